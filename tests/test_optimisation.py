@@ -5,16 +5,19 @@ import signal
 import sys
 import tomllib
 from contextlib import ExitStack
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 
 import paraflex as pf
 from journals import rows_in
 from made_up import STUDY, made_up, write_study
 from paraflex.campaign import open_engine
 from paraflex.campaign.journal import write_journal
+from paraflex.cli.optimise import _report as report
 from paraflex.designs.run import run_task
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_names, load_data
@@ -85,6 +88,20 @@ def test_a_limit_nothing_holds_is_said(tmp_path):
     assert not result.holds_limits
     # What passes it least: the thickest.
     assert result.values["x"] == pytest.approx(0.008, rel=0.05)
+
+
+def test_a_limit_nothing_holds_is_named_with_its_unit(capsys):
+    found = SimpleNamespace(
+        values={"x": 1.0}, start={"x": 2.0}, bounds={}, start_objective=1.0, objective=0.5, holds_limits=False,
+        metrics={"stress_max": 2.5e7, "total_mass": 1.0}, start_metrics={"stress_max": 3e7, "total_mass": 2.0},
+        sought={"limits": (("stress_max", 1e7), ("total_mass", 1.5))},
+    )  # fmt: skip
+    report(Console(width=100), found)
+    lines = capsys.readouterr().out.splitlines()
+    assert next(line.split() for line in lines if "stress_max" in line) == ["stress_max", "MPa", "30", "25"]
+    assert [line for line in lines if line.startswith("limit")] == [
+        "limit exceeded: stress_max is above 10 MPa by 15 MPa"
+    ]
 
 
 @pytest.mark.parametrize("over", ["worst", "mean"])

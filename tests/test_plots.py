@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 
 from paraflex import plots
 from paraflex.errors import InputError, OutputError
-from paraflex.plots.labels import display_unit, plain, symbol, three_digits
+from paraflex.plots.labels import DisplayUnit, display_unit, plain, symbol, three_digits
 from paraflex.plots.selection import default_mode
 
 FULL, PARTIAL = "++", "+-"
@@ -451,13 +451,17 @@ def test_unit_suits_the_largest_value(unit: str, largest: float, name: str, fact
     assert display_unit(unit, [0.0, -largest]) == (name, factor)
 
 
+def test_stresses_are_in_megapascals() -> None:
+    assert [display_unit("Pa", value) for value in (0.0, 2.0, 3e8)] == [DisplayUnit("MPa", 1e-6)] * 3
+
+
 def test_names_as_symbols() -> None:
     names = ("tau1", "A1", "C", "link1", "link", "crank_2b", "cost$")
     assert [symbol(name) for name in names] == [
         r"$\tau_{1}$",
         "$A_{1}$",
         "$C$",
-        "link 1",
+        "link1",
         "link",
         "crank_2b",
         r"cost\$",

@@ -95,6 +95,12 @@ def test_a_start_out_of_reach_says_how_far():
     assert further.problem.endswith(": 0.1 m beyond reach; its furthest point, (1.2, 0) m, lies 0.4 m beyond reach")
 
 
+@pytest.mark.parametrize(("scale", "asked"), [(1e3, True), (10.0, False)])
+def test_a_path_in_millimetres_is_asked_about(scale, asked):
+    path = Line((0.3 * scale, 0.2 * scale), (0.3 * scale, 0.3 * scale), 10.0)
+    assert ("is the path in mm?" in str(refused(arm(), path))) == asked
+
+
 def test_prescribed_motions_move_what_can_be_reached():
     law = SampledAngle(
         lambda t: 0.6 + 0.4 * np.sin(9 * t), lambda t: 3.6 * np.cos(9 * t), lambda t: -32.4 * np.sin(9 * t)

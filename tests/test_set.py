@@ -65,6 +65,7 @@ def test_a_model_set_is_that_of_a_file_that_says_so(tmp_path):
             {"distal1.lenght": 0.3},
             r"distal1.lenght: no such field in the model's file; did you mean \"body.distal1.length",
         ),
+        ({"thickness": 0.3}, r"thickness: no such field in the model's file; did you mean section\.bar\.thickness\?"),
         ({"body.distal9.length": 0.3}, r"body.distal9.length: no such field"),
         ({"parameters.l9": 0.3}, r"parameters.l9: no such field"),
         ({"nothing": 0.3}, r"nothing: no such field"),

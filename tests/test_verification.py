@@ -121,7 +121,7 @@ def test_figures_overlay_the_models(verification, tmp_path):
     links = plots.compared_links(data, "++++", ("second-order", "segments"))
     assert len(links.axes) == 16
     panel = links.axes[3]
-    assert panel.get_title() == "link 2: angular velocity"
+    assert panel.get_title() == "link2: angular velocity"
     for line, model in zip(panel.lines, ("second-order", "segments"), strict=True):
         values = data["chord_velocity"].sel(model=model, mode="++++", body="link2")
         np.testing.assert_array_equal(line.get_ydata(), values)

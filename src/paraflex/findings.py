@@ -12,7 +12,10 @@ from typing import Any
 
 from paraflex.errors import ModelWarning, ParaflexWarning, printable, warn_user
 
-__all__ = ["CODES", "Code", "Finding", "Level", "Verdict", "warn_of"]
+# How a run ends that did what was asked.
+DONE_STATUSES = ("complete", "stopped")
+
+__all__ = ["CODES", "DONE_STATUSES", "Code", "Finding", "Level", "Verdict", "warn_of"]
 
 
 class Level(Enum):

@@ -264,5 +264,5 @@ def laws_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator[Fin
             yield Finding(
                 "law-cut-short", place,
                 f"the run ends at {duration:.4g} s, the law goes on to {end:.4g} s",
-                "let the study last as long, in s",
+                "give the study a duration of at least that, in s",
             )  # fmt: skip

@@ -93,7 +93,9 @@ def _numbers(pairs: Iterable[NumberPair]) -> Table:
         [metric_label(pair.name), *_shown(pair), _percent(pair.relative)]
         for pair in pairs
     )  # fmt: skip
-    return plain_table("number", "unit", numbers=("first", "second", "difference", "relative"), rows=rows)
+    return plain_table(
+        "number", "unit", numbers=("first", "second", "difference", "relative"), rows=rows, wrapped=("number",)
+    )
 
 
 def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
@@ -106,9 +108,8 @@ def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
         [pair.name.replace("_", " "), pair.part, *_shown(pair), _number(pair.time)]
         for pair in most.values()
     )  # fmt: skip
-    return plain_table(
-        "quantity", "of", "unit", numbers=("peak of first", "of second", "difference", "at [s]"), rows=rows
-    )
+    heads = ("peak of first", "of second", "difference", "at [s]")
+    return plain_table("quantity", "of", "unit", numbers=heads, rows=rows, wrapped=("quantity", "of"))
 
 
 def _shown(pair: NumberPair | MotionPair) -> list[str]:

@@ -23,12 +23,13 @@ from paraflex.cli.request import (
     at_fault,
     of_assembly,
 )
-from paraflex.cli.tables import DONE_STATUSES, loads, plain_console, validity
+from paraflex.cli.tables import loads, plain_console, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system
 from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning, ValidityWarning
 from paraflex.files import Model, StudyDefaults
+from paraflex.findings import DONE_STATUSES
 from paraflex.folders import RUN, ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism

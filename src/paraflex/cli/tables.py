@@ -12,15 +12,12 @@ from rich.table import Table
 
 from paraflex.cli.collected import printed
 from paraflex.errors import printable
-from paraflex.findings import Finding
+from paraflex.findings import DONE_STATUSES, Finding
 
 if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
     from paraflex.studies import StudyResult
     from paraflex.tracking import TrackingTask
-
-# How a run ends that did what was asked.
-DONE_STATUSES = ("complete", "stopped")
 
 
 class _PlainConsole(Console):

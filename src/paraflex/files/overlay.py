@@ -90,7 +90,7 @@ def _place_to_set(data: Mapping[str, Any], field: str) -> Place:
         if isinstance(_at(data, place), list) or not _may_have(data, place, part):
             raise InputError(
                 "no such field in the model's file", field=field,
-                remedy=suggestion(_spelt((*place, part)), _known_below(data, place)),
+                remedy=_namesakes(data, part) or suggestion(_spelt((*place, part)), _known_below(data, place)),
             )  # fmt: skip
         place = (*place, part)
     if isinstance(_at(data, place), dict):
@@ -114,6 +114,12 @@ def _known_below(data: Mapping[str, Any], place: Place) -> list[str]:
     there = list(inside) if isinstance(inside, dict) else range(len(inside)) if isinstance(inside, list) else []
     possible = list(annotation.model_fields) if is_table(annotation) else []
     return [_spelt((*place, key)) for key in dict.fromkeys([*there, *possible])]
+
+
+def _namesakes(data: Mapping[str, Any], name: str) -> str:
+    """A remedy for a name whose tables are missing: "did you mean section.bar.thickness?"; empty where none has it."""
+    there = [_spelt(each) for each in number_places(data) if each[-1] == name]
+    return f"did you mean {' or '.join(there[:3])}?" if there else ""
 
 
 def _in_full(data: Mapping[str, Any], field: str) -> list[str]:

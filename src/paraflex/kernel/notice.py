@@ -11,7 +11,7 @@ import multiprocessing
 from collections.abc import Callable
 from pathlib import Path
 
-NOTICE = "paraflex: compiling kernels, once after an installation or an update; this may take half a minute"
+NOTICE = "paraflex: compiling kernels, once after an installation, for each kind of model; this may take half a minute"
 LOG = logging.getLogger("paraflex")
 
 _announced: set[str] = set()

@@ -28,7 +28,7 @@ from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion
 from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.limits import INSTANTS, solvable
-from paraflex.mechanism import Assembly, Mechanism, PointRef
+from paraflex.mechanism import Assembly, Body, Mechanism, PointRef
 from paraflex.mechanism.members import TASK_COORDINATES
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
@@ -45,6 +45,8 @@ _SOON = 0.05
 # A path within a thousandth of a link of such a position cannot be distinguished from one through it.
 _NEARLY_SINGULAR = "or comes so near to one that the assembly beyond it is not certain"
 _MOVE_PATH = "move the path or the bases, or choose another assembly"
+# So many times the size of a mechanism a path is beyond its reach where it is given in another unit.
+_OTHER_UNIT = 30.0
 _OTHER = "it can be reached, but only past a Type I singularity or in another assembly"
 
 
@@ -398,11 +400,20 @@ class PathClosure:
             place = f"({place}) m" if place else f"at t = {found.t[k]:.6g} s"
             furthest = f"its furthest point, {place}, lies {found.beyond(k)} beyond reach"
             detail = f"{detail}; {furthest}" if detail else furthest
+        size = sum(np.hypot.reduce(np.max(np.abs(_places(body)), axis=0)) for body in self.mechanism.bodies)
+        if np.max(found.distance) > _OTHER_UNIT * size:
+            detail += f"; that is {np.max(found.distance) / size:.0f} times the mechanism's size: is the path in mm?"
         place = tuple(found.desired[0, lengths].tolist()) or None
         return UnreachablePathError(
             cause, Moment(at, step, place), partial, _MOVE_PATH, detail=detail,
             shortfall=float(np.max(found.distance)), shortfall_angle=float(np.max(found.turn)),
         )  # fmt: skip
+
+
+def _places(body: Body) -> Array:
+    """Named points of a body in its frame (points, 2) [m]."""
+    places = [(place, 0.0) if isinstance(place, float) else place for place in body.points.values()]
+    return np.array(places, dtype=float).reshape(-1, 2)
 
 
 def _turning(path: Path, t: Array) -> Array | None:

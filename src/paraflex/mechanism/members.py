@@ -79,7 +79,7 @@ class Assembly(CheckedFields):
     _table = "assembly"
 
     name: str
-    angles: Mapping[str, float]
+    angles: Mapping[str, float] = field(default_factory=dict)
     points: Mapping[PointRef, tuple[float, float]] = field(default_factory=dict)
 
 

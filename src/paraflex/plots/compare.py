@@ -51,6 +51,8 @@ def overlaid_motion(comparison: RunComparison, name: str, mode: str = "") -> Fig
         there = dict.fromkeys(pair.name for pair in comparison.motions)
         raise InputError("not compared", field="name", value=name, remedy=f"one of {', '.join(there)}")
     runs = [one_run(data, mode or None) for data in comparison.data]
+    # A motor that idles in both runs has no panel, unless all do.
+    pairs = [pair for pair in pairs if peak([pair.first, pair.second])] or pairs
     curves = [each for pair in _most_different(pairs) for each in _curves(pair, runs)][:_MOST]
     unit = display_unit(pairs[0].unit, np.concatenate([values for _, each in curves for values in each]))
     with journal_style():

@@ -18,8 +18,8 @@ from paraflex.results.metrics import METRICS
 
 Array = NDArray[np.float64]
 
-# Metrics by which designs are not chosen.
-_OF_THE_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
+# Metrics by which designs are not chosen: of the solver, and that of which more is better.
+_NOT_JUDGED = (*(metric.name for metric in METRICS.values() if metric.of_solver), "safety_factor_min")
 _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
 _FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
 # A metric that changes by less, as a share of its size, is the same for all designs.
@@ -88,7 +88,7 @@ class DesignTable:
         if names:
             return list(names)
         # Metrics of single motors only if there are no others.
-        varying = [name for name in self.metrics if self._varies(name) and name not in _OF_THE_SOLVER]
+        varying = [name for name in self.metrics if self._varies(name) and name not in _NOT_JUDGED]
         chosen = ([name for name in varying if "." not in name] or varying)[:most]
         if not chosen:
             raise InputError("no metric varies", field="metric", remedy="run more designs, or wider ranges")
@@ -121,9 +121,7 @@ class DesignTable:
 
     def labelled(self, metric: str) -> tuple[str, float]:
         """Label of a metric's axis, and the factor of its values."""
-        unit, factor = self.units.get(metric, ""), 1.0
-        if unit == "m":
-            unit, factor = display_unit("m", self.metrics[metric])
+        unit, factor = display_unit(self.units.get(metric, ""), self.metrics[metric])
         printed = metric_name(metric)
         return (f"{printed} [{unit}]" if unit not in ("", "1") else printed), factor
 

@@ -128,9 +128,11 @@ def moving_points(run: xr.Dataset) -> list[int]:
     places = run["point_position"].transpose("time", "point", "axis").values
     names = names_of(run, "point")
     travel = np.nan_to_num(np.nanmax(places, axis=0) - np.nanmin(places, axis=0)).max(axis=1)
-    # Points at one place share a line; those that a program made have names of their own.
+    # Points at one place share a line, by the end-effector's name where it is one of them; those that a program made
+    # have names of their own.
+    followed = run.attrs.get("end_effector_point")
     shown: list[int] = []
-    for k in np.argsort(-travel, kind="stable"):
+    for k in sorted(range(len(names)), key=lambda k: (names[k] != followed, -travel[k])):
         apart = all(peak(places[:, k] - places[:, other]) > _STILL_SHARE * travel.max() for other in shown)
         if travel[k] > _STILL_SHARE * travel.max() and apart and "._" not in names[k]:
             shown.append(int(k))

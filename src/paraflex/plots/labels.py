@@ -103,7 +103,7 @@ class DisplayUnit(NamedTuple):
 _PREFIXES = {
     "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
     "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
-    "Pa": (DisplayUnit("GPa", 1e-9), DisplayUnit("MPa", 1e-6), DisplayUnit("kPa", 1e-3), DisplayUnit("Pa", 1.0)),
+    "Pa": (DisplayUnit("GPa", 1e-9), DisplayUnit("MPa", 1e-6)),
 }
 # The largest value of a unit is at least so many: stresses are in MPa, moduli in GPa.
 _LEAST, _LEAST_OF = 0.1, {"GPa": 2.0}
@@ -152,7 +152,7 @@ def logarithmic_number(value: float) -> str:
 
 
 def symbol(name: str) -> str:
-    """A name in figures: "A1" and "tau1" as symbols with a subscript, "link1" as "link 1", others unchanged."""
+    """A name in figures: "A1" and "tau1" as symbols with a subscript, others unchanged."""
     letters, number = _parted(name)
     if len(letters) != 1 and letters not in _GREEK:
         return plain(text_symbol(name))
@@ -161,11 +161,11 @@ def symbol(name: str) -> str:
 
 
 def text_symbol(name: str) -> str:
-    """A name on pages: "τ₁" for "tau1", "A₁" for "A1", "link 1" for "link1", others unchanged."""
+    """A name on pages: "τ₁" for "tau1", "A₁" for "A1", others unchanged."""
     letters, number = _parted(name)
     if len(letters) == 1 or letters in _GREEK:
         return _GREEK.get(letters, letters) + number.translate(_LOWERED)
-    return f"{letters} {number}".rstrip() if letters else name
+    return name
 
 
 def _parted(name: str) -> tuple[str, str]:

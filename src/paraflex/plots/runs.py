@@ -90,4 +90,11 @@ def largest_over_time(data: xr.Dataset, run: xr.Dataset, values: NDArray[np.floa
     figure, axes = panels(1, 1)
     draw_curves(axes[0, 0], run, {symbol(names[k]): values[:, k] for k in sorted(largest)})
     axes[0, 0].set_ylabel(label)
+    kind = "bodies" if dim == "body" else f"{dim}s"
+    axes[0, 0].set_title(shown_of(len(largest), int(np.count_nonzero(peaks)), f"largest {kind}"))
     return finish_over_time(figure, axes, data, panel_height=56.0)
+
+
+def shown_of(shown: int, all_of_them: int, what: str) -> str:
+    """Title of a panel that has not room for all: "7 of 8, the fastest joints"; empty if it has."""
+    return f"{shown} of {all_of_them}, the {what}" if shown < all_of_them else ""

@@ -14,7 +14,7 @@ from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, effort_label, peak, symbol
 from paraflex.plots.layout import lay_out, panels
-from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time, largest_over_time
+from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time, largest_over_time, shown_of
 from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import ZERO, look_of
 from paraflex.results.loads import sliding_joints
@@ -94,6 +94,7 @@ def joint_motions(data: xr.Dataset, mode: str | None = None) -> Figure:
             names = names_of(joints, "joint")
             draw_curves(panel, run, {symbol(names[k]): values[:, k] for k in largest})
             panel.set_ylabel(axis_label(label))
+            panel.set_title(shown_of(len(largest), len(names), "fastest joints"))
     return finish_over_time(figure, axes, data, panel_height=44.0)
 
 
@@ -113,7 +114,7 @@ def drive_efforts(data: xr.Dataset, mode: str | None = None) -> Figure:
                 efforts["torque"][label], efforts["speed"][label] = force, one[f"{dim}_speed"].values
                 efforts["power"][label] = one[f"{dim}_power"].values
     figure, axes = panels(3, 1)
-    rates = {"N m": axis_label("angular_velocity"), "N": axis_label("speed")}
+    rates = {"N m": axis_label("speed", unit="rad/s"), "N": axis_label("speed")}
     rate = rates.get("".join(units), "speed [rad/s, m/s]")
     labels = (effort_label(", ".join(sorted(units, reverse=True))), rate, axis_label("power"))
     for panel, curves, label in zip(axes[:, 0], efforts.values(), labels, strict=True):

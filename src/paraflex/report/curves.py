@@ -18,6 +18,8 @@ from paraflex.report.page import Chart, Curve, Look
 N_COLOURS, N_DASHES = 8, 5
 DOTTED = 2
 MOST_SAMPLES = 2000
+# Share of its median from which on a curve that begins at zero is drawn on a logarithmic axis.
+_RISEN = 0.01
 # Charts without their curves. A deflection is from a link's chord, which displacements of ends are not.
 ERRORS = Chart(
     "errors", "Tracking error", "distance", log=True, note="Distance of the end-effector from its desired place."
@@ -122,8 +124,16 @@ def followed(
 def compared(chart: Chart, values: xr.DataArray, runs: Sequence[str]) -> Chart:
     """A quantity (runs, samples) over time in all runs, in a chart without curves and unit."""
     unit = display_unit(values.attrs["units"], values.values)
-    curves = [Curve(run, unit.factor * values.values[r], run=r, look=look(r)) for r, run in enumerate(runs)]
+    shown = [unit.factor * (risen(one) if chart.log else one) for one in values.values]
+    curves = [Curve(run, shown[r], run=r, look=look(r)) for r, run in enumerate(runs)]
     return replace(chart, y=labelled(chart.y, unit.name), curves=curves)
+
+
+def risen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A positive curve without its rise from zero, which a logarithmic axis would show as many decades."""
+    known = values[np.isfinite(values)]
+    enough = np.nan_to_num(values) >= _RISEN * (float(np.median(known)) if known.size else 0.0)
+    return np.where(np.arange(values.size) >= np.argmax(enough), values, np.nan)
 
 
 def plane_path(data: xr.Dataset, runs: Sequence[str], *, common: bool = True) -> Chart:

@@ -75,7 +75,10 @@ def _whose(run: str) -> str:
 
 def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
     rows = [(mode, body, one) for mode, each in figures.items() for body, one in each.get("beams", {}).items()]
-    note = "Bending in the outermost fibre; stress: bending and axial together, with place and time of the largest."
+    note = (
+        "Stress: bending and axial together, with place and time of the largest. Bending, in the outermost fibre, and "
+        "axial are each largest at places and times of their own, and do not add up to it."
+    )
     if len(rows) > _MOST_ROWS:
         worst: dict[str, tuple[str, str, Any]] = {}
         for row in rows:
@@ -91,14 +94,13 @@ def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
     several = len(figures) > 1
     strengths = any(one["safety_factor"] is not None for _, _, one in rows)
     heads = [("mode" if several else "beam", ""), *([("beam", "")] if several else []),
-             ("stress", "[MPa]"), ("at", "[m]"), ("time", "[s]"), ("bending", "[MPa]"), ("axial", "[MPa]"),
-             *([("safety", "factor")] if strengths else [])]  # fmt: skip
+             ("stress", "[MPa]"), *([("safety", "factor")] if strengths else []), ("at", "[m]"), ("time", "[s]"),
+             ("bending", "[MPa]"), ("axial", "[MPa]")]  # fmt: skip
     cells = [
         (mode if several else text_symbol(body), [
             *([text_symbol(body)] if several else []),
-            number(one["stress_max"], _MEGA), number(one["place"]), number(one["time"]),
-            number(one["bending_stress_max"], _MEGA), number(one["axial_stress_max"], _MEGA),
-            *([_factor(one)] if strengths else []),
+            number(one["stress_max"], _MEGA), *([_factor(one)] if strengths else []), number(one["place"]),
+            number(one["time"]), number(one["bending_stress_max"], _MEGA), number(one["axial_stress_max"], _MEGA),
         ])
         for mode, body, one in rows
     ]  # fmt: skip
@@ -181,6 +183,8 @@ def load_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
     ):
         if name in data:
             charts.append(followed(Chart(name.replace("_", "-"), title, label, choosing="motion"), data[name], runs))
+    if "motor_speed" in data and data.sizes["motor"]:
+        charts.append(followed(Chart("speeds", "Motor speeds", "speed", choosing="motor"), data["motor_speed"], runs))
     if "motor_power" in data and data.sizes["motor"]:
         charts.append(followed(Chart("powers", "Motor powers", "power", choosing="motor"), data["motor_power"], runs))
     if "frame_force" in data:

@@ -16,7 +16,7 @@ from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import count, number, pairs, quantity
-from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
@@ -49,10 +49,10 @@ def motion_page(data: xr.Dataset) -> Page:
         film=moving,
         no_film="" if moving else NO_SHAPES,
         notes=[
-            *doubt_lines(verdict_of(data)),
             *([] if status == "complete" else [f"{status}: {data['message'].item()}"]),
+            *doubt_lines(verdict_of(data)),
         ],
-        remarks=list(filter(None, [validity_line({"": validity_summary(data)})])),
+        remarks=list(filter(None, [validity_line({"": validity_summary(data)})])) if finished(data).all() else [],
     )
 
 
@@ -193,7 +193,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         name = text_symbol(str(data["body"].values[body]))
         tiles.append(("largest deflection", quantity(largest(deflections), "m"), name))
     status = str(data["status"].item())
-    last = "" if status in ("complete", "stopped") else "last sample "
+    last = "" if status in DONE_STATUSES else "last sample "
     ended = ("status", status, f"{last}t = {_last_time(data):.4g} s, computed in {number(data['wall_time'].item())} s")
     # That a run failed is more than its numbers.
     return [ended, *tiles] if last else [*tiles, ended]

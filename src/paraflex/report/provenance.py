@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import xarray as xr
 
 from paraflex.files import library_names
-from paraflex.results.doubts import FINDINGS, verdict_of
+from paraflex.results.doubts import FINDINGS, finished, verdict_of
 
 # Defaults of a run.
 _RUN_FLAGS = ("rigid", "ked", "balanced")
@@ -39,8 +39,20 @@ def asked(data: xr.Dataset) -> dict[str, Any]:
         return {}
 
 
-def verdict_word(data: xr.Dataset) -> str:
-    """Verdict on results: "sound", "doubtful", "wrong"; empty for files of earlier versions."""
+def verdict_word(data: xr.Dataset, failed: Collection[str] = ()) -> str:
+    """Verdict on results: "failed", or "partly failed" with modes that are whole, else "sound", "doubtful", "wrong".
+
+    Empty for files of earlier versions.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    failed : collection of str
+        Modes that could not start.
+    """
+    whole = finished(data)
+    if failed or not whole.all():
+        return "partly failed" if whole.any() else "failed"
     return verdict_of(data).level.value if FINDINGS in data.attrs else ""
 
 

@@ -10,8 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.findings import DONE_STATUSES
 from paraflex.plots.labels import display_unit, text_symbol
-from paraflex.plots.selection import default_mode, names_of
+from paraflex.plots.selection import default_mode, names_of, samples
 from paraflex.report.curves import (
     DOTTED,
     ERRORS,
@@ -35,7 +36,7 @@ from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
-from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
 from paraflex.results.formulas import during_motion
 from paraflex.results.kinds import check_kind
@@ -66,7 +67,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         title=data.attrs["mechanism"],
         kind="run",
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
-        verdict=verdict_word(data),
+        verdict=verdict_word(data, failed or {}),
         facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
         command=run_command_line(run),
         figures=_figures(data),
@@ -81,7 +82,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         selected=runs.index(default_mode(data)),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=[*doubt_lines(verdict_of(data)), *_unfinished(data, failed or {})],
+        notes=[*_unfinished(data, failed or {}), *doubt_lines(verdict_of(data))],
         remarks=_validity(data),
     )
 
@@ -235,12 +236,13 @@ def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
 
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    """The main numbers."""
+    """The main numbers: where modes failed that, and of the others the rest."""
     rms, words = headline(data)
-    errors_rms = rms.values
+    whole = finished(data)
+    errors_rms = np.where(whole, rms.values, np.nan)
     several = data.sizes["mode"] > 1
-    peaks = np.array([largest(one) for one in data["torque"].values])
-    tiles = []
+    peaks = np.where(whole, [largest(one) for one in data["torque"].values], np.nan)
+    tiles = [] if whole.all() else [_broken_off(data, whole)]
     if np.isfinite(errors_rms).any():
         best = int(np.nanargmin(errors_rms))
         value = quantity(errors_rms[best], "m")
@@ -250,11 +252,21 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         kind = "force" if torque_unit(data) == "N" else "torque"
         value = f"{number(peaks[least])} {torque_unit(data)}"
         tiles.append((f"least peak {kind}" if several else f"peak {kind}", value, _name(data, least)))
-    deflections = np.array([largest(one) for one in _deflections(data)])
+    deflections = np.where(whole, [largest(one) for one in _deflections(data)], np.nan)
     if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
         most = int(np.nanargmax(deflections))
         tiles.append(("largest deflection", quantity(deflections[most], "m"), _name(data, most)))
     return [*tiles, *load_tiles({name: load_figures(data.sel(mode=name)) for name in names_of(data, "mode")})]
+
+
+def _broken_off(data: xr.Dataset, whole: NDArray[np.bool_]) -> tuple[str, str, str]:
+    """How many runs did not come to their end, and how far they came."""
+    first = np.flatnonzero(~whole)
+    ends = [float(data["time"].values[max(samples(data.isel(mode=r)) - 1, 0)]) for r in first]
+    word = str(data["status"].values[first[0]])
+    value = f"{first.size} of {whole.size} modes" if whole.size > 1 else f"at {ends[0]:.3g} s"
+    of = f"from t = {min(ends):.3g} s on" if whole.size > 1 else _name(data, int(first[0]))
+    return word, value, f"{of}, of {data['time'].values[-1]:g} s"
 
 
 def _name(data: xr.Dataset, run: int) -> str:
@@ -267,12 +279,14 @@ def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
     for r, name in enumerate(data["mode"].values):
         status = str(data["status"].values[r])
         if status != "complete":
-            out.append(f"Mode {name}: {status}. {data['message'].values[r]}".rstrip())
+            part = "" if status in DONE_STATUSES else ". Its curves and numbers are of the part before"
+            out.append(f"Mode {name}: {status}. {data['message'].values[r]}{part}".rstrip())
     return out
 
 
 def _validity(data: xr.Dataset) -> list[str]:
-    """A sentence that the model is valid, if it is."""
+    """A sentence that the model is valid, if it is; of whole runs only."""
+    data = data.isel(mode=finished(data))
     line = validity_line({str(name): validity_summary(data.sel(mode=name)) for name in data["mode"].values})
     return [line] if line else []
 

@@ -5,15 +5,22 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from paraflex.findings import Finding, Level, Verdict
+from paraflex.findings import DONE_STATUSES, Finding, Level, Verdict
 
 # Prefix of the places of findings about single runs.
 MODE = "mode "
 _LEVEL_WORDS = {Level.WRONG: "wrong", Level.DOUBTFUL: "warning"}
 # Attribute of a dataset that holds its findings, as JSON.
 FINDINGS = "findings"
+
+
+def finished(data: xr.Dataset) -> NDArray[np.bool_]:
+    """Which runs of a dataset came to their end or to an event; of the others numbers are of a part of the run."""
+    return np.isin(np.atleast_1d(data["status"].values), DONE_STATUSES)
 
 
 def keep_findings(data: xr.Dataset, findings: Iterable[Finding]) -> None:

@@ -47,6 +47,9 @@ const charts = (() => {
 
   // What is far below the largest value is no more than rounding, or the start at rest.
   const MOST_DECADES = 5;
+  // Within one decade there may be no power of ten: Plotly then places numbers between them.
+  const steps = (range) => !range || range[1] - range[0] > 1.5 ? { dtick: 1 } : { nticks: 6 };
+
   function decades(chart) {
     let low = Infinity, high = 0;
     for (const curve of chart.description.curves) {
@@ -82,7 +85,7 @@ const charts = (() => {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
       xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : {}),
-      yaxis: axis(chart.description.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), dtick: 1, tickformat: "~g" } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
+      yaxis: axis(chart.description.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
     };
   }
 
