@@ -315,7 +315,8 @@ def test_the_command_line_says_so(tmp_path):
     assert came.format("stop") in said["stop"]
     assert "warning: joint.pin: its point leaves lever, 0.25 m long, at t = 0.249405 s" in said["warn"]
     assert "[slider-off-beam]" in said["warn"]
-    assert "pin" not in said["ignore"]
+    assert "joint pin came" not in said["ignore"]
+    assert "warning: joint.pin" not in said["ignore"]
     figures = json.loads((tmp_path / "error" / "summary.json").read_text())
     assert figures["event"] == "joint pin at the end of lever"
 

@@ -279,7 +279,7 @@ def test_twins_of_a_symmetric_mechanism_are_shown_once(data: xr.Dataset) -> None
     run = data.isel(body=[0, 1, 0, 1]).assign_coords(body=names)
     run["tip_transverse"][:] = wave * [0.0070, 0.0041, 0.0075, 0.0040]
     titles = [axes.get_title() for axes in plots.tip_deflections(run, FULL).axes]
-    assert titles[::3] == ["left 1: axial displacement", "left 2: axial displacement"]
+    assert titles[::3] == ["left1: axial displacement", "left2: axial displacement"]
 
 
 def test_link_motions_desired_and_actual(data: xr.Dataset) -> None:

@@ -156,7 +156,8 @@ def test_the_best_runs_are_made_again_and_move(finished, page, html):
     error = 1e-3 * rows_of(page["series"])[chart["curves"][0]["y"]]
     if chart["y"].endswith("[µm]"):
         error *= 1e-3
-    assert np.sqrt(np.mean(error**2)) == pytest.approx(best["tracking_rms"], rel=1e-4)
+    # The rise from the start at rest is left out: nothing beside the rest.
+    assert np.sqrt(np.nansum(error**2) / error.size) == pytest.approx(best["tracking_rms"], rel=1e-4)
     assert "come out otherwise" not in html
     # Each row of the table of best designs selects its run.
     rows = re.findall(r'<tr data-run="(\d+)"', html)

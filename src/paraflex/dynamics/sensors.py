@@ -41,7 +41,7 @@ from paraflex.mechanism.sensors import unit_vector
 _STEP = 1e-30
 
 
-class Measured(NamedTuple):
+class MotionSamples(NamedTuple):
     """What sensors read from: coordinates (k, n) and their derivatives, multipliers (k, m), torques (k, motors)."""
 
     q: Numbers
@@ -68,16 +68,16 @@ class _Local(NamedTuple):
     ----------
     read : callable
         From those of its own columns alone to readings (k,).
-    columns : Measured of (c,) arrays
+    columns : MotionSamples of (c,) arrays
         Numbers of the coordinates, multipliers and motors that it depends on.
     """
 
-    read: Callable[[Measured], Numbers]
-    columns: Measured
+    read: Callable[[MotionSamples], Numbers]
+    columns: MotionSamples
 
-    def taken(self, given: Measured) -> Measured:
+    def taken(self, given: MotionSamples) -> MotionSamples:
         """Its own columns of those of a system."""
-        return Measured(*(values[:, own] for values, own in zip(given, self.columns, strict=True)))
+        return MotionSamples(*(values[:, own] for values, own in zip(given, self.columns, strict=True)))
 
 
 def sensor_readings(
@@ -106,7 +106,7 @@ def sensor_readings(
     InputError
         A sensor of what the mechanism does not have.
     """
-    given = Measured(q, v, a, multipliers, torques)
+    given = MotionSamples(q, v, a, multipliers, torques)
     readings = [each.read(each.taken(given)) for each in _locals(system, sensors)]
     return np.stack(readings, axis=1) if readings else np.zeros((len(q), 0))
 
@@ -135,14 +135,16 @@ def sensor_rows(
     InputError
         A sensor of what the mechanism does not have.
     """
-    state = Measured(*(np.asarray(each)[None] for each in (q, v, a, multipliers, torques)))
+    state = MotionSamples(*(np.asarray(each)[None] for each in (q, v, a, multipliers, torques)))
     found = _locals(system, sensors)
     entries: list[list[tuple[Array, Array]]] = [[] for _ in state]
     for each in found:
         own = each.taken(state)
         sizes = [values.shape[1] for values in own]
         steps = np.split(1j * _STEP * np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
-        slopes = np.imag(each.read(Measured(*(values + step for values, step in zip(own, steps, strict=True))))) / _STEP
+        slopes = (
+            np.imag(each.read(MotionSamples(*(values + step for values, step in zip(own, steps, strict=True))))) / _STEP
+        )
         for kind, columns, values in zip(entries, each.columns, np.split(slopes, np.cumsum(sizes)[:-1]), strict=True):
             kind.append((columns, values))
     return SensorRows(*(_sparse(kind, values.shape[1]) for kind, values in zip(entries, state, strict=True)))
@@ -181,7 +183,7 @@ def _local(system: System, sensor: Sensor) -> _Local:
     read = _reader(replace(system, bodies=tuple(bodies)), sensor, parts.alone())
     of_bodies = np.concatenate(columns)
     rows, motors = (np.array(each, int) for each in (parts.rows, list(parts.motors)))
-    return _Local(read, Measured(of_bodies, of_bodies, of_bodies, rows, motors))
+    return _Local(read, MotionSamples(of_bodies, of_bodies, of_bodies, rows, motors))
 
 
 def _bodies(system: System, sensor: Sensor) -> list[str]:
@@ -192,7 +194,7 @@ def _bodies(system: System, sensor: Sensor) -> list[str]:
     return [name for name in dict.fromkeys(names) if name != GROUND]
 
 
-def _reader(system: System, sensor: Sensor, parts: JointParts) -> Callable[[Measured], Numbers]:
+def _reader(system: System, sensor: Sensor, parts: JointParts) -> Callable[[MotionSamples], Numbers]:
     """What a sensor of a system does."""
     if isinstance(sensor, Encoder):
         return lambda at: joint_coordinate(system, sensor.joint, at.q, at.v).value
@@ -209,12 +211,12 @@ def _reader(system: System, sensor: Sensor, parts: JointParts) -> Callable[[Meas
     raise TypeError(sensor)
 
 
-def _of_point(system: System, sensor: PointSensor) -> Callable[[Measured], Numbers]:
+def _of_point(system: System, sensor: PointSensor) -> Callable[[MotionSamples], Numbers]:
     """Component of a point's motion along an axis, which a body may carry."""
     marker, (ex, ey) = system.marker(sensor.point), sensor.direction
     frame = None if sensor.body == GROUND else system.body(sensor.body)
 
-    def read(at: Measured) -> Numbers:
+    def read(at: MotionSamples) -> Numbers:
         motion = marker_motion(system, marker, at.q, at.v, at.a)
         if isinstance(sensor, PositionSensor):
             vector = motion.position if frame is None else motion.position - at.q[:, frame.position]
@@ -228,7 +230,7 @@ def _of_point(system: System, sensor: PointSensor) -> Callable[[Measured], Numbe
     return read
 
 
-def _of_strain(system: System, sensor: StrainGauge) -> Callable[[Measured], Numbers]:
+def _of_strain(system: System, sensor: StrainGauge) -> Callable[[MotionSamples], Numbers]:
     """Strain of a beam, N / E A - distance M / E I; without N where its coordinates do not stretch."""
     described = system.mechanism.body(sensor.body)
     assert isinstance(described, FlexibleBeam | AssumedModesBeam)
@@ -240,14 +242,14 @@ def _of_strain(system: System, sensor: StrainGauge) -> Callable[[Measured], Numb
     assert distance is not None
     bending, axial = distance / (stiffness * section.second_moment), 1.0 / (stiffness * section.area)
 
-    def read(at: Measured) -> Numbers:
+    def read(at: MotionSamples) -> Numbers:
         moment, force = at_place.loads(system, at.q, at.v, at.a)
         return (axial * force if at_place.part.force is not None else 0.0) - bending * moment
 
     return read
 
 
-def _of_load(system: System, sensor: JointForceSensor, parts: JointParts, at: Measured) -> Numbers:
+def _of_load(system: System, sensor: JointForceSensor, parts: JointParts, at: MotionSamples) -> Numbers:
     """Component of a joint's force, or its moment."""
     force, moment = load_in(system, sensor.joint, parts, at.q, at.multipliers, at.torques)
     if sensor.axis == "moment":
@@ -259,7 +261,7 @@ def _of_load(system: System, sensor: JointForceSensor, parts: JointParts, at: Me
     return ex * force[:, 0] + ey * force[:, 1]
 
 
-def _of_deflection(system: System, sensor: DeflectionSensor) -> Callable[[Measured], Numbers]:
+def _of_deflection(system: System, sensor: DeflectionSensor) -> Callable[[MotionSamples], Numbers]:
     """Displacement of a point in its body's frame, or the turn of the material there."""
     marker = system.marker(sensor.point)
     body = system.bodies[marker.body]
@@ -267,7 +269,7 @@ def _of_deflection(system: System, sensor: DeflectionSensor) -> Callable[[Measur
         return lambda at: at.q[:, body.flexible] @ marker.slope
     row = 0 if sensor.axis == "x" else 1
 
-    def read(at: Measured) -> Numbers:
+    def read(at: MotionSamples) -> Numbers:
         u = at.q[:, body.flexible]
         moved = u @ marker.N[row]
         if row or marker.bending is None:

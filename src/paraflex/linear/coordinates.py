@@ -29,7 +29,7 @@ _DEPENDENT = 1e-8
 _LAST = 1e-5
 
 
-class Quantity(NamedTuple):
+class Variable(NamedTuple):
     """A state, an input or an output: its name and its unit."""
 
     name: str
@@ -204,16 +204,16 @@ class Coordinates:
             scale[body.flexible] = size / np.hypot(1.0, body.modes.omega / (lowest if np.isfinite(lowest) else 1.0))
         return scale
 
-    def names(self, chosen: Chosen) -> tuple[Quantity, ...]:
+    def names(self, chosen: Chosen) -> tuple[Variable, ...]:
         """The states that are coordinates; their rates follow in the same order."""
         mechanism, quantities = self.system.mechanism, []
         for joint in (self.joints[k] for k in chosen.joints.tolist()):
-            quantities.append(Quantity(joint, "m" if mechanism.joint(joint).slides else "rad"))
+            quantities.append(Variable(joint, "m" if mechanism.joint(joint).slides else "rad"))
         for k in chosen.bodies.tolist():
             body = next(one for one in self.system.bodies if one.all.start <= k < one.all.stop)
             local = k - body.offset
             own = ("x", "y", "angle")[local] if local < 3 else f"elastic{local - 2}"
-            quantities.append(Quantity(f"{body.name}.{own}", ("m", "m", "rad")[local] if local < 3 else "m kg^0.5"))
+            quantities.append(Variable(f"{body.name}.{own}", ("m", "m", "rad")[local] if local < 3 else "m kg^0.5"))
         return tuple(quantities)
 
 

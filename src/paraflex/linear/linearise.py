@@ -24,7 +24,7 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import Chosen, Coordinates, Quantity, coordinates_of
+from paraflex.linear.coordinates import Chosen, Coordinates, Variable, coordinates_of
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import planned_point, resting_point, run_point
@@ -154,9 +154,9 @@ def linear_model(
         mode=ports.mode.name,
         about=about,
         unbalanced=unbalanced,
-        states=(*states, *(Quantity(f"{one.name}_rate", f"{one.unit}/s") for one in states)),
+        states=(*states, *(Variable(f"{one.name}_rate", f"{one.unit}/s") for one in states)),
         inputs=inputs,
-        outputs=tuple(Quantity(sensor.name, mechanism.sensor_unit(sensor)) for sensor in ports.sensors),
+        outputs=tuple(Variable(sensor.name, mechanism.sensor_unit(sensor)) for sensor in ports.sensors),
         minimal=minimal,
         rows=rows,
         wanted=(np.arange(len(inputs)), np.arange(len(ports.sensors))),
@@ -246,11 +246,11 @@ def _forces(system: System, q: Array, motors: Sequence[int], points: Sequence[Po
     return np.array(columns).reshape(-1, system.n).T
 
 
-def _inputs(mechanism: Mechanism, motors: Sequence[int], ports: Ports) -> tuple[Quantity, ...]:
+def _inputs(mechanism: Mechanism, motors: Sequence[int], ports: Ports) -> tuple[Variable, ...]:
     units = mechanism.motor_units()
     prescribed = {one.name: mechanism.joint(one.joint).slides for one in mechanism.prescribed}
     return (
-        *(Quantity(mechanism.motors[k].name, units[k]) for k in motors),
-        *(Quantity(f"{point}.{axis}", "N") for point in ports.forces for axis in ("x", "y")),
-        *(Quantity(f"{name}_acceleration", "m/s^2" if prescribed[name] else "rad/s^2") for name in ports.prescribed),
+        *(Variable(mechanism.motors[k].name, units[k]) for k in motors),
+        *(Variable(f"{point}.{axis}", "N") for point in ports.forces for axis in ("x", "y")),
+        *(Variable(f"{name}_acceleration", "m/s^2" if prescribed[name] else "rad/s^2") for name in ports.prescribed),
     )

@@ -17,7 +17,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics.linearise import undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.errors import InputError
-from paraflex.linear.coordinates import Quantity
+from paraflex.linear.coordinates import Variable
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
@@ -46,7 +46,7 @@ class LinearModel:
         What the model is about: "a pose at rest", "static equilibrium", "a planned motion", "a run".
     unbalanced : float
         Of a pose at rest: what the mechanism would start with if let go [m/s^2]; forces that do not change hold it.
-    states, inputs, outputs : tuple of Quantity
+    states, inputs, outputs : tuple of Variable
         Names and units.
     minimal : Minimal
         The equations that it was made from.
@@ -60,9 +60,9 @@ class LinearModel:
     mode: str
     about: str
     unbalanced: float
-    states: tuple[Quantity, ...]
-    inputs: tuple[Quantity, ...]
-    outputs: tuple[Quantity, ...]
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
     minimal: Minimal
     rows: SensorRows
     wanted: tuple[NDArray[np.int64], NDArray[np.int64]]
@@ -358,7 +358,7 @@ def _by_size(values: Complex) -> Complex:
     return values[np.argsort(np.abs(values), kind="stable")]
 
 
-def _chosen(names: Sequence[str] | None, have: tuple[Quantity, ...], what: str) -> NDArray[np.int64]:
+def _chosen(names: Sequence[str] | None, have: tuple[Variable, ...], what: str) -> NDArray[np.int64]:
     known = [one.name for one in have]
     if names is None:
         return np.arange(len(known))

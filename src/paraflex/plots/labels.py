@@ -113,7 +113,7 @@ def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
     """The unit in which the largest of lengths, angles or stresses has few digits: "m", "rad", "Pa"; others stay."""
     largest, choices = peak(values), _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
     if largest == 0.0:
-        return choices[0]
+        return next(choice for choice in choices if choice.name not in _LEAST_OF)
     fits = (one for one in choices if largest * one.factor >= _LEAST_OF.get(one.name, _LEAST))
     return next(fits, choices[-1])
 
