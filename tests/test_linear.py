@@ -11,7 +11,8 @@ import pytest
 import paraflex as pf
 import twins
 from paraflex.dynamics import State, build_system, inputs_of
-from paraflex.dynamics.signals import constant_signals, pack_signals
+from paraflex.dynamics.projection import second_rates
+from paraflex.dynamics.signals import constant_signals, moment_signals, pack_signals
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError
 from paraflex.kernel.ode import accelerations
@@ -302,6 +303,19 @@ def test_multipliers_of_a_plan_are_those_of_the_rigid_motion():
     solved = pf.simulate(task, "++++").solution
     assert point.a == pytest.approx(solved.a[2], rel=1e-3, abs=1e-3 * np.abs(solved.a[2]).max())
     assert point.multipliers == pytest.approx(solved.multipliers[2], abs=1e-3 * np.abs(solved.multipliers[2]).max())
+
+
+def test_segments_of_a_plan_lie_and_move_along_their_links():
+    """Joints between segments are closed, Phi' and Phi'' are zero, at the plan's velocities and accelerations."""
+    path = Line((0.0, 0.264), (0.0, 0.2), max_acceleration=40.0)
+    task = pf.plan(pf.library.raparm_i(), path, samples=5).in_segments(2)
+    point = linearise(task, mode="++++", at=0.5 * task.motion.t[-1]).minimal.point
+    assert np.abs(point.a).max() > 10.0
+    signals = moment_signals(task.mechanism, point.time)
+    phi, rates = task.system.constraints(signals, point.time, point.q, point.v)
+    assert phi == pytest.approx(0.0, abs=1e-9)
+    assert rates == pytest.approx(0.0, abs=1e-9)
+    assert second_rates(task.system, signals, point.time, point.q, point.v, point.a) == pytest.approx(0.0, abs=1e-7)
 
 
 # --- In other programs ------------------------------------------------------------------------------------------------

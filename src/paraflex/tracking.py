@@ -147,7 +147,7 @@ class TrackingTask:
             self,
             mechanism=mechanism,
             system=system,
-            start=_start(system, self.motion, self.carriers or _in_place(system)),
+            start=_start(system, self.motion, self.carriers),
         )
 
     @checked_arguments()
@@ -333,7 +333,7 @@ def plan_tracking(
         motion=motion,
         effort=required_effort(motion),
         plan=plan_torques(follow, path_knots(path, end, mechanism)),
-        start=_start(system, motion, _in_place(system)),
+        start=_start(system, motion, {}),
         after=as_enum(Ending, after, "after"),
     )
 
@@ -471,22 +471,30 @@ def _drive_and_hold(
     return whole(held)
 
 
-def _in_place(system: System) -> dict[str, tuple[str, float]]:
-    return {body.name: (body.name, 0.0) for body in system.bodies}
-
-
 def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str, float]]) -> State:
     """Bodies at the start of the planned motion; each at its distance along its carrier."""
-    q, v = np.zeros(system.n), np.zeros(system.n)
-    for body in system.bodies:
-        name, along = carriers[body.name]
-        rigid = motion.system.body(name)
-        x, y, phi = motion.q[0, rigid.all]
-        vx, vy, w = motion.v[0, rigid.all]
-        c, s = along * np.cos(phi), along * np.sin(phi)
-        q[body.offset : body.offset + 3] = x + c, y + s, phi
-        v[body.offset : body.offset + 3] = vx - w * s, vy + w * c, w
+    q, v, _ = undeformed_motion(system, motion, carriers, 0)
     return State(float(motion.t[0]), q, v)
+
+
+def undeformed_motion(
+    system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str, float]], sample: int
+) -> tuple[Array, Array, Array]:
+    """Coordinates (n,) and their derivatives at a sample of a rigid motion, bodies at their places along carriers.
+
+    `carriers` is empty where nothing was cut.
+    """
+    q, v, a = np.zeros((3, system.n))
+    for body in system.bodies:
+        name, along = carriers.get(body.name, (body.name, 0.0))
+        own = motion.system.body(name).all
+        (x, y, phi), (vx, vy, w), (ax, ay, dw) = (part[sample, own] for part in (motion.q, motion.v, motion.a))
+        c, s = along * np.cos(phi), along * np.sin(phi)
+        rigid = slice(body.offset, body.offset + 3)
+        q[rigid] = x + c, y + s, phi
+        v[rigid] = vx - w * s, vy + w * c, w
+        a[rigid] = ax - dw * s - w * w * c, ay + dw * c - w * w * s, dw
+    return q, v, a
 
 
 def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Array:

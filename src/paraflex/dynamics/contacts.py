@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics.coordinates import BodyCoordinates, transverse_pieces
+from paraflex.dynamics.coordinates import BodyCoordinates, element_at, transverse_pieces, transverse_rows
 from paraflex.dynamics.joint_coordinates import place_along_beam
 from paraflex.dynamics.system import System
 from paraflex.fem import ReferenceCondition
@@ -75,8 +75,7 @@ class Contacts(NamedTuple):
 
     def element(self, place: Array) -> NDArray[np.int64]:
         """Index of the element at places of any shape."""
-        inner = np.real(self.beam.mesh.nodes[1:-1])
-        return np.searchsorted(inner, np.real(place), side="right")
+        return element_at(self.beam.mesh.nodes, place)
 
     def inside(self, x: Array) -> Array:
         """Stations (s,), as many in each element, a little within their elements, on their side of its nodes."""
@@ -100,9 +99,7 @@ class Contacts(NamedTuple):
 
     def _rows(self, place: Array, derivative: int) -> Array:
         """W or a derivative at places (k, contacts): (k, contacts, nf)."""
-        element = self.element(place)
-        z = place - self.beam.mesh.nodes[element]
-        return np.einsum("kcp,kcpj->kcj", _powers(z, derivative), self.pieces[element])
+        return transverse_rows(self.beam.mesh.nodes, self.pieces, place, derivative)
 
     def exact(self, x: Array, place: Array) -> Array:
         """Moment G at x of a unit force at each place, in the supports of the frame; of arrays that go together."""
@@ -132,12 +129,6 @@ class Contacts(NamedTuple):
             resists = lump.mass * (there - x) * (1.0 / whole.m + turn * (there - centre)) + lump.inertia * turn
             moment = moment + np.where(np.real(there) > np.real(x), resists, 0.0)
         return moment
-
-
-def _powers(z: Array, derivative: int) -> Array:
-    """z^0..z^5 or a derivative of each, along a last axis."""
-    coefficients = np.polynomial.polynomial.polyder(np.eye(6), derivative)
-    return np.stack([sum(c * z**p for p, c in enumerate(column) if c) + 0.0 * z for column in coefficients.T], axis=-1)
 
 
 def contacts_of(system: System, beam: FlexibleBeam) -> Contacts | None:

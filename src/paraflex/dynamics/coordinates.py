@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics.shapes import BodyShape, PointShape, beam_lumps, body_shape
@@ -236,3 +237,17 @@ def transverse_pieces(body: BodyCoordinates) -> Array:
         powers = np.linalg.solve(np.vander(z, increasing=True), rows)
         pieces.append(powers / ((b - a) ** np.arange(6))[:, None] @ body.integrals.D)
     return np.array(pieces)
+
+
+def element_at(nodes: Array, place: Array) -> NDArray[np.int64]:
+    """Index of the element at places of any shape along a beam, the end ones beyond its ends."""
+    return np.searchsorted(np.real(nodes[1:-1]), np.real(place), side="right")
+
+
+def transverse_rows(nodes: Array, pieces: Array, place: Array, derivative: int) -> Array:
+    """Transverse displacement per modal coordinate, or a derivative by the place: (..., nf) for places (...)."""
+    element = element_at(nodes, place)
+    z = place - nodes[element]
+    coefficients = np.polynomial.polynomial.polyder(np.eye(6), derivative)
+    powers = [sum(c * z**p for p, c in enumerate(column) if c) + 0.0 * z for column in coefficients.T]
+    return np.einsum("...p,...pj->...j", np.stack(powers, axis=-1), pieces[element])

@@ -14,7 +14,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.constraints import RowTerm, Term, row_order
-from paraflex.dynamics.coordinates import transverse_pieces
+from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_coordinates import axis_angle, marker_place
 from paraflex.dynamics.points import point_motion
@@ -192,13 +192,9 @@ def _track_slope(system: System, joint: Joint, q: Array) -> Array:
     """Slope (k,) of a beam in its frame, at the place of the point that slides on it."""
     body = system.body(joint.a.body)
     assert body.mesh is not None
-    nodes, pieces = body.mesh.nodes, transverse_pieces(body)
     away = marker_place(system, system.marker(joint.b), q)[0] - q[:, body.position]
     x = np.sum(away * _unit(q[:, body.angle]), axis=1)
-    piece = np.clip(np.searchsorted(nodes, np.real(x), side="right") - 1, 0, len(pieces) - 1)
-    z = x - nodes[piece]
-    powers = np.arange(1, pieces.shape[1])
-    shapes = np.einsum("kp,kpj->kj", powers * z[:, None] ** (powers - 1), pieces[piece][:, 1:])
+    shapes = transverse_rows(body.mesh.nodes, transverse_pieces(body), x, 1)
     return np.sum(shapes * q[:, body.flexible], axis=1)
 
 

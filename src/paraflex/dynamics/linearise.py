@@ -97,7 +97,7 @@ def natural_frequencies(
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
     lam, _, acceleration = forces_at_rest(system, state, [*held, *torque_at], (M, J))
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
-    C, typical = _with_joints(system, J, state.q, held), _typical_square(elastic, other, M)
+    C, typical = _with_joints(system, J, state.q, held), typical_square(elastic, other, M)
     K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
     if system.n <= DENSE_COORDINATES:
         squares, shapes = _all(K, M, C, elastic, typical)
@@ -151,7 +151,7 @@ def forces_at_rest(
     return RestForces(lam + mu[: system.m], -mu[system.m :], acceleration)
 
 
-def _typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
+def typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
     """A reference for squares of frequencies: the lowest of any body, else by springs and weight, else one."""
     if np.any(elastic > 0.0):
         return float(np.min(elastic[elastic > 0.0]))

@@ -139,6 +139,18 @@ def neighbours(system: System, more: Iterable[Sequence[int]] = ()) -> list[set[i
     return found
 
 
+def bodies_acted_on(system: System) -> list[set[int]]:
+    """For each body itself and all that rows and springs between points tie to it: where its forces act."""
+    index = system.index
+    ends = [(spring.a, spring.b) for spring in system.mechanism.linear_springs]
+    return neighbours(system, [[index[ref.body] for ref in pair if not ref.on_ground] for pair in ends])
+
+
+def apart_colours(tied: list[set[int]]) -> NDArray[np.int64]:
+    """A colour for every body, such that two of one colour act on no body in common."""
+    return greedy_colours([set().union(*(tied[other] for other in others)) for others in tied])
+
+
 def greedy_colours(neighbours: list[set[int]]) -> NDArray[np.int64]:
     """A colour for every body, different from those of its neighbours."""
     colours = np.full(len(neighbours), -1)

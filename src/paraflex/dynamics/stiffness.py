@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import greedy_colours, neighbours, tied_bodies, without_stiffness
+from paraflex.dynamics.sparse import apart_colours, bodies_acted_on, tied_bodies, without_stiffness
 from paraflex.dynamics.state import point_position
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING, PackedSystem, Signals, Workspace
@@ -74,10 +74,8 @@ def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.s
         Multipliers of constraints and torques of springs at joints at that pose.
     """
     forces, steps = RestingForces(system, time), _steps(system, q)
-    springs = system.mechanism.linear_springs
-    stretched = [[system.index[ref.body] for ref in (one.a, one.b) if not ref.on_ground] for one in springs]
-    tied, spring_rows = neighbours(system, stretched), _spring_rows(system, forces.springs)
-    colour = greedy_colours([set().union(*(tied[other] for other in others)) for others in tied])
+    tied, spring_rows = bodies_acted_on(system), _spring_rows(system, forces.springs)
+    colour = apart_colours(tied)
     stiffness, slopes = _Entries(), _Entries()
     for group in range(int(colour.max(initial=-1)) + 1):
         members = np.nonzero(colour == group)[0].tolist()

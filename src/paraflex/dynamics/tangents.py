@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
-from paraflex.dynamics.sparse import greedy_colours, neighbours, tied_bodies
+from paraflex.dynamics.sparse import apart_colours, bodies_acted_on, tied_bodies
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING
 from paraflex.kernel.tangent import make_tangent, note_slopes
@@ -117,16 +117,11 @@ class Tangency:
 
     @cached_property
     def _tied(self) -> list[set[int]]:
-        """Each body and all on which it acts."""
-        springs = self.system.mechanism.linear_springs
-        index = self.system.index
-        stretched = [[index[ref.body] for ref in (one.a, one.b) if not ref.on_ground] for one in springs]
-        return neighbours(self.system, stretched)
+        return bodies_acted_on(self.system)
 
     @cached_property
     def _colours(self) -> Numbers:
-        tied = self._tied
-        return greedy_colours([set().union(*(tied[other] for other in others)) for others in tied])
+        return apart_colours(self._tied)
 
     @cached_property
     def _sources(self) -> tuple[int, list[Numbers]]:

@@ -171,8 +171,8 @@ class Coordinates:
     def choose(self, tangents: PointTangents) -> Chosen:
         """Choose minimal coordinates at a pose."""
         scale = self.scale
-        constraints = _unit_rows(tangents.constraints.jacobian * scale)
-        rows = _unit_rows(tangents.joints.jacobian * scale)
+        constraints = unit_rows(tangents.constraints.jacobian * scale)
+        rows = unit_rows(tangents.joints.jacobian * scale)
         kept, free = _independent(constraints)
         joints: list[int] = []
         for k in self._order(rows.shape[0]):
@@ -241,7 +241,8 @@ def _row(joint: str) -> str:
     return f"coordinate of {joint}"
 
 
-def _unit_rows(rows: Array) -> Array:
+def unit_rows(rows: Array) -> Array:
+    """Rows of size one, those of zeros as they are."""
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     return rows / np.where(size > 0.0, size, 1.0)
 

@@ -24,7 +24,7 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import Chosen, Coordinates, Variable, coordinates_of
+from paraflex.linear.coordinates import Coordinates, Variable, coordinates_of
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import planned_point, resting_point, run_point
@@ -130,13 +130,12 @@ def linear_model(
     ports: Ports,
     about: str,
     *,
-    chosen: Chosen | None = None,
     unbalanced: float = 0.0,
 ) -> LinearModel:
-    """The model about a point of a motion, in coordinates chosen there unless they are given."""
+    """The model about a point of a motion, in coordinates chosen there."""
     system = coordinates.system
     mechanism, tangents = system.mechanism, coordinates.at(point)
-    chosen = coordinates.choose(tangents) if chosen is None else chosen
+    chosen = coordinates.choose(tangents)
     if not chosen.freedoms:
         raise InputError("has no freedom to move", field="mechanism", value=mechanism.name, remedy="free a joint")
     motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in ports.mode.motors]
@@ -181,7 +180,7 @@ def _ports(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], pre
         if not prescribed:
             raise InputError(
                 "has neither motors nor prescribed motions, so that a linear model of it has no inputs",
-                field="mechanism", value=mechanism.name, remedy="name points at which forces act: forces, --force",
+                field="mechanism", value=mechanism.name, remedy="name points at which forces act: forces=[...]",
             )  # fmt: skip
     points = tuple(PointRef.parse(text, "forces") for text in forces)
     for point in points:

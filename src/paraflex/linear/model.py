@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics.linearise import undamped_modes
+from paraflex.dynamics.linearise import typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
+from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.minimal import Minimal
@@ -119,17 +120,17 @@ class LinearModel:
     @cached_property
     def _typical(self) -> float:
         """Square of a low frequency [rad^2/s^2], by which frequencies are measured."""
-        omega = np.concatenate([body.modes.omega for body in self.minimal.system.bodies] or [np.zeros(0)])
-        if np.any(omega > 0.0):
-            return float(np.min(omega[omega > 0.0]) ** 2)
-        mass, _, stiffness = self._reduced
-        largest = float(np.max(np.abs(np.diag(stiffness)) / np.diag(mass), initial=0.0))
-        return largest if largest > 0.0 else 1.0
+        whole = self.minimal.tangents.whole
+        return typical_square(stiffness_diagonal(self.minimal.system), whole.stiffness, whole.mass)
 
     @cached_property
     def _modes(self) -> tuple[Array, Array]:
         """Squares of the undamped frequencies (f,), ascending, and shapes (f, f) of unit mass, in the coordinates y."""
-        mass, _, stiffness = self._reduced
+        return self._undamped(np.arange(len(self.states) // 2))
+
+    def _undamped(self, free: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Squares and shapes of the undamped modes in some of the coordinates y, the others held."""
+        mass, _, stiffness = (part[np.ix_(free, free)] for part in self._reduced)
         return undamped_modes(mass, 0.5 * (stiffness + stiffness.T), self._typical)
 
     @cached_property
@@ -184,11 +185,7 @@ class LinearModel:
         InputError
             A motor that the mechanism does not have, or whose joint is no state, as it follows from others.
         """
-        held = [self._joint_state(name) for name in self._motors(motors)]
-        free = np.setdiff1d(np.arange(len(self.states) // 2), held)
-        mass, _, stiffness = (part[np.ix_(free, free)] for part in self._reduced)
-        squares = undamped_modes(mass, 0.5 * (stiffness + stiffness.T), self._typical)[0]
-        return np.sqrt(np.maximum(squares, 0.0))
+        return np.sqrt(np.maximum(self._undamped(self._free(motors))[0], 0.0))
 
     @checked_arguments()
     def held_compliance(self, point: str, motors: Sequence[str] | None = None) -> Array:
@@ -202,15 +199,15 @@ class LinearModel:
             That are held: by default all that are inputs.
         """
         forces = self.select([f"{point}.{axis}" for axis in ("x", "y")])._force_rows
-        free = np.setdiff1d(np.arange(len(forces)), [self._joint_state(name) for name in self._motors(motors)])
+        free = self._free(motors)
         stiffness = self._reduced[2][np.ix_(free, free)]
         return np.asarray(forces[free].T @ scipy.linalg.solve(stiffness, forces[free]))
 
-    def _motors(self, motors: Sequence[str] | None) -> list[str]:
-        mechanism = self.minimal.system.mechanism
-        if motors is None:
-            return [motor.name for motor in mechanism.motors if motor.name in {one.name for one in self.inputs}]
-        return list(motors)
+    def _free(self, motors: Sequence[str] | None) -> NDArray[np.intp]:
+        """Coordinates y that move where motors are held, by default all that are inputs."""
+        own = [motor.name for motor in self.minimal.system.mechanism.motors]
+        names = [one.name for one in self.inputs if one.name in own] if motors is None else motors
+        return np.setdiff1d(np.arange(len(self.states) // 2), [self._joint_state(name) for name in names])
 
     def _joint_state(self, motor: str) -> int:
         joints = {one.name: one.joint for one in self.minimal.system.mechanism.motors}
@@ -234,11 +231,7 @@ class LinearModel:
             return _by_size(np.concatenate([root, -root]))
         A = self._scaled.A
         # Free motions without damping have double poles, which an eigenvalue solver would take apart.
-        free = (
-            (squares == 0.0) & ~np.any(self._modal_damping, axis=1)
-            if self._is_vibrating
-            else np.zeros_like(squares, bool)
-        )
+        free = (squares == 0.0) & ~np.any(self._modal_damping, axis=1) & self._is_vibrating
         other = np.nonzero(~np.tile(free, 2))[0]
         found = np.asarray(scipy.linalg.eigvals(A[np.ix_(other, other)]), dtype=complex)
         return _by_size(np.concatenate([np.zeros(2 * int(free.sum()), dtype=complex), found]))
@@ -293,10 +286,6 @@ class LinearModel:
         for k, s in enumerate(points):
             out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
         return out
-
-    def steady_gain(self) -> Array:
-        """Response (outputs, inputs) to constant inputs, if nothing moves freely."""
-        return np.real(self.frequency_response(np.array([0j]))[0])
 
     # --- The same in other forms --------------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, inputs_of, joint_coordinate
+from paraflex.dynamics import State, System, joint_coordinate
 from paraflex.dynamics.linearise import forces_at_rest
 from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import sparse_jacobian
@@ -14,7 +14,7 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
-from paraflex.tracking import TrackingRun, TrackingTask
+from paraflex.tracking import TrackingRun, TrackingTask, undeformed_motion
 
 
 def resting_point(system: System, state: State, mode: ActuationMode) -> tuple[MotionPoint, float]:
@@ -42,11 +42,7 @@ def planned_point(task: TrackingTask, mode: ActuationMode, sample: int) -> Motio
     deflections have a residual there, which the linear model leaves out.
     """
     system, rigid = task.system, task.motion
-    q, v, a = np.zeros((3, system.n))
-    for body in system.bodies:
-        own = rigid.system.body(body.name).all
-        for whole, part in ((q, rigid.q), (v, rigid.v), (a, rigid.a)):
-            whole[body.offset : body.offset + 3] = part[sample, own]
+    q, v, a = undeformed_motion(system, rigid, task.carriers, sample)
     time = float(rigid.t[sample])
     efforts = task.torques(mode).evaluate(rigid.t[sample : sample + 1])[0]
     forces = RestingForces(system, time)
@@ -74,7 +70,7 @@ def run_point(run: TrackingRun | MotionRun, sample: int) -> MotionPoint:
 
 def _acting(system: System, time: float, efforts: dict[int, float]) -> Array:
     """What acts (acting,) at a time: efforts of motors by number, and loads."""
-    acting = acting_loads(system.mechanism, np.array([time]))[0] if inputs_of(system.mechanism).acting else np.zeros(0)
+    acting = acting_loads(system.mechanism, np.array([time]))[0]
     for k, effort in efforts.items():
         acting[k] = effort
     return acting

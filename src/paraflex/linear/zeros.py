@@ -18,6 +18,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
+from paraflex.linear.coordinates import unit_rows
 
 Complex = NDArray[np.complex128]
 # Zeros of two squared systems that agree this well are one.
@@ -64,7 +65,7 @@ def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
     if inputs < outputs:
         return _common(lambda mix: vibrating_zeros(modes._replace(C=mix @ modes.C), shift), (inputs, outputs), shift)
     scale = 1.0 / np.sqrt(np.maximum(modes.squares, 0.0) + shift**2)
-    left, right = (scipy.linalg.null_space(_unit(rows * scale)) for rows in (modes.B.T, modes.C))
+    left, right = (scipy.linalg.null_space(unit_rows(rows * scale)) for rows in (modes.B.T, modes.C))
 
     def between(matrix: Array) -> Array:
         return left.T @ ((matrix * scale) * scale[:, None]) @ right
@@ -131,10 +132,6 @@ def _shifted(theta: Complex, shift: float) -> Complex:
 def _sizes(matrix: Array, axis: int) -> Array:
     size = np.linalg.norm(matrix, axis=axis, keepdims=True)
     return np.where(size > 0.0, size, 1.0)
-
-
-def _unit(rows: Array) -> Array:
-    return rows / _sizes(rows, 1)
 
 
 def _sorted(values: Complex) -> Complex:

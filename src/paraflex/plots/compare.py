@@ -51,8 +51,8 @@ def overlaid_motion(comparison: RunComparison, name: str, mode: str = "") -> Fig
         there = dict.fromkeys(pair.name for pair in comparison.motions)
         raise InputError("not compared", field="name", value=name, remedy=f"one of {', '.join(there)}")
     runs = [one_run(data, mode or None) for data in comparison.data]
-    # A motor that idles in both runs has no panel, unless all do.
-    pairs = [pair for pair in pairs if peak([pair.first, pair.second])] or pairs
+    # What stands still or idles in both runs has no panel, unless all do.
+    pairs = [pair for pair in pairs if peak([pair.first, pair.second]) > ROUNDING] or pairs
     curves = [each for pair in _most_different(pairs) for each in _curves(pair, runs)][:_MOST]
     unit = display_unit(pairs[0].unit, np.concatenate([values for _, each in curves for values in each]))
     with journal_style():
@@ -80,8 +80,6 @@ def save_overlays(comparison: RunComparison, folder: Path) -> list[Path]:
 
 def _most_different(pairs: list[MotionPair]) -> list[MotionPair]:
     """So many that there is a panel for each, in the order of the mechanism."""
-    # What stands still in both runs has nothing to show.
-    pairs = [pair for pair in pairs if max(pair.first, pair.second) > ROUNDING] or pairs
     chosen = sorted(pairs, key=lambda pair: -np.nan_to_num(pair.difference))[:_MOST]
     return [pair for pair in pairs if pair in chosen]
 
