@@ -132,7 +132,12 @@ def thin_five_bar(blow):
 
 
 @pytest.mark.parametrize(
-    ("blow", "most"), [(zero_until(0.02, 200.0, 0.025), 500), (200.0, 600)], ids=["a blow", "from the start"]
+    ("blow", "most"),
+    [
+        (zero_until(0.02, 200.0, 0.025), 500),
+        (PiecewiseLaw((ConstantSpeed(200.0, 0.0), ConstantSpeed(0.0, 0.0)), (0.005,)), 600),
+    ],
+    ids=["a blow", "from the start"],
 )
 def test_steps_do_not_follow_fast_vibrations_below_the_tolerance_that_a_jump_excites(blow, most):
     # Axial and bending vibrations of up to 200 kHz, some of them a thousandth of the tolerance: with no more than its
@@ -141,12 +146,12 @@ def test_steps_do_not_follow_fast_vibrations_below_the_tolerance_that_a_jump_exc
     task = plan_tracking(mechanism, Line((0.0, 0.33), (0.05, 0.33), 40.0), duration=0.04, samples=401)
     exact = task.simulate("++", options=IntegrationOptions(step=4e-6, constraints="ggl")).solution
     found = task.simulate("++", options=IntegrationOptions(tolerance=1e-5)).solution
+    assert found.steps < most
     mass = sparse_mass(task.system, exact.q[0]) / task.system.total_mass
     away = found.q - exact.q
     assert np.sqrt(np.max(np.sum(away * (mass @ away.T).T, axis=1))) < 1e-5
     # Steps that leave vibrations behind end on the constraints.
     assert found.constraint_position_max < 1e-7
-    assert found.steps < most
 
 
 def test_a_torque_that_rises_turns_an_arm_with_the_cube_of_time():

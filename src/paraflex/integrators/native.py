@@ -183,9 +183,9 @@ def _least_step(problem: Problem) -> float:
 
 
 def loaded_at_start(problem: Problem) -> bool:
-    """Whether loads act at the start: to a mechanism that is undeformed then this is a jump."""
+    """Whether a load given in time acts at the start: to a mechanism that is undeformed then this is a jump."""
     start = np.array([problem.initial.time])
-    return any(load.largest(start) > 0.0 for load in problem.system.mechanism.loads)
+    return any(load.laws and load.largest(start) > 0.0 for load in problem.system.mechanism.loads)
 
 
 def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
