@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.findings import DONE_STATUSES
 from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.curves import TIPS, bending, energies, energy_scale, followed, largest, look, thinned
