@@ -31,6 +31,8 @@ import documented  # noqa: E402
         ("findings.md", 2),
         ("python-mechanisms.md", 6),
         ("stresses.md", 2),
+        ("quick-return.md", 4),
+        ("linear-models.md", 2),
     ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):
