@@ -33,7 +33,7 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.results import load_results, save_results, summary, tracking_dataset
-from paraflex.results.following import part_run
+from paraflex.results.following import below_tolerance_line, part_run
 from paraflex.results.formulas import drift_speed, vibration
 from paraflex.results.outlines import deflections, outlines
 from paraflex.studies import run_study
@@ -331,3 +331,10 @@ def test_a_coordinate_that_is_no_task_is_compared_with_the_plan():
         np.testing.assert_allclose(slope[middle], upper[middle, 1], atol=0.02 * np.max(np.abs(upper[:, 1])))
     data = tracking_dataset([task.simulate("one", options=IntegrationOptions(tolerance=1e-8))])
     assert data["tracking_rms_motion"].item() < 1e-6
+
+
+def test_tracking_errors_below_the_tolerance_are_named():
+    line = below_tolerance_line({"++-": 1.1e-6, "+++": 9e-7, "+-+": 1e-6, "---": None}, 1e-6)
+    assert line.startswith("tracking errors below the tolerance of 1e-06 m")
+    assert ": +++; choose a finer tolerance (--tol)" in line
+    assert below_tolerance_line({"++-": 1.1e-6, "---": None}, 1e-6) == ""

@@ -1,12 +1,18 @@
 """Runs that do not get on are given up early, and say why; healthy ones never are."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from paraflex.dynamics import build_system
 from paraflex.errors import IntegrationError
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.integrators.pace import Pace
+from paraflex.integrators.pace import Pace, too_slow
+from paraflex.integrators.run import Instant
 from paraflex.kinematics import Line
+from paraflex.mechanism import ModalDamping
 from paraflex.motion import simulate_motion
 from paraflex.tracking import plan_tracking
 
@@ -26,6 +32,29 @@ def test_links_thrown_about_at_a_base_pivot_are_given_up_within_seconds():
     assert solution.status == "failed"
     assert 0.08 < solution.t[-1] < 0.2
     assert solution.steps < 200_000
+
+
+def test_a_jump_that_set_undamped_beams_vibrating_is_named_where_a_run_is_given_up():
+    mechanism = load("five_bar").mechanism
+    system = build_system(mechanism)
+    n = system.n
+    now = Instant(0.3, np.zeros(n), np.zeros(n), np.ones(n), np.zeros(system.m), 0.0)
+    pace = Pace(0.0, 1.0, None, 50_000)
+    pace.look(200, 0.3)
+
+    def said(jumps, bodies=mechanism.bodies):
+        given = replace(system, mechanism=replace(mechanism, bodies=bodies))
+        return too_slow(given, now, np.zeros(n), pace, np.array(jumps))
+
+    cause, remedy = said([0.1, 0.25, 0.5])
+    assert "; loads or torques jumped at t = 0.25 s, and what vibrates since in proximal1, distal1," in cause
+    assert "has no damping; given up" in cause
+    assert "damping = { ratios = [0.01] }" in remedy
+    # Nothing has jumped yet, or damping has ended what a jump excited.
+    damped = tuple(replace(body, damping=ModalDamping((0.01,))) for body in mechanism.bodies)
+    for cause, remedy in (said([0.5]), said([0.1], damped)):
+        assert "jumped" not in cause
+        assert "turns links less fast" in remedy
 
 
 def paced(pace, *pieces):

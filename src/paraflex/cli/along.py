@@ -19,7 +19,7 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import check_stops, model_parameters
 from paraflex.cli.request import at_fault, plan_study
-from paraflex.cli.tables import failures, loads, plain_console, print_studies, validity, warn_of
+from paraflex.cli.tables import below_tolerance, failures, loads, plain_console, print_studies, validity, warn_of
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
@@ -117,6 +117,7 @@ def _show(out: Console, results: Mapping[str, StudyResult], task: TrackingTask, 
         for path, summary in ran.items()
         for mode, one in summary["modes"].items()
     }
+    below_tolerance(out, ran, modes)
     validity(out, {name: mode.get("validity") for name, mode in modes.items()})
     loads(out, {name: mode.get("loads", {}) for name, mode in modes.items()})
 

@@ -149,6 +149,19 @@ def validity(console: Console, verdicts: Mapping[str, Any]) -> None:
         console.print(line, soft_wrap=True)
 
 
+def below_tolerance(console: Console, summaries: Mapping[str, Any], modes: Mapping[str, Any]) -> None:
+    """Runs whose tracking error is smaller than errors of integration may be; with fixed steps nothing is known."""
+    from paraflex.results.following import HEADLINE, ErrorSpan, below_tolerance_line
+
+    first = next(iter(summaries.values()))
+    settings = first["parameters"]["run"]
+    if settings.get("step") is not None or settings.get("ked"):
+        return
+    key = HEADLINE[ErrorSpan(first["error"])]
+    if line := below_tolerance_line({name: mode.get(key) for name, mode in modes.items()}, settings["tolerance"]):
+        console.print(line, soft_wrap=True)
+
+
 def loads(console: Console, figures: Mapping[str, Any]) -> None:
     """What a designer asks first: the largest stress of all runs, what prescribed motions need, the joint force."""
     from paraflex.results.loads import effort_lines, joint_line, stress_line

@@ -141,7 +141,7 @@ def integrate(
             if bent or drift:
                 break
             if code == PAUSED and pace.look(run.attempts, now.t):
-                slow = too_slow(system, now, initial.q, pace)
+                slow = too_slow(system, now, initial.q, pace, problem.jumps)
                 break
             if on_progress is not None:
                 on_progress(now.t)

@@ -11,6 +11,7 @@ from paraflex.dynamics import System
 from paraflex.dynamics.singularity import SingularityMeasure
 from paraflex.integrators.run import Instant
 from paraflex.integrators.watch import Breakdown
+from paraflex.mechanism import RigidBody
 
 # Default limit of the steps of a run.
 MOST_STEPS = 10_000_000
@@ -24,6 +25,8 @@ _SLOW_STEPS, _TIMES_SLOWER = 1_000_000, 100.0
 _FIRST_STEPS = 200
 # A singular position nearer than this is named.
 _NEAR_SINGULAR = 1e-2
+# So many beams without damping are named.
+_NAMED = 3
 
 
 class Pace:
@@ -75,14 +78,31 @@ class Pace:
         return self._most is None and self.expected > _SLOW_STEPS and self.step * self._usual * _TIMES_SLOWER < 1.0
 
 
-def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace) -> Breakdown:
-    """Reason for giving a run up early: size of its steps, the fastest body, and the remedy."""
+def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace, jumps: np.ndarray) -> Breakdown:
+    """Reason for giving a run up early: size of its steps, the fastest body, what jumped before, and the remedy."""
     needed = f"about {pace.expected:.2g}" if math.isfinite(pace.expected) else "infinitely many"
+    excited = _excited(system, now, jumps)
+    remedy = (
+        "give beams damping, say damping = { ratios = [0.01] }, or let what jumps rise within some milliseconds; "
+        "else choose"
+        if excited
+        else "choose a motion that turns links less fast,"
+    )
     return Breakdown(
         f"steps are down to {pace.step:.2g} s, and at this pace the run would need {needed} of them: "
-        f"{_fastest(system, now)}{_singular(system, now, start)}; given up",
-        "choose a motion that turns links less fast, a coarser tolerance, or allow more steps (max_steps)",
+        f"{_fastest(system, now)}{_singular(system, now, start)}{excited}; given up",
+        f"{remedy} a coarser tolerance, or allow more steps (max_steps)",
     )
+
+
+def _excited(system: System, now: Instant, jumps: np.ndarray) -> str:
+    """Remark on the last jump of loads or torques before now, if it met beams without damping."""
+    before = jumps[jumps <= now.t]
+    beams = [body for body in system.mechanism.bodies if not isinstance(body, RigidBody) and body.damping is None]
+    if not before.size or not beams:
+        return ""
+    named = ", ".join(body.name for body in beams[:_NAMED]) + (" and others" if len(beams) > _NAMED else "")
+    return f"; loads or torques jumped at t = {before[-1]:.6g} s, and what vibrates since in {named} has no damping"
 
 
 def _fastest(system: System, now: Instant) -> str:

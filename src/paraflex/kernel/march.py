@@ -38,12 +38,15 @@ from paraflex.kernel.run_state import (
     PREPARED,
     PROJECTION,
     REJECTED,
+    RESERVE,
+    RETURNS,
     ROOT_RATE,
     ROOT_STEP,
     SAMPLE,
     STEP,
     STEPS,
     STOP,
+    TAKEN,
     TIME,
     WEIGHT_0,
     WIDEST,
@@ -221,13 +224,15 @@ def accept(system, signals, tableau, controls, t, h, march, work, out):
     last = tableau.c.size - 1
     if march.counts[NEAR] > 0:
         note_crossing(system, t, h, march, work)
-    if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
+    returns = march.counts[RETURNS] > 0 and controls.treatment == BAUMGARTE
+    if (controls.treatment == PROJECTION or returns) and march.counts[NEAR] == 0:
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
     write_samples(system, tableau, t, h, march, work, out)
     copy(march.stage_q[last], march.q)
     copy(march.stage_v[last], march.v)
     march.clock[WORK] += step_work(tableau, h, march)
     march.clock[LAST_STEP] = h
+    march.clock[RESERVE] -= march.clock[TAKEN]
     copy(march.stage_t[1], march.stage_t[0])
     for s in range(last + 1):
         copy(march.stage_a[1, s], march.stage_a[0, s])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -91,6 +91,17 @@ def headline(data: xr.Dataset) -> tuple[xr.DataArray, str]:
     """
     span = ErrorSpan.MOTION if ranked_by_motion(data) else ErrorSpan.WHOLE
     return data[HEADLINE[span]], SPAN_WORDS[span]
+
+
+def below_tolerance_line(errors: Mapping[str, float | None], tolerance: float) -> str:
+    """Which tracking errors [m] are below the tolerance of integration [m]: these tell nothing. Empty if none is."""
+    small = [name for name, error in errors.items() if error is not None and error < tolerance]
+    if not small:
+        return ""
+    return (
+        f"tracking errors below the tolerance of {tolerance:g} m, no size and no order to be read from them: "
+        f"{', '.join(small)}; choose a finer tolerance (--tol)"
+    )
 
 
 def ranked_by_motion(data: xr.Dataset) -> bool:
