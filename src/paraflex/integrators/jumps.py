@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import perm
+from math import factorial, perm
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics import Inputs
 from paraflex.kernel.packed import Signals
 
-# A jump smaller than this fraction of the signal is rounding.
+# A jump smaller than this fraction of the largest value of the signal is rounding.
 _SMOOTH = 1e-9
 
 
@@ -44,7 +44,8 @@ def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
     x = time - breaks[piece - 1]
     for order in range(derivatives):
         left, right = _derivative(before, order, x), _derivative(after, order, 0.0)
-        if abs(right - left) > _SMOOTH * max(abs(left), abs(right), 1.0):
+        largest = factorial(order) * float(np.max(np.abs(signals.coefficients[first:last, order])))
+        if abs(right - left) > _SMOOTH * max(abs(left), largest):
             return True
     return False
 

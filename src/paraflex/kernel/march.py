@@ -46,14 +46,13 @@ from paraflex.kernel.run_state import (
     STEP,
     STEPS,
     STOP,
-    TAKEN,
     TIME,
     WEIGHT_0,
     WIDEST,
     WORK,
 )
 from paraflex.kernel.stage import equations
-from paraflex.kernel.step import attempt, input_power
+from paraflex.kernel.step import RESERVE_SHARE, attempt, input_power
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
 # Errors of vibrations rise and fall within a period: the error before has a say as well (Gustafsson 1994). None counts
@@ -232,7 +231,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out):
     copy(march.stage_v[last], march.v)
     march.clock[WORK] += step_work(tableau, h, march)
     march.clock[LAST_STEP] = h
-    march.clock[RESERVE] -= march.clock[TAKEN]
+    march.clock[RESERVE] *= 1.0 - RESERVE_SHARE
     copy(march.stage_t[1], march.stage_t[0])
     for s in range(last + 1):
         copy(march.stage_a[1, s], march.stage_a[0, s])

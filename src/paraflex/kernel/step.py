@@ -53,7 +53,6 @@ from paraflex.kernel.run_state import (
     RESERVE,
     RETURNS,
     REUSED,
-    TAKEN,
     WIDEST,
 )
 from paraflex.kernel.signals import evaluate_signal
@@ -67,7 +66,8 @@ IMPATIENCE = 20
 # So many times a stage is gone on with: with slopes of friction where it has come to, or because it contracts and the
 # step is fixed.
 ROUNDS = 6
-# What one step may take of the reserve after a jump: with half of it the first step's is too long for its estimate.
+# What a step may take of the reserve after a jump, the rest being for later ones: half of it makes the first step too
+# long for its estimate.
 RESERVE_SHARE = 0.1
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
@@ -197,7 +197,6 @@ def error_after_jump(system, tableau, g, h, allowed, controls, march, work, slow
     """
     gains = (0.0, 0.0, 0.0)
     error = step_error(system, tableau, g, gains, h, controls, march, work, slow)
-    march.clock[TAKEN] = max(error - allowed, 0.0)
     march.counts[RETURNS] = 1
     return error / (allowed + RESERVE_SHARE * march.clock[RESERVE])
 
@@ -225,7 +224,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
     note_root(march, work)
     perhaps_near = work.least[0] < NEAR_PART * march.clock[WIDEST] and march.counts[PREPARED] >= 0
     march.counts[NEAR], march.counts[HELD_END] = 0, 0
-    march.clock[TAKEN], march.counts[RETURNS] = 0.0, 0
+    march.counts[RETURNS] = 0
     if perhaps_near and comes_near(h, march):
         if march.counts[PREPARED] == 0:
             return ENTERS, 0.0
