@@ -154,8 +154,9 @@ def simulate_motion(
     signals, knots = pack_signals(mechanism, motors, end)
     try:
         solution = integrate(
-            system, signals, state, times, knots=np.array([*own, *knots]), options=options, on_progress=on_progress
-        )
+            system, signals, state, times, knots=np.array([*own, *knots]), options=options, samples=samples,
+            on_progress=on_progress,
+        )  # fmt: skip
     except IntegrationError as error:
         error.partial = _run(system, times, values, with_blame(error, mechanism).partial)
         raise
