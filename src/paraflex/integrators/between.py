@@ -21,7 +21,8 @@ from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
 from paraflex.integrators.solution import Solution
 
-# Place of the finding: the number of samples.
+# Code of the finding, and its place: the number of samples.
+COARSE = "samples-coarse"
 SAMPLES = "study.samples"
 # How many times as many samples are looked at, and how many at least.
 _FINER, _LEAST = 2, 1401
@@ -112,7 +113,7 @@ def samples_too_few(system: System, whole: Solution, kept: Solution, samples: in
         return None
     remedy = _round_number(times_as_many * (samples - 1)) + 1
     text = f"{samples} samples are too few to show the largest loads: {'; '.join(found)}"
-    return Finding("samples-coarse", SAMPLES, text, f"say samples = {remedy}")
+    return Finding(COARSE, SAMPLES, text, f"say samples = {remedy}")
 
 
 def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, str, Array]]:
