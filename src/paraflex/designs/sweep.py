@@ -326,9 +326,7 @@ class _Session:
                 seconds=time.perf_counter() - self.began,
                 interrupted=interrupted,
                 beyond=int(np.sum(table[VALIDITY].to_numpy() > 1.0)),
-                coarse=int(
-                    np.sum((table["status"].to_numpy() == STATUS_COMPLETE) & (table["reason"].to_numpy() != ""))
-                ),
+                coarse=int(np.sum(complete & (table["reason"].to_numpy() != ""))),
             )
             write_json(new / result.values_file, result.to_dict(), remedy=GO_ON)
         return result
