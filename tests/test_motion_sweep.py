@@ -136,7 +136,8 @@ def test_a_row_says_that_its_samples_are_too_few(tmp_path):
 
 
 def test_an_optimisation_takes_differences(tmp_path):
-    objective = '[objective]\nminimise = { total_mass = 1.0 }\n[[objective.at_most]]\nmetric = "stress_max"\nvalue = "400 MPa"\n'
+    limit = '[[objective.at_most]]\nmetric = "stress_max"\nvalue = "400 MPa"\n'
+    objective = f"[objective]\nminimise = {{ total_mass = 1.0 }}\n{limit}"
     search = '[search]\nmethod = "nelder-mead"\nevaluations = 12\n'
     found = pf.optimise(written(tmp_path, STUDY, RANGE, objective, search), tmp_path / "out")
     assert found.evaluations <= 12
