@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -165,32 +165,37 @@ def _joints_of(joints: Mapping[str, Mapping[str, Any]], unit: str, what: str, wi
     return table(heads, rows, caption=what, note=f"{what}. {note}")
 
 
-def load_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
-    """Charts over time of runs (run, time, ...): stresses, joints, drives, ground, sensors; none of earlier results."""
-    charts = []
+def load_panel(data: xr.Dataset, runs: Sequence[str], selecting: str = "mode") -> list[Panel]:
+    """Charts over time of runs (run, time, ...): stresses, joints, drives, ground, sensors; none of earlier results.
+
+    `selecting` is what a run is called.
+    """
+    charts: list[Chart] = []
+
+    def add(chart: Chart, values: xr.DataArray) -> None:
+        charts.append(followed(chart, values, runs, selecting=selecting))
+
     if "stress" in data and np.isfinite(data["stress"].values).any():
         bent = data.isel(body=np.flatnonzero(np.isfinite(data["stress"].values).any(axis=(0, 1))))
         stress = (_MEGA * bent["stress"]).assign_attrs(units="MPa")
         note = "Largest magnitude along a beam, bending and axial."
-        charts.append(
-            followed(Chart("stresses", "Stresses of beams", "stress", choosing="beam", note=note), stress, runs)
-        )
+        add(Chart("stresses", "Stresses of beams", "stress", choosing="beam", note=note), stress)
     if "joint_coordinate" in data:
-        charts += _joint_charts(data, runs)
+        for chart, values in _joint_charts(data):
+            add(chart, values)
     for name, title, label in (
         ("drive_torque", "Efforts of prescribed motions", "effort"),
         ("drive_power", "Powers of prescribed motions", "power"),
     ):
         if name in data:
-            charts.append(followed(Chart(name.replace("_", "-"), title, label, choosing="motion"), data[name], runs))
+            add(Chart(name.replace("_", "-"), title, label, choosing="motion"), data[name])
     if "motor_speed" in data and data.sizes["motor"]:
-        charts.append(followed(Chart("speeds", "Motor speeds", "speed", choosing="motor"), data["motor_speed"], runs))
+        add(Chart("speeds", "Motor speeds", "speed", choosing="motor"), data["motor_speed"])
     if "motor_power" in data and data.sizes["motor"]:
-        charts.append(followed(Chart("powers", "Motor powers", "power", choosing="motor"), data["motor_power"], runs))
+        add(Chart("powers", "Motor powers", "power", choosing="motor"), data["motor_power"])
     if "frame_force" in data:
         note = "Of all joints and springs that are on the ground: the shaking force."
-        chart = Chart("frame", "Force on the ground", "force", choosing="direction", note=note)
-        charts.append(followed(chart, data["frame_force"], runs))
+        add(Chart("frame", "Force on the ground", "force", choosing="direction", note=note), data["frame_force"])
     loads = [Panel("Loads", charts)] if charts else []
     return [*loads, *_sensor_panel(data, runs)]
 
@@ -205,9 +210,9 @@ def _sensor_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
     return [Panel("Sensors", charts)] if charts else []
 
 
-def _joint_charts(data: xr.Dataset, runs: Sequence[str]) -> list[Chart]:
-    """Angles and rates of joints that turn, travels and speeds of those that slide."""
-    charts, slides = [], sliding_joints(data)
+def _joint_charts(data: xr.Dataset) -> Iterator[tuple[Chart, xr.DataArray]]:
+    """Angles and rates of joints that turn, travels and speeds of those that slide, with the values of their curves."""
+    slides = sliding_joints(data)
     for own, kind, variable, title, unit in (
         (~slides, "angle", "joint_coordinate", "Joint angles", "rad"),
         (slides, "travel", "joint_coordinate", "Joint travels", "m"),
@@ -217,5 +222,4 @@ def _joint_charts(data: xr.Dataset, runs: Sequence[str]) -> list[Chart]:
         if own.any():
             values = data[variable].isel(joint=np.flatnonzero(own)).assign_attrs(units=unit)
             label = "angular velocity" if kind == "rate" else kind
-            charts.append(followed(Chart(f"joint-{kind}", title, label, choosing="joint"), values, runs))
-    return charts
+            yield Chart(f"joint-{kind}", title, label, choosing="joint"), values
