@@ -95,9 +95,11 @@ def natural_frequencies(
         How many of the lowest; all by default, or ten where there are more than 600 coordinates.
     """
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
-    lam, _, acceleration = forces_at_rest(system, state, [*held, *torque_at], (M, J))
+    efforts = _joint_rows(system, state.q, [*held, *torque_at])
+    lam, _, acceleration = forces_at_rest(system, state, Inertia(M, J, efforts))
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
-    C, typical = _with_joints(system, J, state.q, held), typical_square(elastic, other, M)
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, _joint_rows(system, state.q, held)]))
+    typical = typical_square(elastic, other, M)
     K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
     if system.n <= DENSE_COORDINATES:
         squares, shapes = _all(K, M, C, elastic, typical)
@@ -110,10 +112,18 @@ def natural_frequencies(
     return Vibration(squares[kept], shapes[:, kept], acceleration, complete)
 
 
-def _with_joints(system: System, jacobian: Sparse, q: Array, joints: Sequence[str]) -> Sparse:
-    """Constraint rows, followed by those of the joints' angles or travels."""
+def _joint_rows(system: System, q: Array, joints: Sequence[str]) -> Sparse:
+    """Derivatives (joints, n) of the joints' angles or travels, each once."""
     rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
-    return scipy.sparse.csr_matrix(scipy.sparse.vstack([jacobian, *rows]))
+    return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
+
+
+class Inertia(NamedTuple):
+    """What forces at rest need: the mass (n, n), Phi_q (m, n), and derivatives (joints, n) of joints' coordinates."""
+
+    mass: Sparse
+    constraints: Sparse
+    joints: Sparse
 
 
 class RestForces(NamedTuple):
@@ -134,19 +144,14 @@ class RestForces(NamedTuple):
     acceleration: float
 
 
-def forces_at_rest(
-    system: System, state: State, joints: Sequence[str], matrices: tuple[Sparse, Sparse] | None = None
-) -> RestForces:
-    """Constraint forces at a pose at rest, motors at some joints holding it.
-
-    `matrices` are the mass and the constraint Jacobian there, if they are known.
-    """
-    M, J = matrices or (sparse_mass(system, state.q), sparse_jacobian(system, state.q))
+def forces_at_rest(system: System, state: State, inertia: Inertia) -> RestForces:
+    """Constraint forces at a pose at rest, motors at the joints of `inertia` holding it."""
     forces, lam = RestingForces(system, state.time), np.zeros(system.m)
     springs = forces.springs
     lam[springs] = forces(state.q, lam)[1] / system.packed.rows["compliance"][springs]
     f = forces(state.q, lam)[0] + stiffness_diagonal(system) * state.q
-    a, mu = Saddle(M, _with_joints(system, J, state.q, joints)).solve(-f)
+    M, rows = inertia.mass, scipy.sparse.csr_matrix(scipy.sparse.vstack([inertia.constraints, inertia.joints]))
+    a, mu = Saddle(M, rows).solve(-f)
     acceleration = float(np.sqrt(max(a @ (M @ a), 0.0) / system.total_mass))
     return RestForces(lam + mu[: system.m], -mu[system.m :], acceleration)
 

@@ -201,3 +201,36 @@ class Saddle:
                 break
             z, left = better, rest
         return self._column * z[: self._n], self._row * z[self._n :]
+
+
+class Factor:
+    """A factored square matrix that need not be symmetric; its rows are scaled to size one.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse matrix
+    units : (n,) array
+        What one of each unknown is measured in.
+    """
+
+    def __init__(self, matrix: scipy.sparse.csr_matrix, units: Array) -> None:
+        scaled = scipy.sparse.csr_matrix(matrix @ scipy.sparse.diags(units))
+        size = np.asarray(abs(scaled).max(axis=1).todense()).ravel()
+        self._units, self._rows = units, 1.0 / np.where(size > 0.0, size, 1.0)
+        scaled = scipy.sparse.csc_matrix(scipy.sparse.diags(self._rows) @ scaled)
+        scaled.eliminate_zeros()
+        self._matrix = scaled
+        self._factor = scipy.sparse.linalg.splu(scaled)
+
+    def solve(self, right: Array) -> Array:
+        """Solve for unknowns (n, k) with right-hand sides (n, k)."""
+        return self._units[:, None] * self._factor.solve(self._rows[:, None] * right)
+
+    @property
+    def condition(self) -> float:
+        """Estimate of the condition number of the scaled matrix, in the norm of column sums."""
+        n = self._units.size
+        inverse = scipy.sparse.linalg.LinearOperator(
+            (n, n), matvec=self._factor.solve, rmatvec=lambda x: self._factor.solve(x, "T"), dtype=np.dtype(float)
+        )
+        return float(scipy.sparse.linalg.norm(self._matrix, 1) * scipy.sparse.linalg.onenormest(inverse, t=1))
