@@ -86,7 +86,8 @@ def _check(request: LineariseRequest) -> None:
 def _modes(model: Model, request: LineariseRequest) -> list[ActuationMode]:
     """The modes asked for; of `all` those of the mechanism; by default the one with most motors."""
     mechanism = model.mechanism
-    everything = ActuationMode("all motors", tuple(motor.name for motor in mechanism.motors))
+    motors = tuple(motor.name for motor in mechanism.motors)
+    everything = ActuationMode("all motors" if motors else "no motors", motors)
     own = list(mechanism.modes) or [everything]
     chosen = own if ALL in request.modes else find_modes(model, request.modes) if request.modes else None
     if chosen is None:

@@ -43,7 +43,7 @@ def print_linear(out: Console, data: xr.Dataset) -> None:
         print_titled(out, title, _frequencies(held, count, damped))
     if all(one.on_axis for _, _, poles in held for one in roots(poles)):
         zero = int(np.count_nonzero(held[0][2] == 0.0))
-        free = f"; {zero} at zero with motors free" if zero else ""
+        free = f"; {zero} at zero" + (" with motors free" if len(held) > 1 else "") if zero else ""
         out.print(f"All poles are on the imaginary axis, 2 pi times these frequencies{free}")
     else:
         print_titled(out, "Poles", _roots(held, ("mode", "motors")))
@@ -62,7 +62,7 @@ def held_rows(data: xr.Dataset) -> list[Row]:
     modes = [str(mode) for mode in data["mode"].values]
     common = common_poles(data)
     rows = [("all", "free", common)] if common is not None else [
-        (mode, "free", poles_of(data, mode, "free")) for mode in modes
+        (mode, "free" if motors_of_mode(data, mode) else "none", poles_of(data, mode, "free")) for mode in modes
     ]  # fmt: skip
     return rows + [(mode, "held", poles_of(data, mode, "held")) for mode in modes if motors_of_mode(data, mode)]
 

@@ -25,8 +25,8 @@ _BESIDE_AXIS = 0.05
 _SAME = 1e-4
 # Free poles of modes that differ by less are the same.
 _COMMON = 1e-6
-# Poles below this part of the largest are zero.
-_ZERO = 1e-9
+# Poles and zeros below this part of their median are zero: double ones at zero come apart by the root of rounding.
+_ZERO = 1e-7
 MAP_WORDS = {ENCODERS: "motors to their encoders", END_EFFECTOR: "motors to the end-effector"}
 HELD_WORDS = {"free": "motors free", "held": "motors held"}
 SOURCES = {
@@ -74,10 +74,8 @@ def _digits(value: float) -> str:
 
 def roots(values: Complex) -> list[Root]:
     """Poles or zeros, by magnitude, conjugates and mirror images together."""
-    known = values[np.isfinite(values.real)]
-    size, out = np.abs(known), list[Root]()
-    known = np.where(size <= _ZERO * size.max(initial=0.0), 0.0, known)
-    left = list(known[np.argsort(size, kind="stable")])
+    known, out = _without_rounding(values[np.isfinite(values.real)]), list[Root]()
+    left = list(known[np.argsort(np.abs(known), kind="stable")])
     while left:
         value = left[0]
         near = [one for one in left if _alike(one, value)]
@@ -88,6 +86,11 @@ def roots(values: Complex) -> list[Root]:
         shown = complex(value.real, abs(value.imag))
         out.append(Root(complex(abs(value.real), abs(value.imag)) if mirrors else shown, bool(mirrors), count))
     return out
+
+
+def _without_rounding(values: Complex) -> Complex:
+    """Values, zero where they are that but for rounding."""
+    return np.where(np.abs(values) <= _ZERO * np.median(np.abs(values)), 0.0, values) if values.size else values
 
 
 def _alike(one: complex, other: complex) -> bool:
@@ -234,6 +237,7 @@ def _zero_summary(zeros: Complex) -> dict[str, Any]:
 
 def right_half_plane(values: Complex) -> Complex:
     """Those of some poles or zeros that are in the right half plane."""
+    values = _without_rounding(values)
     return values[values.real > _ON_AXIS * np.abs(values)]
 
 
@@ -258,8 +262,9 @@ def remarks(data: xr.Dataset) -> list[str]:
     largest = max(values, key=lambda mode: values[mode])
     out = []
     if values[largest] > BALANCED:
+        of = f" (mode {largest})" if len(values) > 1 else ""
         out.append(
-            f"not in equilibrium: let go, the mechanism would start with {values[largest]:.3g} m/s^2 (mode {largest}); "
+            f"not in equilibrium: let go, the mechanism would start with {values[largest]:.3g} m/s^2{of}; "
             "here forces that do not change hold it (--balanced linearises about equilibrium)"
         )
     out += phase_sentences(data)
@@ -270,6 +275,7 @@ def remarks(data: xr.Dataset) -> list[str]:
 
 def limiting_zero(zeros: Complex) -> float:
     """Size of the lowest zero in the right half plane that is not beside the imaginary axis; zero for none."""
+    zeros = _without_rounding(zeros)
     sizes = np.abs(zeros[zeros.real > _BESIDE_AXIS * np.abs(zeros)])
     return float(sizes.min()) if sizes.size else 0.0
 
