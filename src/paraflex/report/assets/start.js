@@ -28,11 +28,12 @@ const begin = (() => {
   const groupOf = (run) => page.groups.findIndex(([, count], group) => run < firstOf(group) + count);
 
   function showGroup() {
-    const select = byId("group"), group = groupOf(state.run);
-    if (select.value === String(group) && byId("members").childElementCount) return;
-    select.value = String(group);
-    byId("members").replaceChildren();
-    addButtons(byId("members"), firstOf(group), page.groups[group][1]);
+    const holder = byId("members"), group = groupOf(state.run);
+    byId("group").value = String(group);
+    if (holder.dataset.group === String(group)) return;
+    holder.dataset.group = String(group);
+    holder.replaceChildren();
+    addButtons(holder, firstOf(group), page.groups[group][1]);
   }
 
   function addButtons(holder, first, count) {
