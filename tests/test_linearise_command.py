@@ -11,6 +11,7 @@ import pytest
 import paraflex as pf
 from conftest import DESKTOP
 from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.files import library_text
 from paraflex.linear.branches import pole_branches
 from paraflex.mechanism import Assembly, LossFactor, Mechanism, Motor, PointRef, RevoluteJoint
 from paraflex.report import linear_page, save_page
@@ -255,6 +256,40 @@ def test_about_motions():
     assert own.returncode == 0, own.stderr
     assert "about the run at t = 0.02 s" in own.stdout
     assert "frozen" in own.stdout
+
+
+def test_about_the_runs_of_a_folder(tmp_path):
+    """With a path and without: the same as about the run in Python."""
+    few = ["--samples", "51", "--no-report"]
+    done = paraflex("run", "-m", "five_bar", "--path", "line", "--duration", "0.1", *few, "--out", tmp_path / "path")
+    assert done.returncode == 0, done.stderr
+    numbers = json.loads(paraflex("linearise", tmp_path / "path", "--at", "0.05", "--json").stdout)
+    model = pf.load("five_bar")
+    task = model.plan("line", duration=0.1, samples=51)
+    found = pf.linearise(pf.simulate(task, "++", options=model.study.integration({})), at=0.05)
+    assert (numbers["about"], numbers["time"]) == ("a run", found.time)
+    poles = np.array([complex(*pair) for pair in numbers["modes"]["++"]["motors_free"]["poles"]])
+    assert np.array_equal(poles, found.poles())
+    assert numbers["parameters"]["run"]["results"] == str(tmp_path / "path")
+    own = ["-m", "slider_crank_flexible", "--duration", "0.05"]
+    assert paraflex("run", *own, *few, "--out", tmp_path / "own").returncode == 0
+    said = paraflex("linearise", tmp_path / "own" / "results.nc", "--at", "0.02")
+    assert "about the run at t = 0.02 s: 10 states" in said.stdout, said.stderr
+    file, changed = tmp_path / "mine.toml", tmp_path / "changed"
+    file.write_text(library_text("five_bar"))
+    line = ["-m", file, "--path", "line", "--duration", "0.02"]
+    assert paraflex("run", *line, "--samples", "5", "--no-report", "--out", changed).returncode == 0
+    file.write_text(library_text("five_bar").replace("mass = 0.100", "mass = 0.200", 1))
+    for words, problem in (
+        ([tmp_path / "path", "--pose", "start"], "--pose: means nothing for results"),
+        ([tmp_path / "path", "--mode", "+-"], "--mode: no such mode in these results"),
+        ([tmp_path / "own", "--mode", "+-"], "--mode: no such mode in these results"),
+        ([tmp_path / "path", "--at", "9"], "--at: is not a time of the motion"),
+        ([tmp_path], f"{tmp_path}: no results in this folder"),
+        ([changed], f"{changed}: these results are of another state"),
+    ):
+        done = paraflex("linearise", *words)
+        assert (done.returncode, done.stderr.splitlines()[-1][: len(problem) + 7]) == (2, f"error: {problem}")
 
 
 def test_about_equilibrium():

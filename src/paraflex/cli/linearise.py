@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,17 +23,17 @@ from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, consistent_state, start_state, undeformed
 from paraflex.errors import ActuationError, AssemblyError, InputError
-from paraflex.files import Model
+from paraflex.files import Model, library_names
 from paraflex.files.fields import number_in
 from paraflex.folders import LINEAR_MODELS, ResultsFolder
 from paraflex.kinematics import Line, follow_path
 from paraflex.linear import LinearModel, linearise
-from paraflex.mechanism import ActuationMode
+from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.motion import UNBALANCED, MotionRun, simulate_motion
 from paraflex.results.linear_data import linear_dataset, motors_of
 from paraflex.results.linear_summary import linear_summary
 from paraflex.results.storage import save_results
-from paraflex.tracking import TrackingTask
+from paraflex.tracking import TrackingRun, TrackingTask
 from paraflex.writing import write_json
 
 ALL, START = "all", "start"
@@ -46,18 +47,52 @@ def linearise_command(request: LineariseRequest) -> int:
     """Linearise in every mode, print poles and zeros, and write files where that is asked for; the exit code."""
     began = time.perf_counter()
     _check(request)
-    model = asked_model(request.model)
-    modes = _modes(model, request)
+    make = _of_results(request) if _names_results(request.model.name) else _of_model(request)
     if request.out is None:
-        _tell(_data(model, modes, request), request)
+        _tell(make(), request)
         return COMPLETE
     with hold_results(request.out, LINEAR_MODELS, force=request.force) as folder:
-        data = _data(model, modes, request)
+        data = make()
         _tell(data, request)
         _write(data, folder, request)
     if not request.json:
         say_where(began, "numbers, figures", folder.path, report=request.report)
     return COMPLETE
+
+
+def _names_results(name: str) -> bool:
+    """Whether a name is that of results, not of a model."""
+    return Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names())
+
+
+def _of_model(request: LineariseRequest) -> Callable[[], xr.Dataset]:
+    model = asked_model(request.model)
+    modes = _modes(model, request)
+    return lambda: _data(model, modes, request)
+
+
+def _of_results(request: LineariseRequest) -> Callable[[], xr.Dataset]:
+    """About the runs of a folder of results, which are made again."""
+    given = {"--set": request.model.settings, "--pose": request.pose, "--balanced": request.balanced,
+             "--path": request.path, "--assembly": request.assembly}  # fmt: skip
+    for flag, value in given.items():
+        if value:
+            raise InputError(
+                "means nothing for results, which are what they are", field=flag, value=str(value),
+                remedy="leave it out, or name the model",
+            )  # fmt: skip
+    from paraflex.cli.repeated import repeated_runs  # with the reports, which tell the command of a run
+
+    model, runs = repeated_runs(request.model.name, [] if ALL in request.modes else request.modes)
+
+    def data() -> xr.Dataset:
+        found = list(runs)
+        modes = [run.mode if isinstance(run, TrackingRun) else _everything(model.mechanism) for run in found]
+        parameters = _parameters(model, modes, request)
+        parameters["run"]["results"] = request.model.name
+        return _moving(found, modes, request, parameters)
+
+    return data
 
 
 def _check(request: LineariseRequest) -> None:
@@ -86,9 +121,7 @@ def _check(request: LineariseRequest) -> None:
 def _modes(model: Model, request: LineariseRequest) -> list[ActuationMode]:
     """The modes asked for; of `all` those of the mechanism; by default the one with most motors."""
     mechanism = model.mechanism
-    motors = tuple(motor.name for motor in mechanism.motors)
-    everything = ActuationMode("all motors" if motors else "no motors", motors)
-    own = list(mechanism.modes) or [everything]
+    own = list(mechanism.modes) or [_everything(mechanism)]
     chosen = own if ALL in request.modes else find_modes(model, request.modes) if request.modes else None
     if chosen is None:
         chosen = [max(model.modes() or own, key=lambda mode: len(mode.motors))]
@@ -101,6 +134,11 @@ def _modes(model: Model, request: LineariseRequest) -> list[ActuationMode]:
     return chosen
 
 
+def _everything(mechanism: Mechanism) -> ActuationMode:
+    motors = tuple(motor.name for motor in mechanism.motors)
+    return ActuationMode("all motors" if motors else "no motors", motors)
+
+
 def _data(model: Model, modes: Sequence[ActuationMode], request: LineariseRequest) -> xr.Dataset:
     """Linear models in all modes, and along the motion."""
     ports: dict[str, Any] = {"forces": request.forces, "prescribed": request.prescribed}
@@ -110,11 +148,23 @@ def _data(model: Model, modes: Sequence[ActuationMode], request: LineariseReques
             models = [_at_rest(model, pose, mode, request.balanced, ports) for mode in modes]
             return linear_dataset(models, parameters=_parameters(model, modes, request))
         motion = _motion(model, request)
-        times = motion.motion.t if isinstance(motion, TrackingTask) else motion.solution.t
-        about = [_in_motion(motion, mode, request.at or 0.0, ports) for mode in modes]
+        return _moving([motion] * len(modes), modes, request, _parameters(model, modes, request))
+
+
+def _moving(
+    motions: Sequence[TrackingTask | TrackingRun | MotionRun],
+    modes: Sequence[ActuationMode],
+    request: LineariseRequest,
+    parameters: dict[str, Any],
+) -> xr.Dataset:
+    """Linear models about motions, one for each mode, and along them."""
+    ports: dict[str, Any] = {"forces": request.forces, "prescribed": request.prescribed}
+    with flagged(request):
+        pairs = list(zip(motions, modes, strict=True))
+        about = [_in_motion(motion, mode, request.at or 0.0, ports) for motion, mode in pairs]
+        times = motions[0].motion.t if isinstance(motions[0], TrackingTask) else motions[0].solution.t
         moments = [] if request.along is None else np.linspace(times[0], times[-1], request.along).tolist()
-        along = [[_in_motion(motion, mode, at, ports) for at in moments] for mode in modes]
-        parameters = _parameters(model, modes, request)
+        along = [[_in_motion(motion, mode, at, ports) for at in moments] for motion, mode in pairs]
         return linear_dataset(about, along=along if moments else [], parameters=parameters)
 
 
@@ -214,7 +264,9 @@ def _motion(model: Model, request: LineariseRequest) -> TrackingTask | MotionRun
         raise at_fault(error, model) from None
 
 
-def _in_motion(motion: TrackingTask | MotionRun, mode: ActuationMode, at: float, ports: dict[str, Any]) -> LinearModel:
+def _in_motion(
+    motion: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode, at: float, ports: dict[str, Any]
+) -> LinearModel:
     try:
         return linearise(motion, mode=mode, at=at, **ports)
     except ActuationError as error:

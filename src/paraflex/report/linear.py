@@ -122,7 +122,7 @@ def _command(run: dict[str, Any]) -> str:
     """The command that gives these models again; empty if it is not known."""
     if not run.get("linearise"):
         return ""
-    words = ["paraflex", "linearise", *model_words(run)]
+    words = ["paraflex", "linearise", *([run["results"]] if "results" in run else model_words(run))]
     for name, flag in (("modes", "--mode"), ("forces", "--force-at"), ("prescribed", "--prescribed")):
         words += [word for one in run.get(name, []) for word in (flag, one)]
     for name in ("pose", "at", "along", "path", "assembly"):

@@ -98,7 +98,9 @@ class LineariseRequest:
     at: Annotated[
         float | None,
         Option(
-            metavar="S", parser=SECONDS, help="About the planned motion at a time, or a run where there is no path."
+            metavar="S",
+            parser=SECONDS,
+            help="About the planned motion at a time; of a model without a path, or of results, about the run.",
         ),
     ] = None
     along: Annotated[
