@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # With more coordinates a dense eigenvalue problem takes minutes, and only the lowest frequencies are computed.
 DENSE_COORDINATES, LOWEST = 600, 10
+# What a mechanism let go may start with and still be called balanced [m/s^2].
+BALANCED = 1e-5
 # A squared frequency below this fraction of the typical one is that of a free motion.
 _FREE = 1e-9
 # Constraint rows, scaled, with a smaller singular value than this part of the largest follow from the others.

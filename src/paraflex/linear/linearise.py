@@ -18,6 +18,7 @@ from paraflex.dynamics import (
     consistent_state,
     start_state,
     static_equilibrium,
+    undeformed,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.sensors import sensor_rows
@@ -208,7 +209,8 @@ def _pose(system: System, start: Start | State | None, assembly: str | None) -> 
         return start
     mechanism = system.mechanism
     if start is None:
-        return consistent_state(system, assembly)
+        rigid = build_system(mechanism.rigid())
+        return undeformed(system, rigid, consistent_state(rigid, assembly))
     return start_state(system, start, mechanism.assembly(assembly) if mechanism.assemblies else None)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit
 from paraflex.plots.selection import names_of, point_number, select_run
+from paraflex.results.kinds import kind_of
 
 Array = NDArray[np.float64]
 
@@ -147,6 +148,11 @@ def run_times(data: xr.Dataset) -> tuple[float, float]:
 
 def check_shapes(data: xr.Dataset) -> None:
     """Check that results have the variables for drawings."""
+    if kind_of(data) == "linear":
+        raise InputError(
+            "these are linear models, not a run", field="results",
+            remedy="their report.html shows mode shapes in motion, paraflex plot draws mode_shapes",
+        )  # fmt: skip
     if "shape" not in data:
         raise InputError(
             "these results hold no shapes of links: they are of an earlier version", field="results",

@@ -55,6 +55,8 @@ class Animation:
         Where the end-effector should go [m], in all runs or in each.
     magnify : float
         How many times deflections are drawn at first.
+    periodic : bool
+        Whether it is a turn of something that comes again and again: its time is shown as a phase.
     """
 
     time: Array
@@ -65,6 +67,7 @@ class Animation:
     stiff: Sequence[Scene | None]
     path: Array | None = None
     magnify: float = 1.0
+    periodic: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """The animation in plain values for JSON."""
@@ -83,6 +86,7 @@ class Animation:
             ],
             "looks": LOOKS,
             "magnify": self.magnify,
+            "periodic": self.periodic,
             "marks": [one and [_marks(still_marks(one, limits), 1), _marks(moving_marks(one, limits), self.time.size)]
                       for one in self.scenes],
             # How far the moving symbols are from where they were if nothing bent.

@@ -10,7 +10,7 @@ const player = (() => {
   let arrays = null, times = [0], speed = 1, last = 0, width = 0, height = 0, place = null, colours = {}, waiting = false;
 
   const end = () => times[times.length - 1];
-  const secondsText = (time) => `${time.toFixed(end() < 20 ? 3 : 2)} s`;
+  const secondsText = (time) => (film && film.periodic ? `${Math.round(360 * time / end())}°` : `${time.toFixed(end() < 20 ? 3 : 2)} s`);
 
   function seek(time) {
     report.set("time", Math.min(Math.max(Number(time), times[0]), end()));
@@ -155,8 +155,8 @@ const player = (() => {
   function drawCaption(stopped) {
     pen.font = `13px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "top"; pen.fillStyle = colours.soft;
     const run = page.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
-    const by = state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
-    const caption = `t = ${secondsText(state.time)}${by}`;
+    const by = film.periodic ? `   displacements × ${state.magnify}` : state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
+    const caption = `${film.periodic ? "phase" : "t ="} ${secondsText(state.time)}${by}`;
     // On a narrow screen the buttons alone name the run.
     pen.fillText(pen.measureText(run + caption).width < width - 24 ? run + caption : caption, 12, 8);
     if (stopped !== null) { pen.fillStyle = colours.mark; pen.fillText(`this run ended at ${secondsText(stopped)}`, 12, 27); }
@@ -182,7 +182,7 @@ const player = (() => {
       pen.lineCap = pen.lineJoin = "round";
       drawMarks(still, ground);
       pen.globalAlpha = stopped ? 0.45 : 1;
-      if (byId("ghost").checked && state.magnify > 1) {
+      if (byId("ghost").checked && (state.magnify > 1 || film.periodic)) {
         pen.strokeStyle = colours.soft; pen.lineWidth = 1.2; pen.setLineDash([3, 4]);
         for (const [, from, to] of film.bodies) line(base, from, to);
         pen.setLineDash([]);
@@ -247,7 +247,7 @@ const player = (() => {
     });
     const choose = byId("speed");
     const nearest = SPEEDS.reduce((a, b) => (Math.abs(Math.log(b * 7 / end())) < Math.abs(Math.log(a * 7 / end())) ? b : a));
-    speed = Math.min(nearest, 1);
+    speed = film && film.periodic ? 1 : Math.min(nearest, 1);
     for (const one of SPEEDS) choose.append(new Option(`${one} ×`, one, one === speed, one === speed));
     choose.addEventListener("change", () => { speed = Number(choose.value); });
     for (const name of ["ghost", "trail", "names"]) byId(name).addEventListener("change", repaint);
