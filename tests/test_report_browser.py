@@ -1,12 +1,14 @@
 """The report as a reader has it, in a real Chromium without a window: it opens, moves, follows its keys, fits."""
 
 from collections import Counter
+from itertools import combinations
 
 import pytest
 from playwright.sync_api import Page
 
 from colours import APART, colour_distance
 from conftest import DESKTOP, PHONE
+from paraflex.plots.themes import THEMES
 from paraflex.report import Chart, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
 
@@ -179,6 +181,28 @@ def test_no_link_has_the_colour_of_the_trail_or_the_path(opened, theme):
     for name in ("trail", "text"):
         own = page.evaluate("(name) => report.colour(name)", name)
         assert min(colour_distance(own, link) for link in links) > APART
+    assert links == list(THEMES[theme].links)
+    assert page.evaluate("report.colour('trail')") == THEMES[theme].trail
+
+
+def test_names_keep_clear_of_one_another(opened):
+    page = opened()
+    page.evaluate("""() => {
+        const pen = CanvasRenderingContext2D.prototype, write = pen.fillText;
+        window.boxes = [];
+        pen.fillText = function (text, x, y) {
+            if (this.textAlign === "center") boxes.push([text, x, y, this.measureText(text).width]);
+            return write.call(this, text, x, y);
+        };
+    }""")
+    page.locator("#names").check()
+    for time in (0.01, 0.05, 0.09):
+        page.evaluate("(time) => { boxes.length = 0; player.seek(time); }", time)
+        wait_for_drawing(page)
+        boxes = {text: (x, y, wide) for text, x, y, wide in page.evaluate("boxes")}
+        assert {"link1", "link8", "A1", "D1", "C"} <= boxes.keys()
+        for (one, (x, y, wide)), (other, (u, v, far)) in combinations(boxes.items(), 2):
+            assert abs(x - u) >= 0.5 * (wide + far) or abs(y - v) >= 10.0, (one, other)
 
 
 def test_charts_below_the_screen_wait_until_they_are_seen(opened):

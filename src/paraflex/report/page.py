@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError
 from paraflex.folders import added_to
+from paraflex.plots.themes import THEMES
 from paraflex.report.film import Animation
 from paraflex.report.packing import Series
 from paraflex.writing import write_text
@@ -342,6 +343,7 @@ def _data(page: Page) -> dict[str, Any]:
         "survey": panels(page.survey),
         "designs": None if page.designs is None else _designs(page.designs, series),
         "film": None if page.film is None else page.film.to_dict(),
+        "palettes": {name: look.links for name, look in THEMES.items()},
         "series": series.to_dict(),
     }
 

@@ -39,14 +39,14 @@ _MOST_COLUMNS = 12
 _SHOWN_VARIABLES = (
     "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
     "joint_position", "joint_base", "joint_direction", "joint_direction_base", "spring_position", "point_station",
-    "spring_station", "joint_rail", "gear_radius", "stress", "joint_coordinate", "joint_speed", "drive_torque",
-    "drive_power",
+    "spring_station", "joint_rail", "gear_radius", "load_station", "load_force", "load_torque", "stress",
+    "joint_coordinate", "joint_speed", "drive_torque", "drive_power",
 )  # fmt: skip
-_STATIONS = ("point_station", "spring_station", "joint_rail")
+_STATIONS = ("point_station", "spring_station", "joint_rail", "load_station")
 _DIFFERING = (*_STATIONS, "gear_radius")
 _COORDINATES = (
     "time", "axis", "body", "motor", "joint", "end", "point", "spring", "station_body", "joint_kind", "joint_grounded",
-    "joint_driven", "gear", "gear_joint", "drive",
+    "joint_driven", "gear", "gear_joint", "drive", "load",
 )  # fmt: skip
 
 
