@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics.linearise import typical_square, undamped_modes
+from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable
+from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 Complex = NDArray[np.complex128]
 # Stiffness is symmetric at rest but for this part of it.
 _SYMMETRIC = 1e-7
+# With more degrees of freedom sparse matrices are faster than dense ones.
+_DENSE_FREEDOMS = 200
 # Damping of a modal coordinate below this part of the largest is rounding.
 _ROUNDING = 1e-13
 
@@ -223,18 +227,44 @@ class LinearModel:
             )
         return names.index(joints[motor])
 
-    def poles(self) -> Complex:
-        """Poles (2f,), by magnitude [rad/s]."""
+    @checked_arguments()
+    def poles(self, count: int | None = None) -> Complex:
+        """Poles (2f,), by magnitude [rad/s].
+
+        Parameters
+        ----------
+        count : int, optional
+            Only so many of the slowest: with more than 200 degrees of freedom these are found without A.
+        """
+        if count is not None and self._is_large:
+            return self._slow_poles(count)
         squares = self._modes[0]
         if self._is_vibrating and not np.any(self._modal_damping):
             root = np.sqrt(-squares.astype(complex))
-            return _by_size(np.concatenate([root, -root]))
+            return _by_size(np.concatenate([root, -root]))[:count]
         A = self._scaled.A
         # Free motions without damping have double poles, which an eigenvalue solver would take apart.
         free = (squares == 0.0) & ~np.any(self._modal_damping, axis=1) & self._is_vibrating
         other = np.nonzero(~np.tile(free, 2))[0]
         found = np.asarray(scipy.linalg.eigvals(A[np.ix_(other, other)]), dtype=complex)
-        return _by_size(np.concatenate([np.zeros(2 * int(free.sum()), dtype=complex), found]))
+        return _by_size(np.concatenate([np.zeros(2 * int(free.sum()), dtype=complex), found]))[:count]
+
+    def _slow_poles(self, count: int) -> Complex:
+        """The slowest poles by sparse matrices."""
+        whole = self.minimal.tangents.whole
+        slow = slowest(
+            csr_matrix(0.5 * (whole.stiffness + whole.stiffness.T)), whole.mass, self.minimal.constraints.jacobian,
+            self._typical, count, self.minimal.chosen.freedoms,
+        )  # fmt: skip
+        uneven = scipy.sparse.linalg.norm(whole.stiffness - whole.stiffness.T)
+        vibrates = self.at_rest and uneven <= _SYMMETRIC * scipy.sparse.linalg.norm(whole.stiffness)
+        if vibrates and not np.any(whole.damping.data):
+            root = np.sqrt(-slow.squares.astype(complex))
+            return _by_size(np.concatenate([root, -root]))[:count]
+        found = _by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
+        free = (slow.squares == 0.0) & ~np.any(whole.damping @ slow.shapes, axis=0) & vibrates
+        found[: 2 * int(free.sum())] = 0.0
+        return found[:count]
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
         """Transmission zeros between some inputs and some outputs, by default all, by magnitude [rad/s].
@@ -272,6 +302,8 @@ class LinearModel:
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
         """Response C (s - A)^-1 B + D (k, outputs, inputs).
 
+        With more than 200 degrees of freedom from sparse equations at each frequency, without A.
+
         Parameters
         ----------
         frequencies : (k,) array
@@ -279,13 +311,23 @@ class LinearModel:
         """
         given = np.atleast_1d(np.asarray(frequencies))
         points = given if np.iscomplexobj(given) else 1j * given
+        out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
+        if self._is_large:
+            rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+            for k, s in enumerate(points):
+                out[k] = response_at(self.minimal, rows, self.wanted[0], s)
+            return out
         A, B, C, D = self._scaled
         upper, basis = scipy.linalg.schur(A, output="complex")
         inputs, outputs, eye = basis.conj().T @ B, C @ basis, np.eye(len(A))
-        out = np.empty((points.size, *D.shape), dtype=complex)
         for k, s in enumerate(points):
             out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
         return out
+
+    @property
+    def _is_large(self) -> bool:
+        """Whether sparse matrices are faster."""
+        return len(self.states) > 2 * _DENSE_FREEDOMS
 
     # --- The same in other forms --------------------------------------------------------------------------------------
 
