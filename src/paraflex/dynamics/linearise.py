@@ -39,6 +39,12 @@ _DEPENDENT = 1e-10
 # So few freedoms have a basis of random displacements, Lanczos' method needs more; those that held motors take show by
 # their size, squared.
 _FEW, _INDEPENDENT = 30, 1e-12
+# The first shift in typical squares: one alone could cancel a diagonal entry of a stiffness that is negative.
+_ABOVE = 2.0
+# A shift is reduced by this while many squares are below it, down to this part of the typical square.
+_DESCENT, _LEAST = 1e-2, 1e-13
+# What is left of the square of a free motion of many coordinates, as a part of the typical one.
+_ROUNDING = 1e-14
 # Most tenfold increases of the shift until the shifted stiffness is positive definite.
 _SHIFTS = 15
 
@@ -107,8 +113,7 @@ def natural_frequencies(
         squares, shapes = _all(K, M, C, elastic, typical)
     else:
         freedoms = system.n - dependence(system, state.q).rank
-        squares, shapes = _lowest(K, M, C, typical, LOWEST if count is None else count, freedoms)
-    squares = np.where(np.abs(squares) < _FREE * typical, 0.0, squares)
+        squares, shapes, _ = slowest(K, M, C, typical, LOWEST if count is None else count, freedoms)
     kept = slice(squares.size if count is None else count)
     complete = system.n <= DENSE_COORDINATES and (count is None or count >= squares.size)
     return Vibration(squares[kept], shapes[:, kept], acceleration, complete)
@@ -215,24 +220,55 @@ def _inverse(solver: Saddle, n: int) -> scipy.sparse.linalg.LinearOperator:
     )
 
 
-def _lowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> tuple[Array, Array]:
-    """The squares nearest to one below zero, ascending, and shapes, of at most a number of freedoms.
+class Slowest(NamedTuple):
+    """The lowest squares, ascending, shapes of unit modal mass, and the shift by which they were found [rad^2/s^2]."""
+
+    squares: Array
+    shapes: Array
+    shift: float
+
+
+def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> Slowest:
+    """The lowest squares, of at most a number of freedoms.
 
     By Lanczos' method on the inverse; of few freedoms in a basis of them all.
     """
     n, random = int(np.asarray(M.diagonal()).size), np.random.default_rng(0)
-    inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + typical * M), C), n)
     if not freedoms:
-        return np.zeros(0), np.zeros((n, 0))
+        return Slowest(np.zeros(0), np.zeros((n, 0)), typical)
     if freedoms > _FEW and K.count_nonzero():
+        shift, inverse = _low_shift(K, M, C, typical, min(count + 2, _FEW))
         start = inverse.matvec(M @ random.standard_normal(n))
-        squares, shapes = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-typical, OPinv=inverse, v0=start)
+        squares, shapes = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-shift, OPinv=inverse, v0=start)
         order = np.argsort(squares)
-        return squares[order], shapes[:, order]
+        zero = max(_FREE * shift, _ROUNDING * typical)
+        return Slowest(np.where(np.abs(squares) < zero, 0.0, squares)[order], shapes[:, order], shift)
+    inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + _ABOVE * typical * M), C), n)
     wishes = random.standard_normal((min(freedoms, _FEW), n))
     basis = np.column_stack([inverse.matvec(M @ wish) for wish in wishes])
     size, directions = np.linalg.eigh(basis.T @ (M @ basis))
     kept = size > _INDEPENDENT * np.mean([wish @ (M @ wish) for wish in wishes]) / typical**2
     basis = basis @ (directions[:, kept] / np.sqrt(size[kept]))
     squares, vectors = np.linalg.eigh(basis.T @ (K @ basis))
-    return squares[:count], basis @ vectors[:, :count]
+    squares = np.where(np.abs(squares) < _FREE * typical, 0.0, squares)
+    return Slowest(squares[:count], basis @ vectors[:, :count], typical)
+
+
+def _low_shift(
+    K: Sparse, M: Sparse, C: Sparse, typical: float, count: int
+) -> tuple[float, scipy.sparse.linalg.LinearOperator]:
+    """A shift above which there are all but a few squares, and the shifted inverse.
+
+    The lowest squares of a chain of a thousand links are far below those of a link, so far that Lanczos' method would
+    not tell them apart from there.
+    """
+    n = int(np.asarray(M.diagonal()).size)
+    block, shift = np.random.default_rng(0).standard_normal((n, count)), _ABOVE * typical
+    while True:
+        inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + shift * M), C), n)
+        for _ in range(2):
+            block = np.linalg.qr(np.column_stack([inverse.matvec(M @ one) for one in block.T]))[0]
+        largest = scipy.linalg.eigh(block.T @ (K @ block), block.T @ (M @ block), eigvals_only=True)[-1]
+        if largest >= shift or shift <= _LEAST * typical:
+            return shift, inverse
+        shift *= _DESCENT

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.dynamics.system import System
@@ -211,6 +211,11 @@ class Factor:
     matrix : (n, n) sparse matrix
     units : (n,) array
         What one of each unknown is measured in.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        It is singular.
     """
 
     def __init__(self, matrix: scipy.sparse.csr_matrix, units: Array) -> None:
@@ -220,11 +225,14 @@ class Factor:
         scaled = scipy.sparse.csc_matrix(scipy.sparse.diags(self._rows) @ scaled)
         scaled.eliminate_zeros()
         self._matrix = scaled
-        self._factor = scipy.sparse.linalg.splu(scaled)
+        try:
+            self._factor = scipy.sparse.linalg.splu(scaled)
+        except RuntimeError as error:
+            raise np.linalg.LinAlgError(str(error)) from error
 
-    def solve(self, right: Array) -> Array:
+    def solve(self, right: Numbers) -> Numbers:
         """Solve for unknowns (n, k) with right-hand sides (n, k)."""
-        return self._units[:, None] * self._factor.solve(self._rows[:, None] * right)
+        return self._units[:, None] * self._factor.solve((self._rows[:, None] * right).astype(self._matrix.dtype))
 
     @property
     def condition(self) -> float:

@@ -206,9 +206,10 @@ class Coordinates:
         mechanism, quantities = self.system.mechanism, []
         for joint in (self.joints[k] for k in chosen.joints.tolist()):
             quantities.append(Variable(joint, "m" if mechanism.joint(joint).slides else "rad"))
-        for k in chosen.bodies.tolist():
-            body = next(one for one in self.system.bodies if one.all.start <= k < one.all.stop)
-            local = k - body.offset
+        offsets = np.array([body.offset for body in self.system.bodies])
+        for k, which in zip(chosen.bodies, np.searchsorted(offsets, chosen.bodies, side="right") - 1, strict=True):
+            body = self.system.bodies[which]
+            local = int(k - body.offset)
             own = ("x", "y", "angle")[local] if local < 3 else f"elastic{local - 2}"
             quantities.append(Variable(f"{body.name}.{own}", ("m", "m", "rad")[local] if local < 3 else "m kg^0.5"))
         return tuple(quantities)

@@ -97,12 +97,16 @@ class Minimal:
     def _factor(self) -> Factor:
         """Factor of the rows [Phi_q; T] at the coordinates that are no states."""
         matrix = csr_matrix(scipy.sparse.vstack([self.constraints.jacobian, self.joints.jacobian]))
-        factor = Factor(csr_matrix(matrix[:, self._dependent]), self.scale[self._dependent])
+        cause = "the coordinates chosen for the linear model do not describe its motion"
+        singular = SingularPositionError(
+            cause, Moment(self.point.time, 0), remedy="linearise away from this singular position"
+        )
+        try:
+            factor = Factor(csr_matrix(matrix[:, self._dependent]), self.scale[self._dependent])
+        except np.linalg.LinAlgError as error:
+            raise singular from error
         if not factor.condition < _SINGULAR:
-            cause = "the coordinates chosen for the linear model do not describe its motion"
-            raise SingularPositionError(
-                cause, Moment(self.point.time, 0), remedy="linearise away from this singular position"
-            )
+            raise singular
         return factor
 
     @cached_property

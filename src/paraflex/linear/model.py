@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics.joint_coordinates import joint_coordinate
-from paraflex.dynamics.linearise import typical_square, undamped_modes
+from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable
+from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.motions import Motions, SecondOrder, modal_damping, motions
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
@@ -32,6 +34,8 @@ Complex = NDArray[np.complex128]
 _SYMMETRIC = 1e-7
 # A coordinate of a joint that changes less than this part of its size with others held is held with them.
 _HELD = 1e-8
+# With more degrees of freedom sparse matrices are faster than dense ones.
+_DENSE_FREEDOMS = 200
 
 
 @dataclass(frozen=True)
@@ -226,9 +230,16 @@ class LinearModel:
             )
         return names.index(joint)
 
-    def poles(self) -> Complex:
-        """Poles (2f,), by magnitude [rad/s]."""
-        return self.motions().poles
+    @checked_arguments()
+    def poles(self, count: int | None = None) -> Complex:
+        """Poles (2f,), by magnitude [rad/s].
+
+        Parameters
+        ----------
+        count : int, optional
+            Only so many of the slowest: with more than 200 degrees of freedom these are found without A.
+        """
+        return self._slow_poles(count) if count is not None and self._is_large else self.motions().poles[:count]
 
     @checked_arguments()
     def motions(self, held: Sequence[str] = ()) -> Motions:
@@ -267,11 +278,28 @@ class LinearModel:
                 basis = basis @ scipy.linalg.null_space(row @ basis)
         return basis
 
+    def _slow_poles(self, count: int) -> Complex:
+        """The slowest poles by sparse matrices."""
+        whole = self.minimal.tangents.whole
+        slow = slowest(
+            csr_matrix(0.5 * (whole.stiffness + whole.stiffness.T)), whole.mass, self.minimal.constraints.jacobian,
+            self._typical, count, self.minimal.chosen.freedoms,
+        )  # fmt: skip
+        uneven = scipy.sparse.linalg.norm(whole.stiffness - whole.stiffness.T)
+        vibrates = self.at_rest and uneven <= _SYMMETRIC * scipy.sparse.linalg.norm(whole.stiffness)
+        if vibrates and not np.any(whole.damping.data):
+            root = np.sqrt(-slow.squares.astype(complex))
+            return _by_size(np.concatenate([root, -root]))[:count]
+        found = _by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
+        free = (slow.squares == 0.0) & ~np.any(whole.damping @ slow.shapes, axis=0) & vibrates
+        found[: 2 * int(free.sum())] = 0.0
+        return found[:count]
+
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
         """Transmission zeros between some inputs and some outputs, by default all, by magnitude [rad/s].
 
         Of any number of each: more inputs than outputs, or fewer, mostly have none. At rest, and of outputs that are
-        places, angles, strains or derivatives of places, they are found from the second-order equations, else from
+        places, angles or derivatives of these, they are found from the second-order equations, else from
         the state space, and up to a tenth of the fastest pole.
         """
         chosen = self.select(inputs, outputs)
@@ -303,6 +331,8 @@ class LinearModel:
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
         """Response C (s - A)^-1 B + D (k, outputs, inputs).
 
+        With more than 200 degrees of freedom from sparse equations at each frequency, without A.
+
         Parameters
         ----------
         frequencies : (k,) array
@@ -310,13 +340,23 @@ class LinearModel:
         """
         given = np.atleast_1d(np.asarray(frequencies))
         points = given if np.iscomplexobj(given) else 1j * given
+        out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
+        if self._is_large:
+            rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+            for k, s in enumerate(points):
+                out[k] = response_at(self.minimal, rows, self.wanted[0], s)
+            return out
         A, B, C, D = self._scaled
         upper, basis = scipy.linalg.schur(A, output="complex")
         inputs, outputs, eye = basis.conj().T @ B, C @ basis, np.eye(len(A))
-        out = np.empty((points.size, *D.shape), dtype=complex)
         for k, s in enumerate(points):
             out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
         return out
+
+    @property
+    def _is_large(self) -> bool:
+        """Whether sparse matrices are faster."""
+        return len(self.states) > 2 * _DENSE_FREEDOMS
 
     # --- The same in other forms --------------------------------------------------------------------------------------
 
@@ -372,6 +412,10 @@ class LinearModel:
 def plain_name(name: str) -> str:
     """A name without dots and spaces, for programs that take none."""
     return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
+
+
+def _by_size(values: Complex) -> Complex:
+    return values[np.argsort(np.abs(values), kind="stable")]
 
 
 def _chosen(names: Sequence[str] | None, have: tuple[Variable, ...], what: str) -> NDArray[np.int64]:
