@@ -173,6 +173,30 @@ def test_a_table_on_a_phone_says_that_it_scrolls(opened):
     assert not wide.locator("#part-modes .swipe").is_visible()
 
 
+def test_buttons_that_go_on_beside_a_phone_fade_there(opened, tmp_path):
+    save_page(verification_page(*verified()), tmp_path / "report.html")
+    page = opened(tmp_path / "report.html", viewport={"width": 280, "height": 700})
+    page.locator("#runs label").first.click()
+    buttons = page.locator("#runs")
+    page.wait_for_function("document.getElementById('runs').classList.contains('goes-on')")
+    assert "goes-back" not in buttons.get_attribute("class")
+    assert "gradient" in buttons.evaluate("(one) => getComputedStyle(one).maskImage")
+    page.locator("#runs label").last.click()
+    page.wait_for_function("document.getElementById('runs').classList.contains('goes-back')")
+    assert "goes-on" not in buttons.get_attribute("class")
+
+
+def test_motors_and_joints_are_of_the_selected_mode_and_on_paper_of_all(opened):
+    page = opened()
+    tables = page.locator("#part-motors-and-prescribed-motions .of-run")
+    shown = "(parts) => parts.map((part) => part.checkVisibility())"
+    page.locator("#runs label").nth(1).click()
+    assert tables.evaluate_all(shown) == [False, True, False]
+    assert tables.nth(1).locator("h3").inner_text() == f"mode {MODES[1]}"
+    page.emulate_media(media="print")
+    assert tables.evaluate_all(shown) == [True, True, True]
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_no_link_has_the_colour_of_the_trail_or_the_path(opened, theme):
     page = opened()

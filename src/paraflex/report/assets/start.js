@@ -10,6 +10,7 @@ const begin = (() => {
 
   function showRun() {
     for (const row of document.querySelectorAll("tr[data-run]")) row.classList.toggle("selected", Number(row.dataset.run) === state.run);
+    for (const part of document.querySelectorAll(".of-run")) part.classList.toggle("other", Number(part.dataset.ofRun) !== state.run);
     for (const button of document.querySelectorAll("tr[data-run] .pick")) button.setAttribute("aria-pressed", String(Number(button.closest("tr").dataset.run) === state.run));
     if (page.groups.length && page.runs.length > 1) showGroup();
     const radio = document.querySelector(`#runs input[value="${state.run}"]`);
@@ -111,15 +112,16 @@ const begin = (() => {
     });
   }
 
-  // Tables that are wider than the screen fade where they go on, and a line says that they scroll.
+  // What is wider than the screen fades where it goes on; below tables a line says that they scroll.
   function showScrolling() {
-    for (const holder of document.querySelectorAll(".scroll")) {
+    for (const holder of document.querySelectorAll(".scroll, .runs")) {
       const hint = element("p", { class: "swipe", "aria-hidden": "true", hidden: "" }, "the table scrolls sideways →");
-      holder.before(hint);
+      if (holder.matches(".scroll")) holder.before(hint);
       const show = () => {
         const left = holder.scrollWidth - holder.clientWidth;
         hint.hidden = left < 2;
         holder.classList.toggle("goes-on", holder.scrollLeft < left - 2);
+        holder.classList.toggle("goes-back", holder.scrollLeft > 2);
       };
       holder.addEventListener("scroll", show, { passive: true });
       new ResizeObserver(show).observe(holder);
