@@ -51,7 +51,8 @@ class Descriptor:
     """
 
     def __init__(self, minimal: Minimal, s: complex) -> None:
-        self.minimal, self.s = minimal, s
+        self.minimal: Minimal = minimal
+        self.s: complex = s
         whole, rows = minimal.tangents.whole, minimal.held_rows
         mass, damping, stiffness = whole.mass, whole.damping, whole.stiffness
         weight = np.ones(rows.number.size, dtype=np.result_type(s))

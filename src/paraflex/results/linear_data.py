@@ -34,7 +34,7 @@ _LEAST = 1e3
 # Coordinates are displaced by this part of their units, to both sides, to find how drawn points move.
 _STEP = 1e-5
 # Drawn points, by their names in `Drawing`: of poses, and what they do in an undamped mode.
-DRAWN = {
+DRAWN: dict[str, tuple[str, ...]] = {
     "shape": ("station", "axis"),
     "joints": ("joint", "axis"),
     "directions": ("joint",),
