@@ -144,6 +144,14 @@ def test_poles_near_a_place():
         )
 
 
+def test_slow_poles_of_a_chain_without_weight():
+    """A beam on a pin: it turns freely, and its squares are 1e-13 of those of a link on its springs."""
+    model = linearise(replace(chain(300), gravity=(0.0, 0.0)))
+    poles = model.poles(6)
+    assert np.all(poles[:2] == 0.0)
+    assert np.abs(poles[2::2]) == pytest.approx([15.4182e-3, 49.9649e-3], rel=1e-4)
+
+
 def test_few_poles_are_the_first_of_all():
     model = linearise(pf.library.raparm_i())
     assert model.poles(6) == pytest.approx(model.poles()[:6])
