@@ -43,7 +43,7 @@ _FEW, _INDEPENDENT = 30, 1e-12
 _ABOVE = 2.0
 # A shift is reduced by this while many squares are below it, down to this part of the typical square.
 _DESCENT, _LEAST = 1e-2, 1e-13
-# What is left of the square of a free motion of many coordinates, as a part of the typical one.
+# What rounding leaves of the square of a free motion, as a part of its terms.
 _ROUNDING = 1e-14
 # Most tenfold increases of the shift until the shifted stiffness is positive definite.
 _SHIFTS = 15
@@ -241,8 +241,9 @@ def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedom
         start = inverse.matvec(M @ random.standard_normal(n))
         squares, shapes = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-shift, OPinv=inverse, v0=start)
         order = np.argsort(squares)
-        zero = max(_FREE * shift, _ROUNDING * typical)
-        return Slowest(np.where(np.abs(squares) < zero, 0.0, squares)[order], shapes[:, order], shift)
+        rounding = _ROUNDING * np.sum(np.abs(shapes) * (abs(K) @ np.abs(shapes)), axis=0)
+        squares = np.where(np.abs(squares) < np.maximum(_FREE * shift, rounding), 0.0, squares)
+        return Slowest(squares[order], shapes[:, order], shift)
     inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + _ABOVE * typical * M), C), n)
     wishes = random.standard_normal((min(freedoms, _FEW), n))
     basis = np.column_stack([inverse.matvec(M @ wish) for wish in wishes])

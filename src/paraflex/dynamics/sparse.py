@@ -25,6 +25,8 @@ from paraflex.mechanism import is_hinge
 # exists; iterative refinement removes its effect.
 _REGULAR = 1e-10
 _REFINEMENTS = 8
+# More right-hand sides at once have BLAS start threads, which on a busy machine take a thousand times as long.
+_COLUMNS = 16
 # Refinement goes on while it shrinks the residual at least this much.
 _WORTH_WHILE = 0.5
 
@@ -232,7 +234,9 @@ class Factor:
 
     def solve(self, right: Numbers) -> Numbers:
         """Solve for unknowns (n, k) with right-hand sides (n, k)."""
-        return self._units[:, None] * self._factor.solve((self._rows[:, None] * right).astype(self._matrix.dtype))
+        right = (self._rows[:, None] * right).astype(self._matrix.dtype)
+        parts = [self._factor.solve(right[:, k : k + _COLUMNS]) for k in range(0, right.shape[1], _COLUMNS)]
+        return self._units[:, None] * np.hstack([right[:, :0], *parts])
 
     @property
     def condition(self) -> float:

@@ -20,13 +20,15 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.constraints import coordinate_kind
-from paraflex.dynamics.linearise import DENSE_COORDINATES, Inertia
+from paraflex.dynamics.linearise import Inertia
 from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents, rows_of
 from paraflex.errors import InputError
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import ConstantSpeed, Mechanism, PrescribedAngle
 
+# A matrix of so many entries BLAS factors in one thread.
+_FEW_ENTRIES = 8192
 # Places and angles of bodies count as much less than flexible coordinates: they are chosen last.
 _LAST = 1e-5
 
@@ -184,7 +186,8 @@ class Coordinates:
         weights = np.full(self.system.n, _LAST)
         for body in self.system.bodies:
             weights[body.flexible] = 1.0
-        choose = independent_dense if self.system.n <= DENSE_COORDINATES else independent_sparse
+        few = (tangents.constraints.number.size + len(self.joints)) * self.system.n <= _FEW_ENTRIES
+        choose = independent_dense if few else independent_sparse
         found = choose([constraints, joints[driven], joints[free]], weights)
         states = np.concatenate([free[found.groups[2]], driven[found.groups[1]]])
         bodies = np.setdiff1d(np.arange(self.system.n), found.columns)
