@@ -68,6 +68,10 @@ COMMANDS = {
     "tracking": ["run", "--mechanism", "raparm_i", "--geometry", "second-order", "--out", "{}"],
     "motion": ["run", "--mechanism", "four_bar", "--out", "{}"],
     "verification": ["verify", "--mechanism", "five_bar", "--out", "{}"],
+    "linear": [
+        "linearise", "raparm_i", "--mode", "+-+-", "--mode", "-+-+", "--mode", "++++", "--at", "0", "--along", "101",
+        "--out", "{}",
+    ],
     "methods": [
         "compare-methods", "--mechanism", "five_bar", "--out", "{}", "--tol", "1e-3", "--tol", "1e-4", "--tol", "1e-5",
         "--limit", "10", *(part for name in METHODS for part in ("--method", name)),
@@ -85,6 +89,7 @@ TITLES = {
     "tracking": "Runs along a path",
     "motion": "Runs without a path",
     "verification": "Models and engines compared",
+    "linear": "Linear models",
     "methods": "Methods of integration compared",
     "sweep": "Sweeps",
     "optimisation": "Optimisations",

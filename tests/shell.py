@@ -37,10 +37,14 @@ def interrupted(*arguments):
     return done.stderr
 
 
-def paraflex(*arguments, cwd=None):
-    """A command; every warning that reaches Python is an error, and an error that is none of ours a traceback."""
+def paraflex(*arguments, cwd=None, mixed=False):
+    """A command; every warning that reaches Python is an error, and an error that is none of ours a traceback.
+
+    Mixed, its lines on stderr are among those on stdout, in the order of a terminal.
+    """
     line = ["paraflex", *map(str, arguments)]
-    out, err, code = io.StringIO(), io.StringIO(), 0
+    out, code = io.StringIO(), 0
+    err = out if mixed else io.StringIO()
     with contextlib.ExitStack() as stack:
         stack.enter_context(patch.object(sys, "argv", line))
         stack.enter_context(contextlib.redirect_stdout(out))

@@ -23,8 +23,9 @@ from paraflex.motion import simulate_motion
 from paraflex.plots import film_files, mechanism_drawing
 from paraflex.plots.film import FilmOptions, animate, plan_film
 from paraflex.plots.film_files import find_encoder
-from paraflex.plots.marks import block, ground_of, is_guide, zigzag
-from paraflex.plots.scene import figure_of, scale_bar, scene, select
+from paraflex.plots.marks import block, ground_of, is_guide, moving_marks, zigzag
+from paraflex.plots.scene import ARROW, figure_of, scale_bar, scene, select
+from paraflex.report.film import animation
 from paraflex.results import motion_dataset
 from processes import run, started
 
@@ -423,3 +424,62 @@ def test_ctrl_c_ends_it_with_130_and_no_half_film(folder, tmp_path):
     assert done.returncode == 130
     assert "interrupted: nothing was written" in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+BLOW = """
+[load.blow]
+type = "force"
+point = "rod.P"
+pieces = [ { until = 0.0501, force = [0.0, 0.0] }, { until = 0.0521, force = [0.0, -50.0] }, { force = [20.0, 0.0] } ]
+"""
+
+
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory):
+    """A pendulum with a blow of 2 ms, then a steady force."""
+    file = tmp_path_factory.mktemp("pushed") / "pushed.toml"
+    file.write_text(
+        """
+name = "pushed"
+[ground]
+O = [0.0, 0.0]
+[body.rod]
+type = "rigid"
+mass = 1.0
+inertia = 0.1
+centre_of_mass = [0.5, 0.0]
+points = { O = [0.0, 0.0], P = [1.0, 0.0] }
+[joint]
+O = ["ground.O", "rod.O"]
+[assembly.start]
+rod = -0.5
+"""
+        + BLOW
+    )
+    return motion_dataset(simulate_motion(pf.load(file).mechanism, 0.1, start="start", samples=201))
+
+
+def test_loads_are_arrows_as_long_as_they_are_large_while_they_act(pushed):
+    times = np.linspace(0.0, 0.1, 11)
+    shown = scene(select(pushed, None), times)
+    (drawn_load,) = shown.loads
+    # All of 50 N downwards is drawn in the picture nearest to the blow, which lies between two; then two fifths, 20 N.
+    np.testing.assert_allclose(drawn_load.force[:5], 0.0)
+    np.testing.assert_allclose(drawn_load.force[5], [0.0, -1.0])
+    np.testing.assert_allclose(drawn_load.force[6:], [[0.4, 0.0]] * 5)
+    assert shown.load_keys == {"force": "load blow: 50 N"}
+    (line,) = [mark.places for mark in moving_marks(shown, shown.limits) if mark.look == "load"]
+    (head,) = [mark.places for mark in moving_marks(shown, shown.limits) if mark.look == "head"]
+    long = np.linalg.norm(head[:, 0] - line[:, 0], axis=1)
+    np.testing.assert_allclose(long / (ARROW * shown.limits.size), [0.0] * 5 + [1.0] + [0.4] * 5, atol=1e-12)
+    np.testing.assert_allclose(head[:, 0], drawn_load.place)
+    # Results of earlier versions hold no loads.
+    assert not scene(pushed.drop_vars(["load_force", "load_torque"]), times).loads
+
+
+def test_a_page_has_the_loads_and_their_key(pushed):
+    film = animation(pushed, ())
+    assert film is not None
+    page = film.to_dict()
+    assert [key[2] for key in page["keys"][0]] == ["load blow: 50 N"]
+    assert [piece[:2] for piece in page["marks"][0][1]["pieces"]][-2:] == [["load", "blow"], ["head", ""]]

@@ -265,3 +265,12 @@ def test_version_and_help():
     assert paraflex("--version").stdout.strip().count(".") == 2
     assert "run" in paraflex("--help").stdout
     assert paraflex("rum").returncode == 2
+
+
+def test_info_speaks_of_no_motors_where_there_are_none():
+    driven, fallen, moved = (paraflex("info", name).stdout for name in ("four_bar", "pendulum", "five_bar"))
+    assert "  prescribed motions held: " in driven
+    assert " rpm" in driven
+    assert "  lowest: " in fallen
+    assert "motors free" not in driven + fallen
+    assert "motors free" in moved

@@ -1,4 +1,4 @@
-"""Compiling beforehand: it covers what a study calls, and knows when it has been done."""
+"""Compiling beforehand: it covers what a study and a linear model call, and knows when it has been done."""
 
 import re
 import tomllib
@@ -16,10 +16,10 @@ STUDY = """
 import paraflex as pf
 from paraflex.compilation import _PARTS
 from paraflex.mechanism import Geometry
-from paraflex.kernel import bodies, closure, joints, linear, march, signals, stage
+from paraflex.kernel import bodies, closure, joints, linear, march, signals, stage, tangent, tangent_columns
 
 def compiled():
-    modules = (bodies, closure, joints, linear, march, signals, stage)
+    modules = (bodies, closure, joints, linear, march, signals, stage, tangent, tangent_columns)
     kernels = {f for module in modules for f in vars(module).values() if hasattr(f, "signatures")}
     return {(f.__name__, signature) for f in kernels for signature in f.signatures}
 
@@ -29,6 +29,7 @@ before = compiled()
 model = pf.load("raparm_i")
 task = pf.plan(model.mechanism, model.path("square"), duration=0.01, samples=5)
 pf.run_study(task, ["++++"])
+pf.linearise(task)
 print(len(before), compiled() - before)
 """
 

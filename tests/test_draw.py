@@ -9,16 +9,23 @@ from pathlib import Path
 import matplotlib.text
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.patches import PathPatch
 
 import paraflex as pf
 from paraflex.checks.drawing import pose_of
 from paraflex.cli import draw as command
 from paraflex.errors import ModelWarning
 from paraflex.files import library_names, library_text
-from paraflex.mechanism import Deflection
-from paraflex.plots.marks import moving_marks
+from paraflex.mechanism import ConstantSpeed, Deflection, PrescribedAngle
+from paraflex.plots.marks import SYMBOLS, moving_marks
+from paraflex.plots.model_acting import acting_arrows
 from paraflex.plots.model_drawing import model_drawing
-from paraflex.plots.scene import scene
+from paraflex.plots.model_sensors import sensor_marks
+from paraflex.plots.scene import DrawnJoint, Limits, scene
+from paraflex.plots.signs import joint_sign
+from paraflex.plots.themes import THEMES
+from paraflex.results.acting import acting_load
 from shell import paraflex
 
 RIDER = """
@@ -116,7 +123,16 @@ def open_loop(tmp_path: Path) -> Path:
 def test_everything_of_a_model_is_named(rider: Path) -> None:
     said = words(pf.draw(rider))
     named = ("beam", "arm", "tool", "A", "ride", "roller", "pivot, motor tau", "carriage, motor push", "spring k")
-    for name in (*named, "load weight", "load twist", "ground.S", "g = 9.81 m/s²", "slides along a beam", "motor"):
+    for name in (
+        *named,
+        "weight 5 N",
+        "twist 0.3 N m",
+        "ground.S",
+        "g = 9.81 m/s²",
+        "slides along a beam",
+        "motor",
+        "load",
+    ):
         assert name in said, name
 
 
@@ -252,3 +268,152 @@ def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:
         pf.draw(3)
     with pytest.raises(pf.InputError, match="nothing says where the bodies are"):
         pf.draw(replace(pf.load("slider_crank").mechanism, assemblies=()))
+
+
+LATER = """
+[load.blow]
+type = "force"
+point = "tool.T"
+pieces = [ { until = 0.1, force = [0.0, 0.0] }, { until = 0.2, force = [-200.0, 0.0] }, { force = [0.0, 0.0] } ]
+[load.swing]
+type = "torque"
+point = "tool.C"
+torque = "-2 * sin(10 * t)"
+[load.idle]
+type = "force"
+point = "beam.M"
+force = [0.0, 0.0]
+[study]
+duration = 0.5
+"""
+SENSORS = """
+[sensor]
+turn = { type = "encoder", joint = "pivot" }
+rate = { type = "tachometer", joint = "carriage" }
+acc = { type = "acceleration", point = "tool.T", axis = "x", body = "tool" }
+high = { type = "position", point = "arm.K", axis = "y" }
+fast = { type = "velocity", point = "beam.B", axis = 0.5 }
+root = { type = "strain", body = "beam", at = 0.1 }
+bear = { type = "joint_force", joint = "A", axis = "y" }
+mom = { type = "joint_force", joint = "roller", axis = "moment" }
+tip = { type = "deflection", point = "beam.M", axis = "y" }
+"""
+
+
+def with_lines(file: Path, more: str) -> Path:
+    file.write_text(file.read_text() + more)
+    return file
+
+
+def acting(shown):
+    drawn = scene(shown.data, shown.data["time"].values)
+    return acting_arrows(shown, drawn, drawn.limits)
+
+
+def test_loads_have_their_sizes_and_say_from_when_they_act(rider: Path) -> None:
+    loads = {one.name: one for one in acting(pose_of(with_lines(rider, LATER))).loads}
+    assert {name: (one.size, one.later) for name, one in loads.items()} == {
+        "weight": ("5 N", False), "twist": ("0.3 N m", False), "blow": ("200 N from 0.1 s", True),
+        "swing": ("up to 2 N m", False), "idle": ("0 N", True),
+    }  # fmt: skip
+    # As long as they are large, and to where they act: -200 N pushes to the left.
+    blow, weight = (np.diff(loads[name].arrow.outline[[0, 2]], axis=0)[0] for name in ("blow", "weight"))
+    assert blow[0] < 0.0 == pytest.approx(blow[1])
+    assert np.linalg.norm(blow) > 2.0 * np.linalg.norm(weight)
+    said = words(pf.draw(rider))
+    assert {"blow 200 N from 0.1 s", "load", "load, not yet at the start"} <= {*said}
+    out = drawn(rider, "--no-open")
+    assert "load blow: force at tool.T, 200 N from 0.1 s" in out
+    assert "load swing: torque at tool.C, up to 2 N m" in out
+
+
+def test_a_load_that_begins_between_the_times_looked_at_is_told_exactly() -> None:
+    step = pf.PiecewiseLaw((pf.ConstantSpeed(0.0, 0.0), pf.ConstantSpeed(0.0, 3.0)), (0.0123,))
+    late = acting_load(pf.PointForce("f", pf.PointRef("a", "b"), (step, 0.0)), 1.0)
+    assert late.begins == pytest.approx(0.0123, abs=1e-12)
+
+
+def test_an_arrow_says_which_way_a_joint_is_driven(tmp_path: Path) -> None:
+    four_bar = pf.load("four_bar").mechanism
+    for speed, by, way in ((2.0, 1.0, "anticlockwise"), (-2.0, -1.0, "clockwise")):
+        drive = PrescribedAngle("drive", four_bar.joints[0].name, ConstantSpeed(1.0, speed))
+        shown = pose_of(replace(four_bar, motors=(), modes=(), prescribed=(drive,)))
+        (arrow,) = acting(shown).moves
+        place = shown.data["joint_position"].values[0, 0]
+        around = np.unwrap(np.angle((arrow.line - place) @ [1.0, 1j]))
+        assert np.sign(around[-1] - around[0]) == by
+        assert "prescribed motion" in words(model_drawing(shown))
+        lines = command._drives(shown.mechanism, shown)
+        assert lines == [f"prescribed drive: crank at {drive.joint} {way}, 2 rad/s"]
+
+
+def test_motors_on_a_path_have_arrows_of_their_first_movement() -> None:
+    shown = pose_of("3prr")
+    drawn_scene = scene(shown.data, shown.data["time"].values)
+    moves = acting_arrows(shown, drawn_scene, drawn_scene.limits).moves
+    sliding = [joint for joint in drawn_scene.joints if joint.driven]
+    assert len(moves) == len(sliding) == 3
+    for joint, arrow in zip(sliding, moves, strict=True):
+        # The first place that is a hundredth of the travel away.
+        away = np.linalg.norm(joint.place - joint.place[0], axis=1)
+        moved = joint.place[np.argmax(away > 0.02 * away.max())] - joint.place[0]
+        assert np.dot(arrow.line[-1] - arrow.line[0], moved) > 0.0
+
+
+def test_all_kinds_of_sensors_are_marked_with_their_axes(rider: Path) -> None:
+    shown = pose_of(with_lines(rider, SENSORS))
+    limits = scene(shown.data, np.zeros(1)).limits
+    marks = {one.name: one for one in sensor_marks(shown, limits)}
+    assert len(marks) == len(shown.mechanism.sensors) == 9
+    axes = {name: np.angle((one.arrow.line[-1] - one.place) @ [1.0, 1j]) for name, one in marks.items()}
+    tool = shown.angles["tool"]
+    expected = {"high": np.pi / 2, "fast": 0.5, "root": 0.0, "bear": np.pi / 2, "tip": np.pi / 2, "acc": tool}
+    for name, angle in expected.items():
+        assert axes[name] == pytest.approx(angle, abs=1e-6), name
+    assert axes["rate"] == pytest.approx(shown.angles["arm"], abs=1e-6)
+    assert [name for name, one in marks.items() if one.arrow.round] == ["turn", "mom"]
+    np.testing.assert_allclose(marks["root"].place, [0.1, 0.0], atol=1e-9)
+    np.testing.assert_allclose(marks["turn"].place, [0.3, 0.4], atol=1e-9)
+    said = words(model_drawing(shown))
+    assert {"sensor", "encoder turn", "strain root", "joint force mom"} <= {*said}
+    assert "turn (encoder)" in drawn(rider, "--no-open")
+
+
+@pytest.mark.parametrize("kind", SYMBOLS)
+def test_signs_of_the_legend_are_those_that_are_drawn(kind: str) -> None:
+    limits, look = Limits(0.0, 1.0, 0.0, 0.8), THEMES["light"]
+    sign = joint_sign(kind, limits, look, 1.0)
+    joint = scene_joint(kind)
+    shapes = [shape(joint, limits)[0] for shape in SYMBOLS[kind].values()]
+    assert len(shapes) == len(sign.pieces)
+    for (places, looks), shape in zip(sign.pieces, shapes, strict=True):
+        np.testing.assert_allclose(places, shape)
+        assert ("marker" in looks) == (len(places) == 1)
+    assert len(joint_sign(kind, limits, look, 1.0, driven=True).pieces) == len(shapes) + 1
+
+
+def scene_joint(kind: str) -> DrawnJoint:
+    return DrawnJoint("", kind, False, np.zeros((1, 2)), np.array([np.nan if kind in ("pin", "weld") else 0.0]))
+
+
+def test_the_sign_of_what_slides_along_a_beam_stands_in_the_legend_at_its_size(rider: Path) -> None:
+    figure = pf.draw(rider)
+    FigureCanvasAgg(figure).draw()
+    (legend,) = figure.legends
+    blocks = [one for one in legend.findobj(PathPatch) if len(one.get_path().vertices) == 5]
+    (axes,) = figure.axes
+    corners = [path.vertices for one in axes.collections for path in one.get_paths() if len(path.vertices) == 5]
+    long = [np.linalg.norm(np.diff(axes.transData.transform(places[:2]), axis=0)) for places in corners]
+    wide = [np.ptp(one.get_transform().transform(one.get_path().vertices)[:, 0]) for one in blocks]
+    assert blocks
+    for width in wide:
+        assert any(width == pytest.approx(length, rel=1e-6) for length in long)
+
+
+def test_a_column_of_motors_stands_only_where_there_are_motors(tmp_path: Path) -> None:
+    (row,) = [line for line in drawn("five_bar", "--out", tmp_path / "a.svg").splitlines() if "between" in line]
+    assert "motor" in row
+    bare = tmp_path / "bare.toml"
+    bare.write_text(RIDER.replace('[motor]\ntau = "pivot"\npush = "carriage"\n', ""))
+    (row,) = [line for line in drawn(bare, "--out", tmp_path / "b.svg").splitlines() if "between" in line]
+    assert "motor" not in row

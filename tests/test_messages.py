@@ -191,10 +191,9 @@ def test_a_modulus_in_gigapascals_is_named_by_the_error(tmp_path, monkeypatch, c
     assert code in (1, 2)
     said = out + err
     assert "is that of no solid" in said
-    *_, last = err.strip().splitlines()
-    assert last.startswith("error: ")
-    assert "most likely because of body." in last
-    assert ".material.youngs_modulus: " in last
+    (error,) = (line for line in err.splitlines() if line.startswith("error: "))
+    assert "most likely because of body." in error
+    assert ".material.youngs_modulus: " in error
 
 
 def test_sound_numbers_are_not_blamed():

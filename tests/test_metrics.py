@@ -109,7 +109,9 @@ def test_datasets_hold_what_sweeps_measure(run):
     for name in KEPT_METRICS:
         metric = METRICS[name]
         assert data[name].attrs["comment"] == metric.meaning
-        for column, value in zip(metric.columns(["left", "right"]), np.ravel(data[name].values), strict=True):
+        for column, value in zip(
+            metric.columns({"motor": ["left", "right"]}), np.ravel(data[name].values), strict=True
+        ):
             assert measured[column] == pytest.approx(value, rel=1e-12, nan_ok=True), name
     for name in (*FOLLOWING, "deflection_max", "actuation_condition_max"):
         told = np.nan if figures[name] is None else figures[name]

@@ -60,6 +60,7 @@ FILES = {
     "tracking": "results.nc",
     "motion": "results.nc",
     "verification": "verify.nc",
+    "linear": "linear.nc",
     "methods": "compare-methods.json",
     "sweep": "results.parquet",
     "optimisation": "result.json",
@@ -97,6 +98,9 @@ def _runs(folder: Path) -> None:
     model = pf.load("five_bar")
     sensors = (pf.Encoder("left", "A1"), pf.Tachometer("turning", "A1"))
     task = pf.plan(replace(model.mechanism, sensors=sensors), model.path("line"), duration=0.05, samples=26)
+    linear = [[pf.linearise(task, mode=mode, at=at) for at in (0.0, 0.02, 0.04)] for mode in ("++", None)]
+    (folder / "linear").mkdir()
+    save_results(pf.linear_dataset([each[1] for each in linear], along=linear), folder / "linear" / "linear.nc")
     run = tracking_dataset([task.simulate("++")])
     # A second mode by name; the first is all that the motors can do.
     data = xr.concat([run, run.assign_coords(mode=["+-"])], "mode", combine_attrs="override")
@@ -174,7 +178,7 @@ def test_every_figure_of_every_kind_at_both_widths(results: Path, kind: str, nam
         assert figure.axes
         stays_on_the_page(figure)
         labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel())]
-        assert any(labels) or name in ("parallel_coordinates", "mechanism_drawing")
+        assert any(labels) or name in ("parallel_coordinates", "mechanism_drawing", "mode_shapes")
 
 
 def test_catalogue_and_package_have_the_same_figures() -> None:

@@ -28,7 +28,7 @@ from paraflex.report import (
 from paraflex.report.film import MOST_FRAMES, frames_of
 from paraflex.report.packing import Series, packed
 from paraflex.report.page import plotly_script
-from paraflex.report.text import count, number
+from paraflex.report.text import common_unit, count, number
 from paraflex.results import load_results, open_results
 from reports import FAILED, MODES, STOPPED, array_of, chart_of, html_of, rows_of, told, tracked, verified
 from shell import paraflex
@@ -304,7 +304,9 @@ def test_a_verification_tells_distances_and_overlays_models():
     # The largest of them is a tenth of a millimetre.
     for name in ("rigid", "linear"):
         assert number(mode["models"][name]["distance_max"], 1e3) in text
-        assert number(mode["models"][name]["angle_difference_rms"]["link3"]) in text
+        assert number(mode["models"][name]["angle_difference_rms"]["link3"], 1e3) in text
+    assert "[mrad], [rad/s]" in text
+    assert "kineto-elastodynamics" not in text
     assert number(mode["distances"]["rigid"]["linear"], 1e3) in text
     rows, chart = rows_of(page["series"]), chart_of(page, "angle_differences")
     reference = list(data["model"].values).index(data.attrs["reference"])
@@ -335,6 +337,20 @@ def test_raw_figures_of_plotly_go_through():
     page = replace(page, panels=[Panel("f", [Chart("f", "f", "f", [curve], over_time=False)])])
     kept = told(html_of(page))
     assert rows_of(kept["series"])[chart_of(kept, "f")["curves"][0]["x"]].tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("values", "unit"),
+    [
+        ([4.8e-7, 2.1e-2], "µm"),
+        ([2.3e-5, 4.6e-2], "mm"),
+        ([0.0, None, 3e-18, 0.2], "mm"),
+        ([1e-12, 1.0], "mm"),
+        ([], "mm"),
+    ],
+)  # fmt: skip
+def test_one_unit_in_which_no_value_needs_a_power_of_ten(values, unit):
+    assert common_unit("m", values, beside=1.0).name == unit
 
 
 def test_numbers_and_names_as_print_has_them():

@@ -1,12 +1,14 @@
 """The report as a reader has it, in a real Chromium without a window: it opens, moves, follows its keys, fits."""
 
 from collections import Counter
+from itertools import combinations
 
 import pytest
 from playwright.sync_api import Page
 
 from colours import APART, colour_distance
 from conftest import DESKTOP, PHONE
+from paraflex.plots.themes import THEMES
 from paraflex.report import Chart, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
 
@@ -171,6 +173,30 @@ def test_a_table_on_a_phone_says_that_it_scrolls(opened):
     assert not wide.locator("#part-modes .swipe").is_visible()
 
 
+def test_buttons_that_go_on_beside_a_phone_fade_there(opened, tmp_path):
+    save_page(verification_page(*verified()), tmp_path / "report.html")
+    page = opened(tmp_path / "report.html", viewport={"width": 280, "height": 700})
+    page.locator("#runs label").first.click()
+    buttons = page.locator("#runs")
+    page.wait_for_function("document.getElementById('runs').classList.contains('goes-on')")
+    assert "goes-back" not in buttons.get_attribute("class")
+    assert "gradient" in buttons.evaluate("(one) => getComputedStyle(one).maskImage")
+    page.locator("#runs label").last.click()
+    page.wait_for_function("document.getElementById('runs').classList.contains('goes-back')")
+    assert "goes-on" not in buttons.get_attribute("class")
+
+
+def test_motors_and_joints_are_of_the_selected_mode_and_on_paper_of_all(opened):
+    page = opened()
+    tables = page.locator("#part-motors-and-prescribed-motions .of-run")
+    shown = "(parts) => parts.map((part) => part.checkVisibility())"
+    page.locator("#runs label").nth(1).click()
+    assert tables.evaluate_all(shown) == [False, True, False]
+    assert tables.nth(1).locator("h3").inner_text() == f"mode {MODES[1]}"
+    page.emulate_media(media="print")
+    assert tables.evaluate_all(shown) == [True, True, True]
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_no_link_has_the_colour_of_the_trail_or_the_path(opened, theme):
     page = opened()
@@ -179,6 +205,28 @@ def test_no_link_has_the_colour_of_the_trail_or_the_path(opened, theme):
     for name in ("trail", "text"):
         own = page.evaluate("(name) => report.colour(name)", name)
         assert min(colour_distance(own, link) for link in links) > APART
+    assert links == list(THEMES[theme].links)
+    assert page.evaluate("report.colour('trail')") == THEMES[theme].trail
+
+
+def test_names_keep_clear_of_one_another(opened):
+    page = opened()
+    page.evaluate("""() => {
+        const pen = CanvasRenderingContext2D.prototype, write = pen.fillText;
+        window.boxes = [];
+        pen.fillText = function (text, x, y) {
+            if (this.textAlign === "center") boxes.push([text, x, y, this.measureText(text).width]);
+            return write.call(this, text, x, y);
+        };
+    }""")
+    page.locator("#names").check()
+    for time in (0.01, 0.05, 0.09):
+        page.evaluate("(time) => { boxes.length = 0; player.seek(time); }", time)
+        wait_for_drawing(page)
+        boxes = {text: (x, y, wide) for text, x, y, wide in page.evaluate("boxes")}
+        assert {"link1", "link8", "A1", "D1", "C"} <= boxes.keys()
+        for (one, (x, y, wide)), (other, (u, v, far)) in combinations(boxes.items(), 2):
+            assert abs(x - u) >= 0.5 * (wide + far) or abs(y - v) >= 10.0, (one, other)
 
 
 def test_charts_below_the_screen_wait_until_they_are_seen(opened):

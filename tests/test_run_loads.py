@@ -98,7 +98,7 @@ def test_every_effort_has_its_unit():
     assert push.startswith("drive push: force up to ")
     assert "; speed up to 2 m/s; power up to " in push
     assert spin.startswith("drive spin: torque up to ")
-    assert "; speed up to 3 rad/s; power up to " in spin
+    assert "; speed up to 3 rad/s, 28.65 rpm; power up to " in spin
     efforts = dict(motion_page(data).more)["Motors and prescribed motions"]
     assert efforts.count("m/s") == efforts.count("rad/s") == 2
     # Of results that do not tell which of the two it is, no unit is claimed.
@@ -197,7 +197,9 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
     assert loads["joints"][slider_joint(data)]["unit"] == "m"
     # Below one, which is said three times.
     assert loads["beams"]["rod"]["safety_factor"] < 1.0
-    assert "stress-over-strength" in {one.code for one in crank.doubts}
+    (over,) = [one for one in crank.doubts if one.code == "stress-over-strength"]
+    assert " rad/s, " in over.remedy
+    assert " rpm)" in over.remedy
     page = motion_page(data)
     tables = dict(page.more)
     assert list(tables)[:3] == ["Stresses of beams", "Motors and prescribed motions", "Joints and ground"]

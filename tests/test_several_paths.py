@@ -59,7 +59,16 @@ def test_one_table_has_all_paths_and_modes(two):
         numbers = summary["modes"]["++"]
         assert float(row[2]) == pytest.approx(numbers[f"tracking_rms_{summary['error']}"], rel=1e-4)
         assert [float(one) for one in row[3:5]] == pytest.approx([*numbers["peak_torque"].values()], abs=0.006)
+        (stressed,) = [row for row in rows if row[:2] == [path, "++"] and row[2][0].isalpha()]
+        most = max(one["stress_max"] for one in numbers["loads"]["beams"].values())
+        assert float(stressed[3]) == pytest.approx(1e-6 * most, rel=1e-3)
     assert "mode ++, path " in done.stdout
+
+
+def test_where_results_are_comes_last(tmp_path):
+    done = paraflex("run", "five_bar", *PATHS, "--mode", "++", *FAST, "--out", tmp_path, mixed=True)
+    last = done.stdout.splitlines()[-2:]
+    assert [line.rpartition(" ")[2] for line in last] == [str(tmp_path / path) for path in ("line", "square")]
 
 
 def test_json_lists_both(tmp_path):

@@ -73,7 +73,7 @@ def test_describing_the_library_imports_nothing_that_only_runs_need():
     assert python("-c", look, *unneeded) == []
 
 
-@pytest.mark.parametrize("command", ["run", "verify", "motion"])
+@pytest.mark.parametrize("command", ["run", "verify", "motion", "linearise"])
 def test_commands_import_what_draws_once_there_are_numbers(command):
     look = f"import sys; import paraflex.cli.{command}; print(*set(sys.argv) & set(sys.modules))"
     assert python("-c", look, "matplotlib", "paraflex.report", "paraflex.plots.save") == []

@@ -51,7 +51,7 @@ def valid():
     """RAParM-II's bars are thicker: in this mode linear geometry is 0.2 % off the deviation."""
     model = pf.load("raparm_ii")
     mechanism = bench.variant(model.mechanism, Geometry.LINEAR, PINNED)
-    return pf.plan(mechanism, model.path("square"), duration=0.45, samples=91).simulate("++++")
+    return pf.plan(mechanism, model.path("square"), duration=0.45, samples=401).simulate("++++")
 
 
 def indicators(validity: Validity | None):

@@ -7,6 +7,8 @@ from typing import Any
 from paraflex.results.metrics import METRICS, Metric
 
 MARK = "<!-- metrics -->"
+# Of a motor, a prescribed motion and a joint.
+EXAMPLES = {"motor": "tau1", "drive": "drive", "joint": "O"}
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
@@ -20,6 +22,6 @@ def table() -> str:
 
 
 def _row(metric: Metric) -> str:
-    meaning = metric.meaning + (f": columns `{metric.name}.tau1`, ..." if metric.per_motor else "")
+    meaning = metric.meaning + (f": columns `{metric.name}.{EXAMPLES[metric.each]}`, ..." if metric.each else "")
     unit = "" if metric.unit == "1" else metric.unit
     return f"| `{metric.name}` | {meaning} | {unit} | {'yes' if metric.smooth else 'none'} |"

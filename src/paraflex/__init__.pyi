@@ -103,6 +103,7 @@ from .studies import (
 from .results import (
     tracking_dataset as tracking_dataset,
     motion_dataset as motion_dataset,
+    linear_dataset as linear_dataset,
     summary as summary,
     save_results as save_results,
     load_results as load_results,

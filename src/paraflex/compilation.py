@@ -18,6 +18,7 @@ from llvmlite import binding
 
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
 from paraflex.dynamics.state import check_accelerations
+from paraflex.dynamics.tangents import MotionPoint, Tangency
 from paraflex.errors import as_enum
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
@@ -125,7 +126,10 @@ def _call_start(geometry: Geometry) -> None:
     beam = _free_beam(geometry)
     beam.start()
     # What a start with prescribed motion is checked with.
-    check_accelerations(beam.problem.system, beam.problem.signals, 0.0, beam.state.q, beam.state.v)
+    system, still = beam.problem.system, beam.state
+    check_accelerations(system, beam.problem.signals, 0.0, still.q, still.v)
+    # A linear model.
+    Tangency(system).at(MotionPoint(0.0, still.q, still.v, np.zeros(system.n), np.zeros(0), np.zeros(0)))
 
 
 def _call_plan(_: Geometry) -> None:

@@ -89,6 +89,7 @@ def simulate_motion(
     method: Method | str | None = None,
     options: IntegrationOptions | None = None,
     on_progress: Callable[[float], None] | None = None,
+    warning: bool = True,
 ) -> MotionRun:
     """Integrate a mechanism without a path under its loads.
 
@@ -113,6 +114,8 @@ def simulate_motion(
     options : IntegrationOptions, optional
     on_progress : callable, optional
         Called with the time reached [s].
+    warning : bool
+        Whether a run that is doubtful issues warnings; its `validity` and `doubts` hold them either way.
 
     Warns
     -----
@@ -154,14 +157,16 @@ def simulate_motion(
     signals, knots = pack_signals(mechanism, motors, end)
     try:
         solution = integrate(
-            system, signals, state, times, knots=np.array([*own, *knots]), options=options, on_progress=on_progress
-        )
+            system, signals, state, times, knots=np.array([*own, *knots]), options=options, samples=samples,
+            on_progress=on_progress,
+        )  # fmt: skip
     except IntegrationError as error:
         error.partial = _run(system, times, values, with_blame(error, mechanism).partial)
         raise
     run = _run(system, times, values, solution)
-    warn(run.validity)
-    warn_of(run.doubts, ResultWarning)
+    if warning:
+        warn(run.validity)
+        warn_of(run.doubts, ResultWarning)
     return run
 
 

@@ -28,6 +28,7 @@ from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from paraflex.integrators.beam_ends import leave_beam
+from paraflex.integrators.between import SAMPLES
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
 from paraflex.mechanism.laws import stops
@@ -252,7 +253,12 @@ class TrackingRun(Shown):
         """Findings on events in the run, and on results that are implausible for the mechanism."""
         whole = self.task.whole or self.task
         found = doubtful_results(self.task.system, self.solution, self.driven, whole.mechanism)
-        return (*self.solution.findings, *found)
+        # How many samples are enough is another number in each mode.
+        of_run = (
+            replace(one, place=f"mode {self.mode.name}") if one.place == SAMPLES else one
+            for one in self.solution.findings
+        )
+        return (*of_run, *found)
 
     @cached_property
     def driven(self) -> Driven | None:
@@ -423,7 +429,10 @@ def _drive(
     signals, knots = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))
     stops = np.sort(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))
     try:
-        return integrate(task.system, signals, task.start, times, knots=stops, options=options, on_progress=on_progress)
+        return integrate(
+            task.system, signals, task.start, times, knots=stops, options=options, samples=task.motion.t.size,
+            on_progress=on_progress,
+        )  # fmt: skip
     except IntegrationError as error:
         with_blame(error, (task.whole or task).mechanism)
         raise
@@ -463,7 +472,7 @@ def _drive_and_hold(
     try:
         held = integrate(
             braked.system, signals, braked.state, times[count:], knots=np.array(knots), options=options,
-            begun=driven, on_progress=on_progress,
+            begun=driven, samples=times.size, on_progress=on_progress,
         )  # fmt: skip
     except IntegrationError as error:
         error.partial = whole(with_blame(error, (task.whole or task).mechanism).partial)

@@ -15,6 +15,28 @@ PLAIN: Dimension = (0, 0, 0, 0)
 ANGLE: Dimension = (0, 0, 0, 1)
 
 
+class DisplayUnit(NamedTuple):
+    """A unit for display: its name, and the factor from SI."""
+
+    name: str
+    factor: float
+
+
+# Of every stress that is printed or drawn; moduli may be in GPa.
+STRESS = DisplayUnit("MPa", 1e-6)
+
+
+def printed_unit(unit: str) -> DisplayUnit:
+    """The unit of a quantity in tables of commands: MPa of stresses, nothing of plain numbers, else the SI unit."""
+    return STRESS if unit == "Pa" else DisplayUnit("" if unit == "1" else unit, 1.0)
+
+
+def speed_text(speed: float, unit: str, form: str = ".4g") -> str:
+    """A speed in m/s or rad/s; of the latter also in rpm, as what is given without a unit may have been meant so."""
+    turns = f", {speed * 30.0 / math.pi:{form}} rpm" if unit == "rad/s" else ""
+    return f"{speed:{form}} {unit}{turns}"
+
+
 class Unit(NamedTuple):
     """A unit: `factor` times pi to the power `pi` in SI units, exact, and its dimension."""
 

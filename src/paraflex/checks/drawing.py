@@ -46,7 +46,8 @@ def pose_of(
     if path is not None or (model.paths and model.start is None):
         name = model.path_name(path)
         followed = (name, model.path(name))
-    return posed(model.mechanism, assembly or model.study.assembly, followed, model.start)
+    duration = model.study.duration if followed is None else model.duration(followed[1])
+    return posed(model.mechanism, assembly or model.study.assembly, followed, model.start, duration)
 
 
 def draw(

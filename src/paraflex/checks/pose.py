@@ -23,7 +23,7 @@ from paraflex.dynamics import (
     reach,
     undeformed,
 )
-from paraflex.dynamics.linearise import LOWEST
+from paraflex.dynamics.linearise import BALANCED as BALANCED, LOWEST
 from paraflex.errors import NumericalError, ProportionError
 from paraflex.findings import Finding
 from paraflex.limits import OUT_OF_PROPORTION
@@ -32,8 +32,6 @@ from paraflex.mechanism.poses import approximate_poses
 
 # A body that closing the loops turned further than this had another angle in mind, or another elbow [rad].
 FAR_TURN = 0.5
-# What a mechanism let go may start with and still be called balanced [m/s^2].
-BALANCED = 1e-5
 # A first natural frequency below this is that of no link [Hz].
 SLOWEST_LINK = 0.1
 

@@ -19,7 +19,16 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import check_stops, model_parameters
 from paraflex.cli.request import at_fault, plan_study
-from paraflex.cli.tables import below_tolerance, failures, loads, plain_console, print_studies, validity, warn_of
+from paraflex.cli.tables import (
+    below_tolerance,
+    failures,
+    loads,
+    plain_console,
+    print_studies,
+    stresses,
+    validity,
+    warn_of,
+)
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels
 from paraflex.elastodynamics import simulate_ked
@@ -80,7 +89,7 @@ def run_along(
 
 def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity: str, began: float) -> int:
     """Run along one path after the other; what there is of the first ones stays, and is shown, if a later one fails."""
-    console, alone, done = plain_console(stderr=True), len(planned) == 1, {}
+    console, alone, done, places = plain_console(stderr=True), len(planned) == 1, {}, []
 
     def show(out: Console) -> None:
         _show(out, {"" if alone else path: result for path, result in done.items()}, planned[0].study.task, fidelity)
@@ -94,7 +103,7 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
                         tell(result.to_dict(), show, as_json=request.json)
                     else:
                         warn_of(plain_console(stderr=request.json), verdict_of(result.data), along.whose)
-                    _draw(console, request, along, result, began)
+                    places.append(_draw(console, request, along, result, began))
             if result.interrupted:
                 break
             began = time.perf_counter()
@@ -102,6 +111,8 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
         if done and not alone:
             numbers = {"paths": {path: result.to_dict() for path, result in done.items()}}
             tell(numbers, show, as_json=request.json, doubts=())
+        for place in [] if request.json else places:
+            console.print(place, soft_wrap=True)
     well = len(done) == len(planned) and all(result.complete for result in done.values())
     return exit_code(well, interrupted=any(result.interrupted for result in done.values()))
 
@@ -119,6 +130,8 @@ def _show(out: Console, results: Mapping[str, StudyResult], task: TrackingTask, 
     }
     below_tolerance(out, ran, modes)
     validity(out, {name: mode.get("validity") for name, mode in modes.items()})
+    if len(results) > 1:
+        stresses(out, ran)
     loads(out, {name: mode.get("loads", {}) for name, mode in modes.items()})
 
 
@@ -139,11 +152,11 @@ def _simulated(console: Console, model: Model, along: _Along) -> StudyResult:
     return result
 
 
-def _draw(console: Console, request: RunRequest, along: _Along, result: StudyResult, began: float) -> None:
-    """Add figures and report to the numbers, and say which modes failed."""
+def _draw(console: Console, request: RunRequest, along: _Along, result: StudyResult, began: float) -> str:
+    """Add figures and report to the numbers, and say which modes failed; a line that says where all is."""
     assert result.data is not None
     try:
-        write_drawn_run(result.data, along.folder, request, began)
+        return write_drawn_run(result.data, along.folder, request, began)
     finally:
         failures(console, result, along.whose)
 

@@ -18,6 +18,7 @@ from paraflex.errors import InputError
 from paraflex.folders import RUN_COMPARISON, ResultsFolder
 from paraflex.results.comparison import MotionPair, NumberPair, RunComparison, compare
 from paraflex.results.metrics import metric_label
+from paraflex.units import printed_unit
 from paraflex.writing import write_json
 
 # Settings that are printed, and letters of each; compare.json has all.
@@ -113,8 +114,8 @@ def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
 
 
 def _shown(pair: NumberPair | MotionPair) -> list[str]:
-    """Unit, both values and their difference; stresses in MPa."""
-    unit, factor = ("MPa", 1e-6) if pair.unit == "Pa" else ("" if pair.unit == "1" else pair.unit, 1.0)
+    """Unit, both values and their difference."""
+    unit, factor = printed_unit(pair.unit)
     return [unit, *(_number(factor * value) for value in (pair.first, pair.second, pair.difference))]
 
 

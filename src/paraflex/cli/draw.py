@@ -6,6 +6,7 @@ import os
 import sys
 import tempfile
 import webbrowser
+from collections.abc import Sequence
 from html import escape
 from io import StringIO
 from pathlib import Path
@@ -23,6 +24,7 @@ from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
+from paraflex.results.acting import acting_load, drive_speed
 from paraflex.writing import portable_name, whole_file
 
 if TYPE_CHECKING:
@@ -92,13 +94,15 @@ def _has_screen() -> bool:
 
 
 def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
-    """Bodies, joints and motors, what is open, where the drawing is and how to go on."""
+    """Bodies, joints, drives and loads, what is open, where the drawing is and how to go on."""
     mechanism = model.mechanism
     console.print(f"{mechanism.name} ({model.source})", soft_wrap=True)
     console.print(_joints(mechanism, shown))
-    bodies = [body.name for body in mechanism.bodies]
-    more = f" and {len(bodies) - _LISTED} more" if len(bodies) > _LISTED else ""
-    console.print(f"bodies: {', '.join(bodies[:_LISTED])}{more}", soft_wrap=True)
+    console.print(f"bodies: {_few([body.name for body in mechanism.bodies])}", soft_wrap=True)
+    for line in [*_drives(mechanism, shown), *_loads(mechanism, shown)]:
+        console.print(line, soft_wrap=True)
+    if mechanism.sensors:
+        console.print(f"sensors: {_few([f'{one.name} ({one.kind})' for one in mechanism.sensors])}", soft_wrap=True)
     for problem in shown.problems:
         console.print(f"warning: {problem}", soft_wrap=True)
     if shown.gaps:
@@ -109,14 +113,50 @@ def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, ou
     console.print(f"next: paraflex info {name}, paraflex run --mechanism {name}", soft_wrap=True)
 
 
+def _few(names: Sequence[str]) -> str:
+    """The first of some names."""
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return f"{', '.join(names[:_LISTED])}{more}"
+
+
+def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:
+    """Prescribed motions: which way they begin, and how fast."""
+    lines = []
+    for drive in mechanism.prescribed[:_LISTED]:
+        joint = mechanism.joint(drive.joint)
+        sign = shown.moves.get(drive.joint, 0)
+        if not sign:
+            lines.append(f"prescribed {drive.name}: {drive.joint} is held")
+            continue
+        if joint.slides:
+            way = "along its axis" if sign > 0 else "against its axis"
+        else:
+            way = "anticlockwise" if sign > 0 else "clockwise"
+        speed = drive_speed(drive, joint.slides, shown.duration)
+        lines.append(f"prescribed {drive.name}: {joint.b.body} at {drive.joint} {way}, {speed}")
+    return lines
+
+
+def _loads(mechanism: Mechanism, shown: Posed) -> list[str]:
+    """Loads with their sizes."""
+    sizes = [acting_load(load, shown.duration) for load in mechanism.loads[:_LISTED]]
+    return [f"load {one.load.name}: {one.load.kind} at {one.load.point}, {one.size}" for one in sizes]
+
+
 def _joints(mechanism: Mechanism, shown: Posed) -> Table:
     table = Table(title="joints", title_justify="left")
-    for heading in ("joint", "kind", "between", "motor", *(["open by"] if shown.gaps else [])):
+    # Columns of what there is.
+    columns = {
+        "motor": {motor.joint: motor.name for motor in mechanism.motors},
+        "prescribed": {drive.joint: drive.name for drive in mechanism.prescribed},
+        "open by": dict(shown.gaps),
+    }
+    columns = {heading: of_joints for heading, of_joints in columns.items() if of_joints}
+    for heading in ("joint", "kind", "between", *columns):
         table.add_column(heading)
-    motors = {motor.joint: motor.name for motor in mechanism.motors}
     for joint in mechanism.joints[:_LISTED]:
-        row = [joint.name, joint.kind, f"{joint.a}, {joint.b}", motors.get(joint.name, "")]
-        table.add_row(*row, *([shown.gaps.get(joint.name, "")] if shown.gaps else []))
+        more = [of_joints.get(joint.name, "") for of_joints in columns.values()]
+        table.add_row(joint.name, joint.kind, f"{joint.a}, {joint.b}", *more)
     if len(mechanism.joints) > _LISTED:
         table.add_row(f"and {len(mechanism.joints) - _LISTED} more")
     return table

@@ -48,7 +48,11 @@ def tell(
 
 
 def say_where(began: float, what: str, folder: Path, *, report: bool = False) -> None:
-    """The last line of a command: how long it took, and where things are."""
+    """Print the last line of a command."""
+    plain_console(stderr=True).print(where(began, what, folder, report=report), soft_wrap=True)
+
+
+def where(began: float, what: str, folder: Path, *, report: bool = False) -> str:
+    """How long something took until now, and where things are."""
     more = " and report.html" if report else ""
-    text = f"{time.perf_counter() - began:.1f} s; {what}{more} in {folder}"
-    plain_console(stderr=True).print(text, soft_wrap=True)
+    return f"{time.perf_counter() - began:.1f} s; {what}{more} in {folder}"

@@ -55,5 +55,5 @@ def _report(console: Console, result: IndicesResult, found: list[dict[str, Any]]
     for k, dropped in enumerate(indices["dropped"].values):
         if dropped:
             share = f"{dropped} of {dropped + indices['samples'].values[k]} base samples"
-            where = ", ".join(str(indices[name].values[k]) for name in ("metric", "path", "mode"))
+            where = ", ".join(filter(None, (str(indices[name].values[k]) for name in ("metric", "path", "mode"))))
             console.print(f"{where}: {share} left out: not all their runs are complete", soft_wrap=True)

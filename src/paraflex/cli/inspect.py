@@ -28,6 +28,7 @@ from paraflex.mechanism import (
     grouped,
     loops,
 )
+from paraflex.units import speed_text
 
 # Loops and sets of motors listed at most.
 _LISTED = 1000
@@ -147,7 +148,7 @@ def _drive(drive: PrescribedAngle, unit: str) -> str:
     """Name, joint and, where it is constant, the speed of a prescribed motion."""
     law = drive.law
     return f"{drive.name}: joint {drive.joint}, " + (
-        f"{law.speed:.4g} {unit}" if isinstance(law, ConstantSpeed) else "in time"
+        speed_text(law.speed, unit) if isinstance(law, ConstantSpeed) else "in time"
     )
 
 

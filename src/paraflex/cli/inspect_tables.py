@@ -49,7 +49,7 @@ def print_facts(facts: dict[str, Any]) -> None:
         _print_drives(console, facts)
     console.print(_links(facts))
     if "frequencies" in facts:
-        _print_frequencies(console, facts["frequencies"])
+        _print_frequencies(console, facts)
     print_verdict(console, facts)
 
 
@@ -169,10 +169,12 @@ def _links(facts: dict[str, Any]) -> Table:
     return table
 
 
-def _print_frequencies(console: Console, found: dict[str, Any]) -> None:
+def _print_frequencies(console: Console, facts: dict[str, Any]) -> None:
+    found, motors = facts["frequencies"], bool(facts["motors"])
+    free = "motors free" if motors else "prescribed motions held" if facts["prescribed"] else "lowest"
     pose = "static equilibrium" if found["balanced"] else "undeformed"
     console.print(f"natural frequencies of the assembled mechanism at rest, t = {found['time']:g} s, {pose} [Hz]")
-    for label, key in (("motors held", "motors_held_hz"), ("motors free", "motors_free_hz")):
+    for label, key in (("motors held", "motors_held_hz"), (free, "motors_free_hz")):
         if found[key] is not None:
             lowest = ", ".join(f"{f:.4g}" for f in found[key][:6])
             console.print(f"  {label}: {lowest or 'none: nothing can move'}", soft_wrap=True)
@@ -186,6 +188,8 @@ def _print_frequencies(console: Console, found: dict[str, Any]) -> None:
             "--balanced takes the equilibrium nearby"
             if found["equilibrium_nearby"]
             else "with its motors held, too, there is none nearby"
+            if motors
+            else "there is none nearby"
         )
         console.print(
             f"  not an equilibrium: let go it would start with {found['acceleration']:.3g} m/s^2, root mean square "

@@ -101,12 +101,14 @@ def _run_held(
     tell(summary, lambda out: _report(out, summary, data), as_json=request.json)
     finished = run.solution.status in DONE_STATUSES
     try:
-        write_drawn_run(data, folder, request, began)
+        place = write_drawn_run(data, folder, request, began)
     finally:
         if not finished:
             message = run.solution.message
             kept = run.solution.status == "interrupted"
             console.print(f"{message}; results until then are kept" if kept else f"error: {message}", soft_wrap=True)
+    if not request.json:
+        console.print(place, soft_wrap=True)
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 

@@ -8,8 +8,8 @@ from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.search import parameter_table, search_command
 from paraflex.cli.tables import plain_table
 from paraflex.designs.measure import metric_of
-from paraflex.plots.labels import DisplayUnit, display_unit
 from paraflex.studies import OptimisationResult, load_optimisation
+from paraflex.units import printed_unit
 
 
 def optimise_command(request: SearchRequest) -> int:
@@ -21,19 +21,13 @@ def _report(console: Console, result: OptimisationResult) -> None:
     console.print(parameter_table(result))
     rows = [["objective", "", *(f"{value:.6g}" for value in (result.start_objective, result.objective))]]
     for name, value in result.metrics.items():
-        unit = _shown_unit(name)
+        unit = printed_unit(metric_of(name).unit)
         rows.append([name, unit.name, *(f"{unit.factor * one:.6g}" for one in (result.start_metrics[name], value))])
     console.print(plain_table("", "unit", numbers=("start", "best"), rows=rows))
     for name, limit in [] if result.holds_limits else result.sought["limits"]:
-        unit, value = _shown_unit(name), result.metrics[name]
+        unit, value = printed_unit(metric_of(name).unit), result.metrics[name]
         if value > limit:
             of, over = (f"{unit.factor * one:.6g} {unit.name}".rstrip() for one in (limit, value - limit))
             console.print(f"limit exceeded: {name} is above {of} by {over}", soft_wrap=True)
     if not result.holds_limits:
         console.print("no design keeps all limits: this one, and best.toml, exceed them least and do not satisfy them")
-
-
-def _shown_unit(metric: str) -> DisplayUnit:
-    """Stresses are in MPa as on pages, numbers without a unit have none, all others are in SI."""
-    unit = metric_of(metric).unit
-    return display_unit(unit, 1.0) if unit == "Pa" else DisplayUnit("" if unit == "1" else unit, 1.0)

@@ -13,7 +13,7 @@ from paraflex.cli.commands.studies import SweepRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
-from paraflex.designs.measure import beyond_limits
+from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.sweep import SweepStudy
 from paraflex.studies import SweepResult, load_sweep
 
@@ -66,6 +66,8 @@ def _report(console: Console, result: SweepResult) -> None:
     plain_console().print(f"{result.done} of {result.total} runs: {statuses or 'none yet'}")
     if result.beyond:
         plain_console().print(f"warning: {beyond_limits(result.beyond)}", soft_wrap=True)
+    if result.coarse:
+        plain_console().print(f"warning: {coarse_runs(result.coarse)}", soft_wrap=True)
     if result.fresh:
         console.print(
             f"{result.fresh} of them in {result.seconds:.1f} s now, {result.fresh / result.seconds:.1f} runs/s"

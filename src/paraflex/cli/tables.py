@@ -13,6 +13,7 @@ from rich.table import Table
 from paraflex.cli.collected import printed
 from paraflex.errors import printable
 from paraflex.findings import DONE_STATUSES, Finding
+from paraflex.units import STRESS
 
 if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
@@ -169,6 +170,22 @@ def loads(console: Console, figures: Mapping[str, Any]) -> None:
     lines = [line for name, one in figures.items() for line in effort_lines(one, name)]
     for line in filter(None, [stress_line(figures), *lines, joint_line(figures)]):
         console.print(line, soft_wrap=True)
+
+
+def stresses(console: Console, summaries: Mapping[str, Any]) -> None:
+    """The largest stress of every run along some paths, where the mechanism has any."""
+    from paraflex.results.loads import ranked
+
+    rows, numbers = [], (f"stress\n[{STRESS.name}]", "at\n[m]", "time\n[s]", "safety\nfactor")
+    for names, mode in _runs(summaries):
+        found = ranked({"": mode.get("loads", {})}, "beams", "stress_max")
+        if found:
+            most, _, body, one = found[0]
+            values = (STRESS.factor * most, one["place"], one["time"], one["safety_factor"])
+            rows.append([*names, body, *(number(value, ".4g") for value in values)])
+    if rows:
+        table = plain_table(*_texts(summaries), "beam", numbers=numbers, rows=rows)
+        print_titled(console, "Largest stress of every run", table)
 
 
 def failures(console: Console, result: StudyResult, whose: str = "") -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import say_where
+from paraflex.cli.ending import where
 from paraflex.errors import OutputError
 from paraflex.folders import ResultsFolder
 from paraflex.results import save_results
@@ -28,13 +28,12 @@ def write_numbers(data: xr.Dataset, summary: dict[str, Any], folder: ResultsFold
         write_json(new / "summary.json", summary)
 
 
-def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest, began: float) -> None:
-    """Add the figures of a run, and the report if it is wanted; say where all is."""
+def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest, began: float) -> str:
+    """Add the figures of a run, and the report if it is wanted; a line that says where all is."""
     from paraflex.cli.report import page_of
 
     write_drawn(data, folder, (lambda: page_of(data, folder.path)) if request.report else None)
-    if not request.json:
-        say_where(began, "results, figures", folder.path, report=request.report)
+    return where(began, "results, figures", folder.path, report=request.report)
 
 
 def write_drawn(

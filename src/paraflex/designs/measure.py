@@ -9,12 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, IntegrationError, Moment, as_enum, suggestion
+from paraflex.integrators.between import COARSE
+from paraflex.mechanism import Mechanism
+from paraflex.motion import MotionRun
 from paraflex.results.following import HEADLINE, ErrorSpan
-from paraflex.results.metrics import METRICS, VALIDITY, Metric
-from paraflex.results.run_traces import run_traces
-from paraflex.results.traces import Traces
+from paraflex.results.metrics import DRIVE, JOINT, METRICS, MOTION, MOTOR, PATH, VALIDITY, Members, Metric
+from paraflex.results.run_traces import MotionTraces, RunTraces, run_traces
 from paraflex.tracking import TrackingRun
 
+Runs = TrackingRun | MotionRun
+RunsTraces = RunTraces | MotionTraces
+
+# Metrics that short peaks between samples may be missing from.
+_LARGEST_LOADS = (
+    "stress_max", "safety_factor_min", "section_moment_max", "drive_torque_max", "drive_power_max", "joint_force_max",
+)  # fmt: skip
 # Metrics that have derivatives.
 SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)
 
@@ -37,31 +46,63 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
         raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(known)))
 
 
-def metrics_of(names: Sequence[str], error: ErrorSpan | str) -> tuple[str, ...]:
-    """Metrics in the given order; all if none is given, with the ranking error first.
+def members_of(mechanism: Mechanism) -> Members:
+    """What of a mechanism metrics have a column each of: names of motors, drives (prescribed motions) and joints."""
+    members = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
+    return {kind: tuple(one.name for one in each) for kind, each in members.items()}
+
+
+def metrics_of(
+    names: Sequence[str], error: ErrorSpan | str, mechanism: Mechanism | None = None, runs: str = PATH
+) -> tuple[str, ...]:
+    """Metrics in the given order; if none is given those that are kept of such runs, with the ranking error first.
+
+    Parameters
+    ----------
+    names : sequence of str
+    error : ErrorSpan or str
+        The tracking error that ranks runs along a path.
+    mechanism : Mechanism, optional
+        Of the runs: without motors no metrics of these are kept.
+    runs : str
+        "path" or "motion".
 
     Raises
     ------
     InputError
-        An unknown name.
+        An unknown name, or one that such runs do not have.
     """
     for name in names:
         check_metric(name)
-    return tuple(dict.fromkeys([*(names or [HEADLINE[as_enum(ErrorSpan, error, "error")], *METRICS]), VALIDITY]))
+        if runs == MOTION and METRICS[name].along_path:
+            raise InputError(
+                "a metric of runs along a path, which the mechanism does not have", field="metrics", value=name,
+                remedy="choose from " + ", ".join(each.name for each in METRICS.values() if not each.along_path),
+            )  # fmt: skip
+    if names:
+        return tuple(dict.fromkeys([*names, VALIDITY]))
+    motors = mechanism is None or mechanism.motors
+    kept = [
+        one.name
+        for one in METRICS.values()
+        if runs in one.kept_of and not (runs == MOTION and one.along_path) and (motors or not one.of_motors)
+    ]
+    first = [HEADLINE[as_enum(ErrorSpan, error, "error")]] if runs == PATH else []
+    return tuple(dict.fromkeys([*first, *kept, VALIDITY]))
 
 
-def metric_columns(run: TrackingRun, names: Sequence[str]) -> tuple[str, ...]:
-    """Columns of the metrics by name, NAME.MOTOR for those per motor."""
-    motors = [motor.name for motor in run.task.mechanism.motors]
-    return tuple(column for name in names for column in METRICS[name].columns(motors))
+def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
+    """Columns of the metrics by name, NAME.MEMBER for those of each motor, drive or joint."""
+    members = members_of(run.system.mechanism if isinstance(run, MotionRun) else run.task.mechanism)
+    return tuple(column for name in names for column in METRICS[name].columns(members))
 
 
-def metric_values(traces: Traces, nominal: Traces, names: Sequence[str]) -> NDArray[Any]:
+def metric_values(traces: RunsTraces, nominal: RunsTraces, names: Sequence[str]) -> NDArray[Any]:
     """Numbers of `metric_columns` for a run near another."""
     return np.concatenate([np.zeros(0), *(np.ravel(METRICS[name].formula(traces, nominal)) for name in names)])
 
 
-def measure(run: TrackingRun, names: Sequence[str]) -> dict[str, float | int]:
+def measure(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
     """Metrics of a run that ran to its end by column, in the order of the names.
 
     Raises
@@ -77,6 +118,18 @@ def measure(run: TrackingRun, names: Sequence[str]) -> dict[str, float | int]:
     traces = run_traces(run)
     values = zip(metric_columns(run, names), metric_values(traces, traces, names), strict=True)
     return {column: int(value) if metric_of(column).whole else float(value) for column, value in values}
+
+
+def coarseness(run: Runs, names: Sequence[str]) -> str:
+    """Why the largest loads among some metrics of a run may lie between its samples; empty where they do not."""
+    found = [one for one in run.solution.findings if one.code == COARSE] if set(names) & set(_LARGEST_LOADS) else []
+    return "; ".join(f"{one.text}; {one.remedy}" for one in found)
+
+
+def coarse_runs(runs: int) -> str:
+    """A sentence on runs with too few samples for their largest loads."""
+    which = "one run has" if runs == 1 else f"{runs} runs have"
+    return f"{which} larger loads between the samples than metrics show (column reason): take more samples [{COARSE}]"
 
 
 def smooth_metrics(names: Sequence[str]) -> tuple[str, ...]:

@@ -11,13 +11,11 @@ import xarray as xr
 
 from paraflex.campaign import STUDY, read_study
 from paraflex.designs.measure import measure
-from paraflex.designs.run import Abandoned, Task, plan_task
+from paraflex.designs.run import Task, dataset_of, ready, run_mode
 from paraflex.designs.samples import Varied
 from paraflex.designs.setting import Setting, digest, versions
 from paraflex.errors import InputError
 from paraflex.files.overlay import Place
-from paraflex.results import tracking_dataset
-from paraflex.tracking import simulate
 
 _AGAIN = "run the study again, in a new folder"
 
@@ -123,11 +121,9 @@ def run_again(
     Abandoned
         See `watch`.
     """
-    planned, options = plan_task(setting, Task(0, 0, tuple(values), path))
-    run = simulate(planned, mode, options=options, on_progress=watch, warning=False)
-    if run.solution.status == "interrupted":
-        raise Abandoned
-    return tracking_dataset([run], options=options), measure(run, setting.metrics)
+    planned, options = ready(setting, Task(0, 0, tuple(values), path))
+    run = run_mode(planned, mode, options, watch)
+    return dataset_of(run, options), measure(run, setting.metrics)
 
 
 def _range(parameter: Varied) -> list[Any]:
@@ -154,6 +150,7 @@ def _setting(content: Mapping[str, Any], had: Mapping[str, str]) -> Setting:
         metrics=tuple(content["metrics"]),
         trajectories=False,
         versions=had,
+        balanced=content.get("balanced", False),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,14 +11,16 @@ import xarray as xr
 
 from paraflex.campaign import Row
 from paraflex.compilation import compile_kernels_for
-from paraflex.designs.measure import measure
+from paraflex.designs.measure import Runs, coarseness, measure
+from paraflex.designs.own_motion import OwnMotion, own_motion
 from paraflex.designs.setting import Setting, digest, versions
 from paraflex.errors import InputError, NumericalError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
-from paraflex.results import tracking_dataset
-from paraflex.results.metrics import METRICS
-from paraflex.tracking import TrackingRun, TrackingTask, simulate
+from paraflex.motion import MotionRun
+from paraflex.results import motion_dataset, tracking_dataset
+from paraflex.results.metrics import METRICS, Members
+from paraflex.tracking import TrackingTask, simulate
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -29,7 +31,7 @@ _ID_DIGITS = 16
 
 
 class Task(NamedTuple):
-    """A design along a path: its number among all, the number and values of its design, and the path's name."""
+    """A design along a path: its number among all, the number and values of its design, and the path's name, if any."""
 
     number: int
     design: int
@@ -81,16 +83,17 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     _check_versions(setting)
     rows, kept = [_blank(setting, task, mode) for mode in setting.modes], {}
     try:
-        planned, options = plan_task(setting, task)
+        planned, options = ready(setting, task)
     except Exception as error:
         for row in rows:
             row |= trouble(error)
         return Outcome(task, rows)
     for row in rows:
         try:
-            run = _simulate(planned, row["mode"], options, watch)
+            run = run_mode(planned, row["mode"], options, watch)
             row |= measure(run, setting.metrics) | {
                 "status": STATUS_COMPLETE,
+                "reason": coarseness(run, setting.metrics),
                 "time_reached": float(run.solution.t[-1]),
             }
         except Abandoned:
@@ -102,6 +105,22 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
         if setting.trajectories:
             kept[row["id"]] = _trajectory(run, options, row)
     return Outcome(task, rows, kept)
+
+
+def ready(setting: Setting, task: Task) -> tuple[TrackingTask | OwnMotion, IntegrationOptions]:
+    """What is to be simulated of a design, planned along its path or without one, and the integration options.
+
+    Raises
+    ------
+    InputError, NumericalError
+        Numbers that cannot be, a path out of reach, or loops that do not close.
+    """
+    if setting.has_path:
+        return plan_task(setting, task)
+    model, options = setting.design(task.values)
+    _compile(model.mechanism)
+    motion = own_motion(model, setting.duration, setting.samples, setting.assembly, balanced=setting.balanced)
+    return motion, options
 
 
 def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOptions]:
@@ -120,7 +139,7 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
     return planned, options
 
 
-def table_schema(setting: Setting, motors: Sequence[str]) -> pa.Schema:
+def table_schema(setting: Setting, members: Members) -> pa.Schema:
     """Columns of rows: runs, parameters, status, metrics; with units in the fields' metadata."""
     import pyarrow as pa
 
@@ -133,7 +152,7 @@ def table_schema(setting: Setting, motors: Sequence[str]) -> pa.Schema:
     for name in setting.metrics:
         metric = METRICS[name]
         about = {"unit": metric.unit, "meaning": metric.meaning}
-        fields += [pa.field(each, whole if metric.whole else real, metadata=about) for each in metric.columns(motors)]
+        fields += [pa.field(each, whole if metric.whole else real, metadata=about) for each in metric.columns(members)]
     return pa.schema(fields)
 
 
@@ -183,17 +202,34 @@ def _blank(setting: Setting, task: Task, mode: str) -> Row:
     }
 
 
-def _simulate(
-    planned: TrackingTask, mode: str, options: IntegrationOptions, watch: Callable[[float], None] | None
-) -> TrackingRun:
-    run = simulate(planned, mode, options=options, on_progress=watch, warning=False)
+def run_mode(
+    planned: TrackingTask | OwnMotion, mode: str, options: IntegrationOptions, watch: Callable[[float], None] | None
+) -> Runs:
+    """Simulate what is ready, in a mode where it has a path.
+
+    Raises
+    ------
+    Abandoned
+        See `run_task`.
+    """
+    if isinstance(planned, OwnMotion):
+        run = planned.simulate(options, watch)
+    else:
+        run = simulate(planned, mode, options=options, on_progress=watch, warning=False)
     if run.solution.status == "interrupted":
         raise Abandoned
     return run
 
 
-def _trajectory(run: TrackingRun, options: IntegrationOptions, row: Row) -> xr.Dataset:
-    data = tracking_dataset([run], options=options)
+def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:
+    """A run with all its samples."""
+    if isinstance(run, MotionRun):
+        return motion_dataset(run, options=options)
+    return tracking_dataset([run], options=options)
+
+
+def _trajectory(run: Runs, options: IntegrationOptions, row: Row) -> xr.Dataset:
+    data = dataset_of(run, options)
     # Of two runs of one design all must be equal.
     return data.drop_vars("wall_time").assign_attrs({"run": row["run"], "id": row["id"], "design": row["design"]})
 

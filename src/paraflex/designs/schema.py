@@ -72,6 +72,10 @@ class SweepTable(Table):
     duration: Number | None = Field(default=None, description="the duration in s, dwell included")
     samples: Count | None = Field(default=None, description="the number of samples of each run")
     assembly: Text | None = Field(default=None, description="the name of an assembly")
+    balanced: Yes = Field(
+        default=False,
+        description="true for a start bent as in steady running, of a mechanism without a path",
+    )
     metrics: list[Text] = Field(default=[], description="names of the metrics to keep, validity always; all by default")
     trajectories: Yes = Field(default=False, description="true to keep every run as a netCDF file")
     sampling: SamplingTable = SamplingTable()

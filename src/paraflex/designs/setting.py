@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from paraflex.designs.measure import metrics_of
+from paraflex.designs.own_motion import own_duration
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, VaryTable
 from paraflex.designs.units import check_unit_of
@@ -29,7 +30,7 @@ from paraflex.limits import WHOLE, at_most, of_size
 from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
 from paraflex.results.following import Part
-from paraflex.results.metrics import METRICS
+from paraflex.results.metrics import METRICS, MOTION, PATH
 from paraflex.validity import doubtful_numbers
 
 # Default limit of attempted steps: a single design with violent motion must not delay a study.
@@ -39,6 +40,8 @@ INTEGRATION = "integration"
 INTEGRATION_NUMBERS = ("tolerance", "step", "alpha", "beta")
 # Columns of every table of designs that are neither parameters nor metrics.
 FIXED_COLUMNS = ("run", "id", "design", "path", "mode", "status", "reason", "time_reached")
+# What a run without a path has as the names of its path and of its mode.
+NO_PATH, NO_MODE = "", ""
 # Packages that results depend on.
 _RESULT_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
@@ -75,6 +78,8 @@ class Setting:
         Of the packages that results depend on.
     text : str
         The mechanism's file, for its comments.
+    balanced : bool
+        Whether runs without a path start in the deflections of steady running.
     """
 
     data: Mapping[str, Any]
@@ -92,12 +97,18 @@ class Setting:
     trajectories: bool
     versions: Mapping[str, str]
     text: str = field(default="", repr=False, compare=False)
+    balanced: bool = False
+
+    @property
+    def has_path(self) -> bool:
+        """Whether runs are along paths, and not a mechanism's own motion."""
+        return self.paths != (NO_PATH,)
 
     @cached_property
     def identity(self) -> str:
         """Digest of the common settings of all runs, for their ids."""
         asked = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
-        return digest([dict(self.data), *asked])
+        return digest([dict(self.data), *asked, *(["balanced"] if self.balanced else [])])
 
     def numbers(self, values: tuple[float, ...]) -> list[tuple[Place, float | int]]:
         """Every place that a design sets, and its value."""
@@ -125,7 +136,7 @@ class Setting:
         """The part of each path that runs too short for it do, for the design that the file describes."""
         model = model_from(dict(self.data), self.source)
         found = {}
-        for name in self.paths:
+        for name in self.paths if self.has_path else ():
             path = model.path(name)
             found[name] = part_of(path, model.duration(path, self.duration))
         return {name: part for name, part in found.items() if part is not None}
@@ -134,7 +145,8 @@ class Setting:
         """Findings on the design that the file describes, and on paths for which runs are too short."""
         model = model_from(dict(self.data), self.source)
         parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
-        return Verdict([*doubtful_numbers(model.mechanism), *parts])
+        duration = None if self.has_path else own_duration(model, self.duration)
+        return Verdict([*doubtful_numbers(model.mechanism, duration), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
         """Integration options of a design: its own, else those of the study, else those of its file.
@@ -156,7 +168,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
         Anything that does not fit the mechanism, whatever designs are taken.
     """
     model = read_model(_mechanism(table.mechanism, folder), table.set)
-    data = model.parameters
+    data, paths = model.parameters, _paths(model, table.paths)
     parameters = tuple(_varied(name, entry, data) for name, entry in table.vary.items())
     setting = Setting(
         data=data,
@@ -164,16 +176,17 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
         names=tuple(parameter.name for parameter in parameters),
         places=tuple(_places(data, parameter.name, parameter.fields) for parameter in parameters),
         whole=tuple(parameter.whole for parameter in parameters),
-        paths=_paths(model, table.paths),
-        modes=_modes(model, table.modes),
+        paths=paths,
+        modes=_modes(model, table.modes) if paths != (NO_PATH,) else _no_modes(table),
         duration=table.duration,
         samples=table.samples,
         assembly=table.assembly,
         integration=_integration(table),
-        metrics=metrics_of(table.metrics, model.study.error),
+        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, MOTION if paths == (NO_PATH,) else PATH),
         trajectories=table.trajectories,
         versions=versions(),
         text=model.text,
+        balanced=table.balanced,
     )
     _check(setting, model)
     _check_columns(parameters)
@@ -260,10 +273,20 @@ def _place(data: Mapping[str, Any], field: str) -> Place:
 
 def _paths(model: Model, names: list[str]) -> tuple[str, ...]:
     if not names:
-        return model.study.paths or (model.path_name(),)
+        return model.study.paths or ((model.path_name(),) if model.paths else (NO_PATH,))
     for name in names:
         known(name, model.paths, "paths", "path")
     return tuple(dict.fromkeys(names))
+
+
+def _no_modes(table: SweepTable) -> tuple[str, ...]:
+    """The modes of runs without a path: none."""
+    if table.modes:
+        raise InputError(
+            "a mechanism without a path has no actuation modes, its torques are given", field="modes",
+            value=table.modes[0], remedy="leave it out, or add a [path.NAME] table to the mechanism's file",
+        )  # fmt: skip
+    return (NO_MODE,)
 
 
 def _modes(model: Model, names: list[str]) -> tuple[str, ...]:
@@ -283,12 +306,19 @@ def _integration(table: SweepTable) -> dict[str, Any]:
 
 def _check(setting: Setting, model: Model) -> None:
     """Check the common settings of all runs."""
-    model.check_start()
+    if setting.has_path:
+        model.check_start()
     try:
         setting.options(model)
     except InputError as error:
         raise error.within("integration") from None
     check_times(setting.duration, setting.samples)
+    if setting.has_path and setting.balanced:
+        raise InputError(
+            "runs along a path start on the planned motion", field="balanced", value=True, remedy="leave it out"
+        )
+    if not setting.has_path:
+        own_duration(model, setting.duration)
     model.mechanism.assembly(setting.assembly)
 
 

@@ -31,6 +31,7 @@ from paraflex.campaign import (
     table_name,
 )
 from paraflex.compilation import compile_kernels_for
+from paraflex.designs.measure import members_of
 from paraflex.designs.reopen import study_account
 from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, is_row_of, lost, run_id, run_task, table_schema
 from paraflex.designs.samples import Varied, check_varied, designs
@@ -38,7 +39,7 @@ from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
 from paraflex.errors import InputError
 from paraflex.files import Model, model_from
-from paraflex.results.metrics import VALIDITY
+from paraflex.results.metrics import VALIDITY, Members
 from paraflex.results.parquet import read_parquet
 from paraflex.results.storage import write_results
 from paraflex.writing import GO_ON, write_json
@@ -67,6 +68,8 @@ class SweepResult(KeptResult):
         Whether the user stopped it.
     beyond : int
         Runs beyond what their model can describe: validity above 1.
+    coarse : int
+        Runs with too few samples for their largest loads: complete, with a reason.
     """
 
     values_file = "summary.json"
@@ -78,6 +81,7 @@ class SweepResult(KeptResult):
     seconds: float = 0.0
     interrupted: bool = False
     beyond: int = 0
+    coarse: int = 0
 
     @property
     def done(self) -> int:
@@ -92,7 +96,7 @@ class SweepResult(KeptResult):
     def to_dict(self) -> dict[str, Any]:
         """Counts in plain values; the time taken stands nowhere in them, for it is no result."""
         counts = {"runs": self.total, "done": self.done, "status": dict(self.counts)}
-        return {"name": self.name} | counts | {"beyond_validity": self.beyond}
+        return {"name": self.name} | counts | {"beyond_validity": self.beyond, "too_few_samples": self.coarse}
 
 
 @dataclass(frozen=True)
@@ -130,8 +134,8 @@ class SweepStudy(Study["SweepResult"]):
     kind : str
         Of sampling.
     designs : (k, parameters) array
-    motors : tuple of str
-        Of the mechanism.
+    members : mapping of str to tuple of str
+        Names of the mechanism's motors, drives and joints, of which metrics have a column each.
     """
 
     name: str
@@ -139,7 +143,7 @@ class SweepStudy(Study["SweepResult"]):
     parameters: tuple[Varied, ...]
     kind: str
     designs: NDArray[np.float64]
-    motors: tuple[str, ...]
+    members: Members
 
     @property
     def runs(self) -> int:
@@ -160,6 +164,7 @@ class SweepStudy(Study["SweepResult"]):
             "duration": setting.duration,
             "samples": setting.samples,
             "assembly": setting.assembly,
+            **({"balanced": True} if setting.balanced else {}),
             "integration": dict(setting.integration),
             "metrics": list(setting.metrics),
             "trajectories": setting.trajectories,
@@ -194,7 +199,7 @@ class SweepStudy(Study["SweepResult"]):
         if limit is not None and limit < 1:
             raise InputError("must be positive", field="--limit", value=limit, remedy="say how many runs")
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
-        with open_campaign(folder, account, table_schema(setting, self.motors), self._has) as campaign:
+        with open_campaign(folder, account, table_schema(setting, self.members), self._has) as campaign:
             session = _Session(self, campaign, on_progress)
             interrupted = False
             if not session.complete:
@@ -244,7 +249,7 @@ def make_study(table: SweepTable, folder: Path) -> SweepStudy:
         parameters=parameters,
         kind=sampling.kind,
         designs=designs(parameters, sampling.kind, sampling.number, sampling.seed),
-        motors=tuple(motor.name for motor in model.mechanism.motors),
+        members=members_of(model.mechanism),
     )
 
 
@@ -310,7 +315,8 @@ class _Session:
     def end(self, interrupted: bool) -> SweepResult:
         """Write the table, and counts beside it."""
         with self.campaign.published(finished=self.complete) as new:
-            table = read_parquet(new / table_name(finished=self.complete), ["status", VALIDITY])
+            table = read_parquet(new / table_name(finished=self.complete), ["status", "reason", VALIDITY])
+            complete = table["status"].to_numpy() == STATUS_COMPLETE
             result = SweepResult(
                 name=self.study.name,
                 folder=self.campaign.folder.path,
@@ -320,6 +326,7 @@ class _Session:
                 seconds=time.perf_counter() - self.began,
                 interrupted=interrupted,
                 beyond=int(np.sum(table[VALIDITY].to_numpy() > 1.0)),
+                coarse=int(np.sum(complete & (table["reason"].to_numpy() != ""))),
             )
             write_json(new / result.values_file, result.to_dict(), remedy=GO_ON)
         return result

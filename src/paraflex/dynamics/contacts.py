@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, element_at, transverse_pieces, transverse_rows
+from paraflex.dynamics.inertia_moments import inertia_moments
 from paraflex.dynamics.joint_coordinates import place_along_beam
 from paraflex.dynamics.system import System
 from paraflex.fem import ReferenceCondition
@@ -45,6 +46,8 @@ class Contacts(NamedTuple):
         Multiplier of each.
     pieces : (elements, 6, nf) array
         Transverse displacement W: see `transverse_pieces`.
+    resisted : (elements, 8, nf) array
+        See `inertia_moments`.
     stiffness : (elements,) array
         E I [N m^2].
     """
@@ -54,6 +57,7 @@ class Contacts(NamedTuple):
     joints: tuple[str, ...]
     rows: tuple[int, ...]
     pieces: Array
+    resisted: Array
     stiffness: Array
 
     def at(self, system: System, q: Array, multipliers: Array) -> tuple[Array, Array]:
@@ -93,9 +97,11 @@ class Contacts(NamedTuple):
         """Flexible coordinates (k, nf) that forces (k, contacts) at their places deflect quasi-statically."""
         return np.einsum("kcj,kc->kj", self._rows(place, 0), force) / self.body.modes.omega**2
 
-    def bending(self, place: Array) -> Array:
-        """Bending moment per flexible coordinate at places (k, contacts): (k, contacts, nf)."""
-        return self.stiffness[self.element(place)][..., None] * self._rows(place, 2)
+    def moment(self, place: Array, u: Array, across: Array) -> Array:
+        """Moment (k, contacts) of coordinates (k, nf) and their accelerations across the beam, at places."""
+        bending = self.stiffness[self.element(place)][..., None] * self._rows(place, 2)
+        resisted = transverse_rows(self.beam.mesh.nodes, self.resisted, place, 0)
+        return np.einsum("kcj,kj->kc", bending, u) + np.einsum("kcj,kj->kc", resisted, across)
 
     def _rows(self, place: Array, derivative: int) -> Array:
         """W or a derivative at places (k, contacts): (k, contacts, nf)."""
@@ -139,4 +145,4 @@ def contacts_of(system: System, beam: FlexibleBeam) -> Contacts | None:
     body, spans = system.body(beam.name), beam.spans
     rows = tuple(system.rows.index(f"{name} normal") for name in joints)
     stiffness = np.array([spans[span].bending_stiffness for span in beam.mesh.spans])
-    return Contacts(beam, body, joints, rows, transverse_pieces(body), stiffness)
+    return Contacts(beam, body, joints, rows, transverse_pieces(body), inertia_moments(beam, body), stiffness)

@@ -247,7 +247,11 @@ def element_at(nodes: Array, place: Array) -> NDArray[np.int64]:
 def transverse_rows(nodes: Array, pieces: Array, place: Array, derivative: int) -> Array:
     """Transverse displacement per modal coordinate, or a derivative by the place: (..., nf) for places (...)."""
     element = element_at(nodes, place)
-    z = place - nodes[element]
-    coefficients = np.polynomial.polynomial.polyder(np.eye(6), derivative)
+    return piece_rows(pieces, element, place - nodes[element], derivative)
+
+
+def piece_rows(pieces: Array, element: NDArray[np.int64], z: Array, derivative: int = 0) -> Array:
+    """Polynomials of elements, as of `transverse_pieces`, or a derivative, at distances z from their first nodes."""
+    coefficients = np.polynomial.polynomial.polyder(np.eye(pieces.shape[1]), derivative)
     powers = [sum(c * z**p for p, c in enumerate(column) if c) + 0.0 * z for column in coefficients.T]
     return np.einsum("...p,...pj->...j", np.stack(powers, axis=-1), pieces[element])

@@ -118,7 +118,7 @@ def drive_torques(system: System, multipliers: Array) -> Array:
     """Torque [N m] or force [N] of every prescribed motion (k, drives), on its joint's second body."""
     mechanism = system.mechanism
     numbers = {signal: k for k, signal in enumerate(inputs_of(mechanism).prescribed)}
-    torques, row = np.zeros((len(multipliers), len(numbers))), 0
+    torques, row = np.zeros((len(multipliers), len(numbers)), multipliers.dtype), 0
     for constraint in row_order(mechanism, system.index):
         if constraint.signal in numbers:
             torques[:, numbers[constraint.signal]] = -multipliers[:, row]

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # With more coordinates a dense eigenvalue problem takes minutes, and only the lowest frequencies are computed.
 DENSE_COORDINATES, LOWEST = 600, 10
+# What a mechanism let go may start with and still be called balanced [m/s^2].
+BALANCED = 1e-5
 # A squared frequency below this fraction of the typical one is that of a free motion.
 _FREE = 1e-9
 # Constraint rows, scaled, with a smaller singular value than this part of the largest follow from the others.
@@ -37,6 +39,12 @@ _DEPENDENT = 1e-10
 # So few freedoms have a basis of random displacements, Lanczos' method needs more; those that held motors take show by
 # their size, squared.
 _FEW, _INDEPENDENT = 30, 1e-12
+# The first shift in typical squares: one alone could cancel a diagonal entry of a stiffness that is negative.
+_ABOVE = 2.0
+# A shift is reduced by this while many squares are below it, down to this part of the typical square.
+_DESCENT, _LEAST = 1e-2, 1e-13
+# What rounding leaves of the square of a free motion, as a part of its terms.
+_ROUNDING = 1e-14
 # Most tenfold increases of the shift until the shifted stiffness is positive definite.
 _SHIFTS = 15
 
@@ -95,25 +103,34 @@ def natural_frequencies(
         How many of the lowest; all by default, or ten where there are more than 600 coordinates.
     """
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
-    lam, _, acceleration = forces_at_rest(system, state, [*held, *torque_at], (M, J))
+    efforts = _joint_rows(system, state.q, [*held, *torque_at])
+    lam, _, acceleration = forces_at_rest(system, state, Inertia(M, J, efforts))
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
-    C, typical = _with_joints(system, J, state.q, held), typical_square(elastic, other, M)
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, _joint_rows(system, state.q, held)]))
+    typical = typical_square(elastic, other, M)
     K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
     if system.n <= DENSE_COORDINATES:
         squares, shapes = _all(K, M, C, elastic, typical)
     else:
         freedoms = system.n - dependence(system, state.q).rank
-        squares, shapes = _lowest(K, M, C, typical, LOWEST if count is None else count, freedoms)
-    squares = np.where(np.abs(squares) < _FREE * typical, 0.0, squares)
+        squares, shapes, _ = slowest(K, M, C, typical, LOWEST if count is None else count, freedoms)
     kept = slice(squares.size if count is None else count)
     complete = system.n <= DENSE_COORDINATES and (count is None or count >= squares.size)
     return Vibration(squares[kept], shapes[:, kept], acceleration, complete)
 
 
-def _with_joints(system: System, jacobian: Sparse, q: Array, joints: Sequence[str]) -> Sparse:
-    """Constraint rows, followed by those of the joints' angles or travels."""
+def _joint_rows(system: System, q: Array, joints: Sequence[str]) -> Sparse:
+    """Derivatives (joints, n) of the joints' angles or travels, each once."""
     rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
-    return scipy.sparse.csr_matrix(scipy.sparse.vstack([jacobian, *rows]))
+    return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
+
+
+class Inertia(NamedTuple):
+    """What forces at rest need: the mass (n, n), Phi_q (m, n), and derivatives (joints, n) of joints' coordinates."""
+
+    mass: Sparse
+    constraints: Sparse
+    joints: Sparse
 
 
 class RestForces(NamedTuple):
@@ -134,19 +151,14 @@ class RestForces(NamedTuple):
     acceleration: float
 
 
-def forces_at_rest(
-    system: System, state: State, joints: Sequence[str], matrices: tuple[Sparse, Sparse] | None = None
-) -> RestForces:
-    """Constraint forces at a pose at rest, motors at some joints holding it.
-
-    `matrices` are the mass and the constraint Jacobian there, if they are known.
-    """
-    M, J = matrices or (sparse_mass(system, state.q), sparse_jacobian(system, state.q))
+def forces_at_rest(system: System, state: State, inertia: Inertia) -> RestForces:
+    """Constraint forces at a pose at rest, motors at the joints of `inertia` holding it."""
     forces, lam = RestingForces(system, state.time), np.zeros(system.m)
     springs = forces.springs
     lam[springs] = forces(state.q, lam)[1] / system.packed.rows["compliance"][springs]
     f = forces(state.q, lam)[0] + stiffness_diagonal(system) * state.q
-    a, mu = Saddle(M, _with_joints(system, J, state.q, joints)).solve(-f)
+    M, rows = inertia.mass, scipy.sparse.csr_matrix(scipy.sparse.vstack([inertia.constraints, inertia.joints]))
+    a, mu = Saddle(M, rows).solve(-f)
     acceleration = float(np.sqrt(max(a @ (M @ a), 0.0) / system.total_mass))
     return RestForces(lam + mu[: system.m], -mu[system.m :], acceleration)
 
@@ -208,24 +220,56 @@ def _inverse(solver: Saddle, n: int) -> scipy.sparse.linalg.LinearOperator:
     )
 
 
-def _lowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> tuple[Array, Array]:
-    """The squares nearest to one below zero, ascending, and shapes, of at most a number of freedoms.
+class Slowest(NamedTuple):
+    """The lowest squares, ascending, shapes of unit modal mass, and the shift by which they were found [rad^2/s^2]."""
+
+    squares: Array
+    shapes: Array
+    shift: float
+
+
+def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> Slowest:
+    """The lowest squares, of at most a number of freedoms.
 
     By Lanczos' method on the inverse; of few freedoms in a basis of them all.
     """
     n, random = int(np.asarray(M.diagonal()).size), np.random.default_rng(0)
-    inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + typical * M), C), n)
     if not freedoms:
-        return np.zeros(0), np.zeros((n, 0))
+        return Slowest(np.zeros(0), np.zeros((n, 0)), typical)
     if freedoms > _FEW and K.count_nonzero():
+        shift, inverse = _low_shift(K, M, C, typical, min(count + 2, _FEW))
         start = inverse.matvec(M @ random.standard_normal(n))
-        squares, shapes = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-typical, OPinv=inverse, v0=start)
+        squares, shapes = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-shift, OPinv=inverse, v0=start)
         order = np.argsort(squares)
-        return squares[order], shapes[:, order]
+        rounding = _ROUNDING * np.sum(np.abs(shapes) * (abs(K) @ np.abs(shapes)), axis=0)
+        squares = np.where(np.abs(squares) < np.maximum(_FREE * shift, rounding), 0.0, squares)
+        return Slowest(squares[order], shapes[:, order], shift)
+    inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + _ABOVE * typical * M), C), n)
     wishes = random.standard_normal((min(freedoms, _FEW), n))
     basis = np.column_stack([inverse.matvec(M @ wish) for wish in wishes])
     size, directions = np.linalg.eigh(basis.T @ (M @ basis))
     kept = size > _INDEPENDENT * np.mean([wish @ (M @ wish) for wish in wishes]) / typical**2
     basis = basis @ (directions[:, kept] / np.sqrt(size[kept]))
     squares, vectors = np.linalg.eigh(basis.T @ (K @ basis))
-    return squares[:count], basis @ vectors[:, :count]
+    squares = np.where(np.abs(squares) < _FREE * typical, 0.0, squares)
+    return Slowest(squares[:count], basis @ vectors[:, :count], typical)
+
+
+def _low_shift(
+    K: Sparse, M: Sparse, C: Sparse, typical: float, count: int
+) -> tuple[float, scipy.sparse.linalg.LinearOperator]:
+    """A shift above which there are all but a few squares, and the shifted inverse.
+
+    The lowest squares of a chain of a thousand links are far below those of a link, so far that Lanczos' method would
+    not tell them apart from there.
+    """
+    n = int(np.asarray(M.diagonal()).size)
+    block, shift = np.random.default_rng(0).standard_normal((n, count)), _ABOVE * typical
+    while True:
+        inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + shift * M), C), n)
+        for _ in range(2):
+            block = np.linalg.qr(np.column_stack([inverse.matvec(M @ one) for one in block.T]))[0]
+        largest = scipy.linalg.eigh(block.T @ (K @ block), block.T @ (M @ block), eigvals_only=True)[-1]
+        if largest >= shift or shift <= _LEAST * typical:
+            return shift, inverse
+        shift *= _DESCENT

@@ -120,7 +120,7 @@ def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.
         saddle = Saddle(metric, rows, np.full(units.size, damping * mean))
         return lambda wanted: saddle.solve(r=wanted / units)[0]
     dense = rows.toarray()
-    weighted = np.linalg.solve(metric.toarray(), dense.T)
+    weighted = scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(metric)).solve(dense.T)
     schur = dense @ weighted
     if damping:
         schur += damping * np.mean(np.diag(schur)) * np.eye(units.size)

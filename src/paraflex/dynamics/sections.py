@@ -9,8 +9,9 @@ element follows from what its mass resists, N'(x) = rho A (a - g) . e_x, the mea
 with the acceleration a of the centre line, s'' + phi'' E s - phi'^2 s + 2 phi' E s' + r''. Of second-order geometry u
 is the stretch of the centre line, so that N is that of the element; the shortening by bending is left out of a.
 
-Where a joint slides along a beam, its force adds to the moment what shape functions leave out (`dynamics.contacts`),
-and the section under it is one more place, which moves.
+To the moment adds what shape functions leave out of it: of the inertia of the deflection (`dynamics.inertia_moments`),
+and of the force of a joint that slides along the beam (`dynamics.contacts`). The section under such a joint is one more
+place, which moves.
 
 Cook, Malkus, Plesha, Witt (2002), Concepts and Applications of Finite Element Analysis, 4th ed., 2.9 and 3.12 (loads
 between nodes added to what nodal displacements give).
@@ -26,7 +27,8 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.contacts import Contacts, contacts_of
-from paraflex.dynamics.coordinates import BodyCoordinates
+from paraflex.dynamics.coordinates import BodyCoordinates, piece_rows
+from paraflex.dynamics.inertia_moments import inertia_moments
 from paraflex.dynamics.system import System
 from paraflex.fem.element import axial_shape, transverse_shape
 from paraflex.fem.integrals import GAUSS_POINTS
@@ -122,11 +124,21 @@ class Sections:
 
 
 class _Beam(NamedTuple):
-    """A beam's moment and axial force per flexible coordinate (s, nf), and how the force changes within elements."""
+    """A beam's moment and axial force per flexible coordinate (s, nf), and what the shape functions leave out of them.
+
+    Attributes
+    ----------
+    resisted : (s, nf) array, optional
+        Moment per acceleration of each coordinate across the beam.
+    change : _Change, optional
+        How the axial force changes within elements.
+    contacts : Contacts, optional
+    """
 
     body: str
     moment: Array
     force: Array | None
+    resisted: Array | None = None
     change: _Change | None = None
     contacts: Contacts | None = None
 
@@ -183,8 +195,11 @@ class SectionAt(NamedTuple):
 
         Without what a force that slides along the beam adds within its element.
         """
-        moment = q[:, system.body(self.part.body).flexible] @ self.part.moment[0]
-        return moment, _axial(system, self.part, q, v, a)[:, 0]
+        body, part = system.body(self.part.body), self.part
+        moment = q[:, body.flexible] @ part.moment.T
+        if part.resisted is not None:
+            moment = moment + _across(body, q, v, a) @ part.resisted.T
+        return moment[:, 0], _axial(system, part, q, v, a)[:, 0]
 
 
 def section_at(system: System, name: str, x: float) -> SectionAt | None:
@@ -251,11 +266,15 @@ def _meshed(
         each = [stiffness[e] * mesh.scatter(e, shape(z * lengths[e], lengths[e], derivative)) for e, z in at]
         return np.concatenate(each) @ D
 
-    moment = rows(transverse_shape, 2, bend)
-    if not _stretches(body, last - first, np.sum(lengths / stretch)):
-        return _Beam(body.name, moment, None), x, own, made
-    mass = np.array([spans[span].mass_per_length for span in owners])
-    return _Beam(body.name, moment, rows(axial_shape, 1, stretch), _change(beam, D, at, mass)), x, own, made
+    elements = np.concatenate([np.full(z.size, e) for e, z in at])
+    part = _Beam(
+        body.name, rows(transverse_shape, 2, bend), None,
+        resisted=piece_rows(inertia_moments(beam, body), elements, x - mesh.nodes[elements]),
+    )  # fmt: skip
+    if _stretches(body, last - first, np.sum(lengths / stretch)):
+        mass = np.array([spans[span].mass_per_length for span in owners])
+        part = part._replace(force=rows(axial_shape, 1, stretch), change=_change(beam, D, at, mass))
+    return part, x, own, made
 
 
 def _stretches(body: BodyCoordinates, lengthened: Array, flexibility: float) -> bool:
@@ -294,12 +313,14 @@ def _loads(
     x, *kinds = (np.broadcast_to(each, (len(q), each.size)) for each in sections)
     u, contacts = q[:, system.body(part.body).flexible], part.contacts
     force = _axial(system, part, q, v, a)
+    across = _across(system.body(part.body), q, v, a)
+    resisted = 0.0 if part.resisted is None else across @ part.resisted.T
     if contacts is None:
-        return SectionLoads(u @ part.moment.T, force, x, *kinds)
+        return SectionLoads(u @ part.moment.T + resisted, force, x, *kinds)
     place, pushed = contacts.at(system, q, multipliers)
     # Without what the forces deflect quasi-statically, then with the moments of these as they are.
     u = u - contacts.deflected(place, pushed)
-    moment = np.hstack([u @ part.moment.T, np.einsum("kcj,kj->kc", contacts.bending(place), u)])
+    moment = np.hstack([u @ part.moment.T + resisted, contacts.moment(place, u, across)])
     everywhere = np.hstack([np.broadcast_to(contacts.inside(sections[0]), x.shape), place])
     moment += np.einsum("ksc,kc->ks", contacts.exact(everywhere[:, :, None], place[:, None, :]), pushed)
     left, weight = contacts.between(sections[0], place)
@@ -307,6 +328,11 @@ def _loads(
     kinds = [np.hstack([each, np.take_along_axis(each, left, 1)]) for each in kinds]
     force = np.hstack([force, (1.0 - weight) * before + weight * after])
     return SectionLoads(moment, force, np.hstack([x, place]), *kinds)
+
+
+def _across(body: BodyCoordinates, q: Array, v: Array, a: Array) -> Array:
+    """Acceleration across the beam (k, nf) per shape: u'' - phi'^2 u."""
+    return a[:, body.flexible] - v[:, body.angle, None] ** 2 * q[:, body.flexible]
 
 
 def _axial(system: System, part: _Beam, q: Array, v: Array, a: Array) -> Array:

@@ -158,3 +158,9 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
             damped.append(replace(body, damping=damping_matrix(mechanism, undamped, index, body.name)))
     packed, rows = pack_system(mechanism, tuple(damped), index, row_order(mechanism, index))
     return System(mechanism=mechanism, bodies=tuple(damped), packed=packed, rows=rows)
+
+
+def with_constraints_of(system: System, mechanism: Mechanism) -> System:
+    """The bodies of a system, with their damping, under the constraints of another mechanism of the same bodies."""
+    packed, rows = pack_system(mechanism, system.bodies, system.index, row_order(mechanism, system.index))
+    return System(mechanism=mechanism, bodies=system.bodies, packed=packed, rows=rows)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
+from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.sparse import apart_colours, bodies_acted_on, tied_bodies
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING
@@ -92,17 +93,30 @@ class Tangents(NamedTuple):
     compliant_rate: csr_matrix
 
 
-class _Places(NamedTuple):
-    """Where entries of a sparse matrix come from: its rows and columns, and the computed column of each."""
+class _Pattern(NamedTuple):
+    """Where entries of a sparse matrix (rows, columns) are, and which computed value is each."""
 
-    row: Numbers
-    column: Numbers
-    source: Numbers
+    shape: tuple[int, int]
+    pointers: Numbers
+    columns: Numbers
+    sources: Numbers
 
-    def matrix(self, values: Array, rows: int, columns: int) -> csr_matrix:
-        """The matrix (rows, columns) of computed columns (sources, rows)."""
-        entries = values[self.source, self.row]
-        return csr_matrix((entries, (self.row, self.column)), shape=(rows, columns))
+    def matrix(self, values: Array) -> csr_matrix:
+        """The matrix of computed columns (sources, rows)."""
+        return csr_matrix((values.ravel()[self.sources], self.columns, self.pointers), shape=self.shape)
+
+
+def rows_of(rows: Numbers, *matrices: csr_matrix) -> tuple[csr_matrix, ...]:
+    """Some rows of matrices whose entries are in the same places."""
+    pointers, columns, shape = matrices[0].indptr, matrices[0].indices, matrices[0].shape
+    assert shape is not None
+    counts = np.diff(pointers)[rows]
+    ends = np.cumsum(counts)
+    taken = np.arange(counts.sum()) + np.repeat(pointers[rows] - ends + counts, counts)
+    at = np.concatenate([[0], ends])
+    return tuple(
+        csr_matrix((matrix.data[taken], columns[taken], at), shape=(rows.size, shape[1])) for matrix in matrices
+    )
 
 
 @dataclass(frozen=True)
@@ -134,26 +148,35 @@ class Tangency:
         return first, [starts[colour] + np.arange(n) for colour, n in zip(self._colours, size, strict=True)]
 
     @cached_property
-    def _force_places(self) -> _Places:
+    def _force_pattern(self) -> _Pattern:
         bodies = self.system.bodies
         own = [np.arange(body.all.start, body.all.stop) for body in bodies]
-        met = [np.concatenate([own[other] for other in sorted(others)]) for others in self._tied]
-        return self._places(met)
+        return self._pattern([np.concatenate([own[other] for other in sorted(others)]) for others in self._tied],
+                             self.system.n)  # fmt: skip
 
     @cached_property
-    def _row_places(self) -> _Places:
+    def _row_pattern(self) -> _Pattern:
         touched: list[list[int]] = [[] for _ in self.system.bodies]
         for row, body in zip(*(part.tolist() for part in tied_bodies(self.system)), strict=True):
             touched[body].append(row)
-        return self._places([np.array(rows, dtype=int) for rows in touched])
+        return self._pattern([np.array(rows, dtype=int) for rows in touched], self.system.m)
 
-    def _places(self, met: list[Numbers]) -> _Places:
-        """Places of entries, where the coordinates of each body meet given rows."""
+    def _pattern(self, met: list[Numbers], rows: int) -> _Pattern:
+        """Pattern of a matrix with so many rows, of which the coordinates of each body meet some."""
         parts = []
-        for body, source, rows in zip(self.system.bodies, self._sources[1], met, strict=True):
+        for body, source, own in zip(self.system.bodies, self._sources[1], met, strict=True):
             columns = np.arange(body.all.start, body.all.stop)
-            parts.append((np.tile(rows, columns.size), np.repeat(columns, rows.size), np.repeat(source, rows.size)))
-        return _Places(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+            parts.append((np.tile(own, columns.size), np.repeat(columns, own.size), np.repeat(source, own.size)))
+        row, column, source = (np.concatenate(part) for part in zip(*parts, strict=True))
+        order = np.lexsort((column, row))
+        pointers = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=rows))])
+        return _Pattern((rows, self.system.n), pointers, column[order], (source * rows + row)[order])
+
+    def inertia(self, time: float, q: Array) -> tuple[csr_matrix, csr_matrix]:
+        """Mass matrix (n, n), and Phi_q (m, n), with zeros in rows that are no constraints."""
+        still, acting = np.zeros(self.system.n), np.zeros(inputs_of(self.system.mechanism).acting)
+        point = MotionPoint(time, q, still, still, np.zeros(self.system.m), acting)
+        return self._columns(point, INDEX_1, ACCELERATION)
 
     def at(self, point: MotionPoint) -> Tangents:
         """The tangent matrices at a point of a motion."""
@@ -163,16 +186,18 @@ class Tangency:
         rate = self._columns(point, _RATES, COORDINATE)[1] if np.any(point.v) else 0.0 * second_place
         kinds = self.system.packed.rows["kind"]
         rows, compliant = np.nonzero(kinds == CONSTRAINT)[0], np.nonzero(kinds != CONSTRAINT)[0]
-        strength = scipy.sparse.diags(self._strengths(point)[compliant])
-        place, speed = strength @ second_place[compliant], strength @ second_rate[compliant]
-        # The directions in which their torques act: as angles and travels change.
-        springs = scipy.sparse.diags((kinds[compliant] == SPRING).astype(float))
-        turns = springs @ second_place[compliant]
-        turns = turns + (scipy.sparse.identity(compliant.size) - springs) @ second_rate[compliant]
+        held = rows_of(rows, jacobian, rate, second_place, second_rate)
+        place, speed = rows_of(compliant, second_place, second_rate)
+        if compliant.size:
+            # The directions in which their torques act: as angles and travels change.
+            springs = scipy.sparse.diags((kinds[compliant] == SPRING).astype(float))
+            turns = csr_matrix(springs @ place + (scipy.sparse.identity(compliant.size) - springs) @ speed).T
+            strength = scipy.sparse.diags(self._strengths(point)[compliant])
+            place, speed = csr_matrix(strength @ place), csr_matrix(strength @ speed)
+            damping, stiffness = csr_matrix(damping + turns @ speed), csr_matrix(stiffness + turns @ place)
         return Tangents(
-            mass, csr_matrix(damping + turns.T @ speed), csr_matrix(stiffness + turns.T @ place), rows,
-            jacobian[rows], rate[rows], second_place[rows], second_rate[rows], compliant, place, speed,
-        )  # fmt: skip
+            mass, damping, stiffness, rows, *held, compliant=compliant, compliant_place=place, compliant_rate=speed
+        )
 
     def _columns(
         self, point: MotionPoint, weights: tuple[float, float, float], part: int
@@ -187,8 +212,7 @@ class Tangency:
             system.packed, weights, part, self._colours, point.q, point.v, point.a, point.multipliers, point.torques,
             compliance, direction, forces, rows,
         )  # fmt: skip
-        n = system.n
-        return self._force_places.matrix(forces, n, n), self._row_places.matrix(rows, system.m, n)
+        return self._force_pattern.matrix(forces), self._row_pattern.matrix(rows)
 
     def _strengths(self, point: MotionPoint) -> Array:
         """Change of each multiplier (m,) of a spring, damper or friction with its angle or rate."""

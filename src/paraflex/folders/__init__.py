@@ -14,6 +14,7 @@ from paraflex.folders.lock import (
 from paraflex.folders.manifest import (
     COMPARISON as COMPARISON,
     KINDS as KINDS,
+    LINEAR_MODELS as LINEAR_MODELS,
     RUN as RUN,
     RUN_COMPARISON as RUN_COMPARISON,
     SENSITIVITY as SENSITIVITY,

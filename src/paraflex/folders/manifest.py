@@ -24,12 +24,14 @@ COMPARISON = "comparison of methods"
 SENSITIVITY = "sensitivity"
 RUN_COMPARISON = "comparison of runs"
 STUDY_OF_RUNS = "study of many runs"
+LINEAR_MODELS = "study of linear models"
 KINDS: Mapping[str, tuple[str, ...]] = {
     STUDY_OF_RUNS: ("study.json", "journal.sqlite", "results.parquet"),
     VERIFICATION: ("verify.json", "verify.nc"),
     COMPARISON: ("compare-methods.json",),
     RUN_COMPARISON: ("compare.json",),
     SENSITIVITY: ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
+    LINEAR_MODELS: ("linear.json", "linear.nc"),
     RUN: ("summary.json", "results.nc"),
 }
 # What else a study of many runs keeps, listed or not: they come and go while it runs.

@@ -20,6 +20,7 @@ from paraflex.errors import (
 )
 from paraflex.integrators import native, outside
 from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
+from paraflex.integrators.between import samples_too_few, with_between
 from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
@@ -70,6 +71,7 @@ def integrate(
     knots: Array | None = None,
     options: IntegrationOptions | None = None,
     begun: Solution | None = None,
+    samples: int | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Solution:
     """Integrate a system from an initial state.
@@ -88,6 +90,8 @@ def integrate(
     options : IntegrationOptions, optional
     begun : Solution, optional
         The part of the run that this one goes on from: its steps count towards those of the options, and in errors.
+    samples : int, optional
+        Those of the whole run, where a finding is to say that its largest loads lie between them (own methods).
     on_progress : callable, optional
         Told the time reached [s] every few milliseconds. A KeyboardInterrupt, in it or elsewhere, ends the run with
         what is there, marked "interrupted".
@@ -116,12 +120,14 @@ def integrate(
     options = options or IntegrationOptions()
     refuse_tolerance(options.tolerance, system.size)
     loose = loose_tolerance(options.tolerance, system.size)
-    problem = make_problem(system, signals, initial, times, knots)
+    own = isinstance(options.method, NativeMethod)
+    between = with_between(np.asarray(times, dtype=float), system.n) if samples and own else None
+    problem = make_problem(system, signals, initial, times if between is None else between.times, knots)
     ends, crossing = BeamEnds(system, initial), None
     functions = (*event_functions(system, initial.q, options.events), *ends.functions)
     run = prepare(problem, options)
     status, message, bent, drift, slow = "complete", "", None, None, None
-    window = _WINDOW if isinstance(options.method, NativeMethod) else _WINDOW_OUTSIDE
+    window = _WINDOW if own else _WINDOW_OUTSIDE
     pace = Pace(initial.time, float(problem.times[-1]), options.max_steps, window)
     code, limits = PAUSED, (run.dependent_rows, options.tolerance, options.treatment)
     most = pace.most - (0 if begun is None else begun.steps + begun.rejected)
@@ -148,7 +154,9 @@ def integrate(
     except KeyboardInterrupt:
         status, message = "interrupted", f"interrupted at t = {run.now().t:.6g} s"
     solution = _solution(run, options, time.perf_counter() - began, status, message, crossing)
-    solution = replace(solution, findings=(*ends.findings(solution.q), *filter(None, [loose])))
+    whole, solution = solution, solution if between is None else between.kept(solution)
+    few = samples_too_few(system, whole, solution, samples) if samples else None
+    solution = replace(solution, findings=(*ends.findings(solution.q), *filter(None, [loose, few])))
     _refuse_beam_end(solution, crossing)
     if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
         return solution

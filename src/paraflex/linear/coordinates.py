@@ -2,12 +2,12 @@
 
 The constraints leave f free directions at a pose. Their coordinates y = T q are the angles and travels of the joints
 that have motors, as far as these are independent (of flexible links mostly all), then as many flexible coordinates of
-bodies as are missing, and places and angles of bodies where these do not suffice. Bodies are chosen by a QR
-factorisation with pivots, soft coordinates first.
+bodies as are missing, and places and angles of bodies where these do not suffice: see `independent`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -15,16 +15,20 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, build_system
+from paraflex.dynamics import System
 from paraflex.dynamics.constraints import coordinate_kind
-from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents
+from paraflex.dynamics.linearise import Inertia
+from paraflex.dynamics.system import with_constraints_of
+from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents, rows_of
 from paraflex.errors import InputError
+from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import ConstantSpeed, Mechanism, PrescribedAngle
 
-# A direction with less than this part of its size independent of others follows from them.
-_DEPENDENT = 1e-8
+# A matrix of so many entries BLAS factors in one thread.
+_FEW_ENTRIES = 8192
 # Places and angles of bodies count as much less than flexible coordinates: they are chosen last.
 _LAST = 1e-5
 
@@ -68,16 +72,21 @@ class PointTangents(NamedTuple):
     constraints, joints : RowTangents
     compliant : array of int
         Rows of springs, dampers and friction, as the system numbers them.
+    motors : (motors, n) sparse matrix
+        Derivatives of the coordinates on which the motors act.
     """
 
     whole: Tangents
     constraints: RowTangents
     joints: RowTangents
     compliant: NDArray[np.int64]
+    motors: csr_matrix
 
 
 class RowTangents(NamedTuple):
-    """Derivatives of some rows Phi of constraints, or of coordinates y of joints, each (rows, n).
+    """Derivatives of some rows Phi of constraints, or of coordinates y of joints, each (rows, n) and sparse.
+
+    Entries of all are in the same places.
 
     Attributes
     ----------
@@ -88,25 +97,20 @@ class RowTangents(NamedTuple):
         As the system numbers its rows; -1 where it has none.
     """
 
-    jacobian: Array
-    rate: Array
-    second_place: Array
-    second_rate: Array
+    jacobian: csr_matrix
+    rate: csr_matrix
+    second_place: csr_matrix
+    second_rate: csr_matrix
     number: NDArray[np.int64]
 
     def taken(self, rows: NDArray[np.int64]) -> RowTangents:
         """Some of the rows."""
-        return RowTangents(
-            self.jacobian[rows], self.rate[rows], self.second_place[rows], self.second_rate[rows], self.number[rows]
-        )
+        return RowTangents(*rows_of(rows, *self[:4]), number=self.number[rows])
 
     def with_rows(self, others: RowTangents) -> RowTangents:
         """These rows and then others."""
-        return RowTangents(
-            np.vstack([self.jacobian, others.jacobian]), np.vstack([self.rate, others.rate]),
-            np.vstack([self.second_place, others.second_place]), np.vstack([self.second_rate, others.second_rate]),
-            np.concatenate([self.number, others.number]),
-        )  # fmt: skip
+        parts = (csr_matrix(scipy.sparse.vstack(pair)) for pair in zip(self[:4], others[:4], strict=True))
+        return RowTangents(*parts, number=np.concatenate([self.number, others.number]))
 
 
 @dataclass(frozen=True)
@@ -134,64 +138,60 @@ class Coordinates:
                      for joint in self.joints if joint not in held)  # fmt: skip
         if not more:
             return Tangency(self.system)
-        extended = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *more)))
-        # Damping ratios are those of links whose motors turn freely, as in the system.
-        own, bodies = self.system.packed, extended.packed.bodies.copy()
-        bodies["damping"] = own.bodies["damping"]
-        packed = extended.packed._replace(bodies=bodies, modal=own.modal, damping=own.damping)
-        return Tangency(replace(extended, packed=packed))
+        return Tangency(with_constraints_of(self.system, replace(mechanism, prescribed=(*mechanism.prescribed, *more))))
 
     @cached_property
-    def _rows(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Rows of the system with more rows: those of the joints' coordinates; and their numbers in the system."""
+    def _rows(self) -> tuple[dict[str, int], NDArray[np.int64]]:
+        """Rows of the system with more rows: those of joints' coordinates; and the numbers of all in the system."""
         extended = self.tangency.system
         mechanism, names = extended.mechanism, {name: k for k, name in enumerate(extended.rows)}
-        by_joint = {one.joint: one.name for one in mechanism.prescribed}
-        rows = [names[f"{by_joint[joint]} {coordinate_kind(mechanism.joint(joint))}"] for joint in self.joints]
+        rows = {one.joint: names[f"{one.name} {coordinate_kind(mechanism.joint(one.joint))}"]
+                for one in mechanism.prescribed}  # fmt: skip
         own = {name: k for k, name in enumerate(self.system.rows)}
-        return np.array(rows, dtype=int), np.array([own.get(name, -1) for name in extended.rows])
+        return rows, np.array([own.get(name, -1) for name in extended.rows], dtype=int)
+
+    def _rows_of(self, joints: Sequence[str]) -> NDArray[np.int64]:
+        return np.array([self._rows[0][joint] for joint in joints], dtype=int)
+
+    def inertia(self, time: float, q: Array, joints: Sequence[str]) -> Inertia:
+        """Mass and rows at coordinates (n,)."""
+        mass, jacobian = self.tangency.inertia(time, q)
+        number = self._rows[1]
+        own = np.nonzero(number >= 0)[0]
+        constraints, rows = own[np.argsort(number[own])], self._rows_of(joints)
+        return Inertia(mass, *rows_of(constraints, jacobian), *rows_of(rows, jacobian))
 
     def at(self, point: MotionPoint) -> PointTangents:
         """The tangent matrices at a point of a motion."""
-        coordinates, number = self._rows
+        coordinates, number = self._rows_of(self.joints), self._rows[1]
         lam = np.zeros(number.size)
         lam[number >= 0] = point.multipliers[number[number >= 0]]
         whole = self.tangency.at(point._replace(multipliers=lam))
 
         def rows(wanted: NDArray[np.int64]) -> RowTangents:
             at = np.searchsorted(whole.rows, wanted)
-            return RowTangents(
-                whole.jacobian[at].toarray(), whole.rate[at].toarray(), whole.second_place[at].toarray(),
-                whole.second_rate[at].toarray(), number[wanted],
-            )  # fmt: skip
+            parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
+            return RowTangents(*rows_of(at, *parts), number=number[wanted])
 
         holding = whole.rows[~np.isin(whole.rows, coordinates)]
-        return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant])
+        motors = self._rows_of([motor.joint for motor in self.system.mechanism.motors])
+        acting = rows_of(np.searchsorted(whole.rows, motors), whole.jacobian)[0]
+        return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant], acting)
 
     def choose(self, tangents: PointTangents) -> Chosen:
         """Choose minimal coordinates at a pose."""
-        scale = self.scale
-        constraints = unit_rows(tangents.constraints.jacobian * scale)
-        rows = unit_rows(tangents.joints.jacobian * scale)
-        kept, free = _independent(constraints)
-        joints: list[int] = []
-        for k in self._order(rows.shape[0]):
-            moved = rows[k] @ free
-            size = np.linalg.norm(moved)
-            if size <= _DEPENDENT:
-                continue
-            joints.append(k)
-            free = free @ _complement(moved / size)
+        constraints, joints = (_unit(part.jacobian, self.scale) for part in (tangents.constraints, tangents.joints))
+        # Those that are driven must be states.
+        free, driven = np.split(np.arange(len(self.joints)), [len(self.joints) - len(self.driven)])
         weights = np.full(self.system.n, _LAST)
         for body in self.system.bodies:
             weights[body.flexible] = 1.0
-        order = scipy.linalg.qr(free.T * weights, mode="r", pivoting=True)[-1]
-        return Chosen(kept, np.array(sorted(joints), dtype=int), np.sort(np.asarray(order)[: free.shape[1]]))
-
-    def _order(self, rows: int) -> list[int]:
-        """Rows of coordinates of joints, those that are driven first: these must be states."""
-        first = rows - len(self.driven)
-        return [*range(first, rows), *range(first)]
+        few = (tangents.constraints.number.size + len(self.joints)) * self.system.n <= _FEW_ENTRIES
+        choose = independent_dense if few else independent_sparse
+        found = choose([constraints, joints[driven], joints[free]], weights)
+        states = np.concatenate([free[found.groups[2]], driven[found.groups[1]]])
+        bodies = np.setdiff1d(np.arange(self.system.n), found.columns)
+        return Chosen(found.groups[0], states, bodies)
 
     @cached_property
     def scale(self) -> Array:
@@ -209,9 +209,10 @@ class Coordinates:
         mechanism, quantities = self.system.mechanism, []
         for joint in (self.joints[k] for k in chosen.joints.tolist()):
             quantities.append(Variable(joint, "m" if mechanism.joint(joint).slides else "rad"))
-        for k in chosen.bodies.tolist():
-            body = next(one for one in self.system.bodies if one.all.start <= k < one.all.stop)
-            local = k - body.offset
+        offsets = np.array([body.offset for body in self.system.bodies])
+        for k, which in zip(chosen.bodies, np.searchsorted(offsets, chosen.bodies, side="right") - 1, strict=True):
+            body = self.system.bodies[which]
+            local = int(k - body.offset)
             own = ("x", "y", "angle")[local] if local < 3 else f"elastic{local - 2}"
             quantities.append(Variable(f"{body.name}.{own}", ("m", "m", "rad")[local] if local < 3 else "m kg^0.5"))
         return tuple(quantities)
@@ -241,25 +242,8 @@ def _row(joint: str) -> str:
     return f"coordinate of {joint}"
 
 
-def unit_rows(rows: Array) -> Array:
-    """Rows of size one, those of zeros as they are."""
-    size = np.linalg.norm(rows, axis=1, keepdims=True)
-    return rows / np.where(size > 0.0, size, 1.0)
-
-
-def _independent(rows: Array) -> tuple[NDArray[np.int64], Array]:
-    """Numbers of independent rows (of unit size), and a basis (n, f) of what all of them allow."""
-    if not rows.size:
-        return np.zeros(0, dtype=int), np.eye(rows.shape[1])
-    factors = scipy.linalg.qr(rows.T, pivoting=True)
-    size = np.abs(np.diag(factors[1]))
-    rank = int(np.sum(size > _DEPENDENT * size.max(initial=1.0)))
-    return np.sort(np.asarray(factors[2])[:rank]), np.asarray(factors[0])[:, rank:]
-
-
-def _complement(direction: Array) -> Array:
-    """A basis (f, f - 1) of what is perpendicular to a unit vector (f,)."""
-    reflected = direction.copy()
-    reflected[0] += np.copysign(1.0, direction[0])
-    reflected /= np.linalg.norm(reflected)
-    return (np.eye(direction.size) - 2.0 * np.outer(reflected, reflected))[:, 1:]
+def _unit(rows: csr_matrix, scale: Array) -> csr_matrix:
+    """Rows of size one in units (n,) of the coordinates, those of zeros as they are."""
+    scaled = csr_matrix(rows @ scipy.sparse.diags(scale))
+    size = np.sqrt(np.asarray(scaled.multiply(scaled).sum(axis=1)).ravel())
+    return csr_matrix(scipy.sparse.diags(1.0 / np.where(size > 0.0, size, 1.0)) @ scaled)

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
+from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
@@ -14,9 +16,9 @@ from paraflex.dynamics import (
     System,
     build_system,
     consistent_state,
-    joint_coordinate,
     start_state,
     static_equilibrium,
+    undeformed,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.sensors import sensor_rows
@@ -112,6 +114,7 @@ def linearise(
     unbalanced = 0.0
     if isinstance(source, TrackingTask | TrackingRun | MotionRun):
         system, point, about = _moving(source, chosen, at)
+        coordinates = coordinates_of(system, ports.prescribed)
     else:
         given = start if start is not None or isinstance(source, Mechanism) else source.start
         system = build_system(mechanism)
@@ -119,9 +122,10 @@ def linearise(
         if balanced:
             joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
             state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
-        point, unbalanced = resting_point(system, state, chosen)
+        coordinates = coordinates_of(system, ports.prescribed)
+        point, unbalanced = resting_point(coordinates, state, chosen)
         about = "static equilibrium" if balanced else "a pose at rest"
-    return linear_model(coordinates_of(system, ports.prescribed), point, ports, about, unbalanced=unbalanced)
+    return linear_model(coordinates, point, ports, about, unbalanced=unbalanced)
 
 
 def linear_model(
@@ -139,8 +143,9 @@ def linear_model(
     if not chosen.freedoms:
         raise InputError("has no freedom to move", field="mechanism", value=mechanism.name, remedy="free a joint")
     motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in ports.mode.motors]
+    forces = _forces(system, point.q, tangents.motors[motors], ports.forces)
     minimal = Minimal(
-        system, point, tangents, chosen, coordinates.scale, _forces(system, point.q, motors, ports.forces),
+        system, point, tangents, chosen, coordinates.scale, forces,
         np.array(motors, dtype=int), len(ports.prescribed),
     )  # fmt: skip
     states = coordinates.names(chosen)
@@ -204,7 +209,8 @@ def _pose(system: System, start: Start | State | None, assembly: str | None) -> 
         return start
     mechanism = system.mechanism
     if start is None:
-        return consistent_state(system, assembly)
+        rigid = build_system(mechanism.rigid())
+        return undeformed(system, rigid, consistent_state(rigid, assembly))
     return start_state(system, start, mechanism.assembly(assembly) if mechanism.assemblies else None)
 
 
@@ -237,12 +243,10 @@ def nearest_sample(times: Array, at: float) -> int:
     return sample
 
 
-def _forces(system: System, q: Array, motors: Sequence[int], points: Sequence[PointRef]) -> Array:
-    """Generalised forces (n, inputs) of unit torques of motors and of unit forces along x and y at points."""
-    mechanism = system.mechanism
-    columns = [joint_coordinate(system, mechanism.motors[k].joint, q[None]).rows[0] for k in motors]
-    columns += [row for point in points for row in marker_place(system, system.marker(point), q[None])[1][0]]
-    return np.array(columns).reshape(-1, system.n).T
+def _forces(system: System, q: Array, motors: csr_matrix, points: Sequence[PointRef]) -> csr_matrix:
+    """Generalised forces (n, inputs) of unit torques of motors, by rows (motors, n), and along x and y at points."""
+    places = [csr_matrix(marker_place(system, system.marker(point), q[None])[1][0]) for point in points]
+    return csr_matrix(scipy.sparse.vstack([motors, *places]).T)
 
 
 def _inputs(mechanism: Mechanism, motors: Sequence[int], ports: Ports) -> tuple[Variable, ...]:

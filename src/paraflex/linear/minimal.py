@@ -20,9 +20,11 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System
+from paraflex.dynamics.sparse import Factor
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import Moment, SingularPositionError
 from paraflex.linear.coordinates import Chosen, PointTangents, RowTangents
@@ -64,7 +66,7 @@ class Minimal:
     chosen : Chosen
     scale : (n,) array
         What one of each coordinate is measured in.
-    forces : (n, inputs) array
+    forces : (n, inputs) sparse matrix
         Generalised forces S of the inputs that are torques and forces.
     motors : (motors,) array of int
         Numbers of the motors that are the first of the inputs.
@@ -77,7 +79,7 @@ class Minimal:
     tangents: PointTangents
     chosen: Chosen
     scale: Array
-    forces: Array
+    forces: csr_matrix
     motors: NDArray[np.int64]
     driven: int
 
@@ -92,64 +94,73 @@ class Minimal:
         return self.tangents.joints.taken(self.chosen.joints)
 
     @cached_property
-    def _factor(self) -> tuple[tuple[Array, Array], Array]:
-        """LU factor of the rows [Phi_q; T] in units of the coordinates and of the rows, and the latter."""
-        bodies = np.zeros((self.chosen.bodies.size, self.system.n))
-        bodies[np.arange(self.chosen.bodies.size), self.chosen.bodies] = 1.0
-        rows = np.vstack([self.constraints.jacobian, self.joints.jacobian, bodies]) * self.scale
-        size = np.linalg.norm(rows, axis=1, keepdims=True)
-        factor = scipy.linalg.lu_factor(rows / size)
-        condition = scipy.linalg.lapack.dgecon(factor[0], np.linalg.norm(rows / size, 1))[0]
-        if not condition * _SINGULAR > 1.0:
-            cause = "the coordinates chosen for the linear model do not describe its motion"
-            raise SingularPositionError(
-                cause, Moment(self.point.time, 0), remedy="linearise away from this singular position"
-            )
-        return factor, size
+    def _factor(self) -> Factor:
+        """Factor of the rows [Phi_q; T] at the coordinates that are no states."""
+        matrix = csr_matrix(scipy.sparse.vstack([self.constraints.jacobian, self.joints.jacobian]))
+        cause = "the coordinates chosen for the linear model do not describe its motion"
+        singular = SingularPositionError(
+            cause, Moment(self.point.time, 0), remedy="linearise away from this singular position"
+        )
+        try:
+            factor = Factor(csr_matrix(matrix[:, self._dependent]), self.scale[self._dependent])
+        except np.linalg.LinAlgError as error:
+            raise singular from error
+        if not factor.condition < _SINGULAR:
+            raise singular
+        return factor
 
-    def _coordinates(self, right: Array) -> Array:
-        """Changes of all coordinates, from those of Phi and y."""
-        factor, size = self._factor
-        return self.scale[:, None] * scipy.linalg.lu_solve(factor, right / size)
+    @cached_property
+    def _dependent(self) -> NDArray[np.int64]:
+        return np.setdiff1d(np.arange(self.system.n), self.chosen.bodies)
+
+    def coordinates(self, constraints: Array, y: Array) -> Array:
+        """Changes of all coordinates (n, k), from those of the constraints Phi (c, k) and of y (f, k)."""
+        joints = self.chosen.joints.size
+        out = np.zeros((self.system.n, y.shape[1]))
+        out[self.chosen.bodies] = y[joints:]
+        right = np.vstack([constraints - self.constraints.jacobian @ out, y[:joints] - self.joints.jacobian @ out])
+        out[self._dependent] = self._factor.solve(right)
+        return out
 
     @cached_property
     def directions(self) -> Array:
-        """Z (n, f): how all coordinates change with each y."""
-        return self._coordinates(np.eye(self.system.n)[:, self.system.n - self.chosen.freedoms :])
+        """Z (n, f): how all coordinates change with each y. Dense."""
+        f = self.chosen.freedoms
+        return self.coordinates(np.zeros((self.chosen.constraints.size, f)), np.eye(f))
 
     @cached_property
     def changes(self) -> Changes:
-        """Changes of the motion with states and inputs."""
+        """Changes of the motion with states and inputs. Dense."""
         Z, whole = self.directions, self.tangents.whole
         turned = np.zeros_like(Z)
         if np.any(self.point.v):
             still = np.zeros((self.chosen.bodies.size, Z.shape[1]))
-            turned = -self._coordinates(np.vstack([self.constraints.rate @ Z, self.joints.rate @ Z, still]))
+            turned = -self.coordinates(self.constraints.rate @ Z, np.vstack([self.joints.rate @ Z, still]))
         q, v = np.hstack([Z, np.zeros_like(Z)]), np.hstack([turned, Z])
         forces = np.hstack(
-            [-(whole.damping @ v + whole.stiffness @ q), self.forces, np.zeros((self.system.n, self.driven))]
+            [-(whole.damping @ v + whole.stiffness @ q), self.forces.toarray(), np.zeros((self.system.n, self.driven))]
         )
         held = self._held(q, v, forces.shape[1])
         a, kept = self._accelerations(forces, held)
         second = np.zeros((self.chosen.freedoms, a.shape[1]))
-        moved = self.joints.second_place @ q + self.joints.second_rate @ v
-        second[: moved.shape[0]] = self.joints.jacobian @ a
-        second[: moved.shape[0], : moved.shape[1]] += moved
-        second[moved.shape[0] :] = a[self.chosen.bodies]
+        joints = self.chosen.joints.size
+        second[:joints] = self.joints.jacobian @ a
+        second[:joints, : q.shape[1]] += self.joints.second_place @ q + self.joints.second_rate @ v
+        second[joints:] = a[self.chosen.bodies]
         multipliers = np.zeros((self.system.m, a.shape[1]))
-        multipliers[self._held_rows.number] = kept
+        multipliers[self.held_rows.number] = kept
         multipliers[self.tangents.compliant, : q.shape[1]] = whole.compliant_place @ q + whole.compliant_rate @ v
         return Changes(q, v, a, multipliers, second)
 
     @cached_property
-    def _held_rows(self) -> RowTangents:
+    def held_rows(self) -> RowTangents:
         """Rows whose second derivatives are given: constraints, and coordinates that are driven."""
         driven = self.joints.taken(np.arange(self.chosen.joints.size - self.driven, self.chosen.joints.size))
         return self.constraints.with_rows(driven)
 
     def _held(self, q: Array, v: Array, columns: int) -> Array:
         """Phi_q da as states and inputs want it."""
-        rows = self._held_rows
+        rows = self.held_rows
         out = np.zeros((rows.number.size, columns))
         out[:, : q.shape[1]] = -(rows.second_place @ q + rows.second_rate @ v)
         if self.driven:
@@ -158,15 +169,10 @@ class Minimal:
 
     def _accelerations(self, forces: Array, held: Array) -> tuple[Array, Array]:
         """Accelerations and multipliers from forces and from the second derivatives of held rows."""
-        rows, n = self._held_rows.jacobian, self.system.n
-        mass = self.tangents.whole.mass.toarray()
+        rows, n = self.held_rows.jacobian, self.system.n
+        mass = self.tangents.whole.mass
         column = 1.0 / np.sqrt(mass.diagonal())
-        scaled = rows * column
-        size = 1.0 / np.linalg.norm(scaled, axis=1)
-        scaled = scaled * size[:, None]
-        matrix = np.zeros((n + size.size, n + size.size))
-        matrix[:n, :n] = mass * column * column[:, None]
-        matrix[n:, :n], matrix[:n, n:] = scaled, scaled.T
-        right = np.vstack([forces * column[:, None], held * size[:, None]])
-        found = scipy.linalg.solve(matrix, right, assume_a="sym")
-        return found[:n] * column[:, None], found[n:] * size[:, None]
+        size = 1.0 / scipy.sparse.linalg.norm(rows @ scipy.sparse.diags(column), axis=1)
+        factor = Factor(csr_matrix(scipy.sparse.bmat([[mass, rows.T], [rows, None]])), np.concatenate([column, size]))
+        found = factor.solve(np.vstack([forces, held]))
+        return found[:n], found[n:]

@@ -11,15 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics.linearise import typical_square, undamped_modes
+from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable
+from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
+from paraflex.linear.motions import Motions, SecondOrder, modal_damping, motions
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
 if TYPE_CHECKING:
@@ -28,8 +32,10 @@ if TYPE_CHECKING:
 Complex = NDArray[np.complex128]
 # Stiffness is symmetric at rest but for this part of it.
 _SYMMETRIC = 1e-7
-# Damping of a modal coordinate below this part of the largest is rounding.
-_ROUNDING = 1e-13
+# A coordinate of a joint that changes less than this part of its size with others held is held with them.
+_HELD = 1e-8
+# With more degrees of freedom sparse matrices are faster than dense ones.
+_DENSE_FREEDOMS = 200
 
 
 @dataclass(frozen=True)
@@ -143,9 +149,7 @@ class LinearModel:
     @cached_property
     def _modal_damping(self) -> Array:
         """Damping (f, f) of the undamped modes."""
-        shapes = self._modes[1]
-        damping = shapes.T @ self._reduced[1] @ shapes
-        return np.where(np.abs(damping) > _ROUNDING * np.max(np.abs(damping), initial=0.0), damping, 0.0)
+        return modal_damping(self._reduced[1], self._modes[1])
 
     @cached_property
     def _scaled(self) -> StateSpace:
@@ -209,38 +213,93 @@ class LinearModel:
         names = [one.name for one in self.inputs if one.name in own] if motors is None else motors
         return np.setdiff1d(np.arange(len(self.states) // 2), [self._joint_state(name) for name in names])
 
-    def _joint_state(self, motor: str) -> int:
+    def _joint(self, motor: str) -> str:
         joints = {one.name: one.joint for one in self.minimal.system.mechanism.motors}
         if motor not in joints:
             raise InputError("is no motor", field="motors", value=motor, remedy="choose from " + ", ".join(joints))
-        names = [one.name for one in self.states]
-        if joints[motor] not in names:
+        return joints[motor]
+
+    def _joint_state(self, motor: str) -> int:
+        joint, names = self._joint(motor), [one.name for one in self.states]
+        if joint not in names:
             raise InputError(
                 "moves only as other motors do",
                 field="motors",
                 value=motor,
                 remedy="leave it out: it is held with them",
             )
-        return names.index(joints[motor])
+        return names.index(joint)
 
-    def poles(self) -> Complex:
-        """Poles (2f,), by magnitude [rad/s]."""
-        squares = self._modes[0]
-        if self._is_vibrating and not np.any(self._modal_damping):
-            root = np.sqrt(-squares.astype(complex))
-            return _by_size(np.concatenate([root, -root]))
-        A = self._scaled.A
-        # Free motions without damping have double poles, which an eigenvalue solver would take apart.
-        free = (squares == 0.0) & ~np.any(self._modal_damping, axis=1) & self._is_vibrating
-        other = np.nonzero(~np.tile(free, 2))[0]
-        found = np.asarray(scipy.linalg.eigvals(A[np.ix_(other, other)]), dtype=complex)
-        return _by_size(np.concatenate([np.zeros(2 * int(free.sum()), dtype=complex), found]))
+    @checked_arguments()
+    def poles(self, count: int | None = None) -> Complex:
+        """Poles (2f,), by magnitude [rad/s].
+
+        Parameters
+        ----------
+        count : int, optional
+            Only so many of the slowest: with more than 200 degrees of freedom these are found without A.
+        """
+        return self._slow_poles(count) if count is not None and self._is_large else self.motions().poles[:count]
+
+    @checked_arguments()
+    def motions(self, held: Sequence[str] = ()) -> Motions:
+        """Undamped modes and poles, with their shapes in all coordinates of the system.
+
+        Parameters
+        ----------
+        held : sequence of str
+            Motors that are held; of motors that move only as others do, one is enough.
+
+        Raises
+        ------
+        InputError
+            A motor that the mechanism does not have.
+        """
+        basis = self._held_basis(held)
+        return motions(self._second_order.within(basis), self.minimal.directions @ basis)
+
+    @cached_property
+    def _second_order(self) -> SecondOrder:
+        """The equations with inputs zero; of a motion with the terms of its rates."""
+        mass, damping, stiffness = self._reduced
+        if not self._is_vibrating:
+            f = mass.shape[0]
+            stiffness, damping = -mass @ self.A[f:, :f], -mass @ self.A[f:, f:]
+        return SecondOrder(mass, damping, stiffness, self._typical, self._is_vibrating)
+
+    def _held_basis(self, motors: Sequence[str]) -> Array:
+        """Directions (f, k) of the coordinates y that are free where motors are held."""
+        names, joints = [one.name for one in self.states], [self._joint(name) for name in motors]
+        basis = np.delete(np.eye(len(names) // 2), [names.index(one) for one in joints if one in names], axis=1)
+        system, q = self.minimal.system, self.minimal.point.q
+        for joint in (one for one in joints if one not in names):
+            row = joint_coordinate(system, joint, q[None]).rows @ self.minimal.directions
+            if np.linalg.norm(row @ basis) > _HELD * np.linalg.norm(row):
+                basis = basis @ scipy.linalg.null_space(row @ basis)
+        return basis
+
+    def _slow_poles(self, count: int) -> Complex:
+        """The slowest poles by sparse matrices."""
+        whole = self.minimal.tangents.whole
+        slow = slowest(
+            csr_matrix(0.5 * (whole.stiffness + whole.stiffness.T)), whole.mass, self.minimal.constraints.jacobian,
+            self._typical, count, self.minimal.chosen.freedoms,
+        )  # fmt: skip
+        uneven = scipy.sparse.linalg.norm(whole.stiffness - whole.stiffness.T)
+        vibrates = self.at_rest and uneven <= _SYMMETRIC * scipy.sparse.linalg.norm(whole.stiffness)
+        if vibrates and not np.any(whole.damping.data):
+            root = np.sqrt(-slow.squares.astype(complex))
+            return _by_size(np.concatenate([root, -root]))[:count]
+        found = _by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
+        free = (slow.squares == 0.0) & ~np.any(whole.damping @ slow.shapes, axis=0) & vibrates
+        found[: 2 * int(free.sum())] = 0.0
+        return found[:count]
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
         """Transmission zeros between some inputs and some outputs, by default all, by magnitude [rad/s].
 
         Of any number of each: more inputs than outputs, or fewer, mostly have none. At rest, and of outputs that are
-        places, angles, strains or derivatives of places, they are found from the second-order equations, else from
+        places, angles or derivatives of these, they are found from the second-order equations, else from
         the state space, and up to a tenth of the fastest pole.
         """
         chosen = self.select(inputs, outputs)
@@ -272,6 +331,8 @@ class LinearModel:
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
         """Response C (s - A)^-1 B + D (k, outputs, inputs).
 
+        With more than 200 degrees of freedom from sparse equations at each frequency, without A.
+
         Parameters
         ----------
         frequencies : (k,) array
@@ -279,13 +340,23 @@ class LinearModel:
         """
         given = np.atleast_1d(np.asarray(frequencies))
         points = given if np.iscomplexobj(given) else 1j * given
+        out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
+        if self._is_large:
+            rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+            for k, s in enumerate(points):
+                out[k] = response_at(self.minimal, rows, self.wanted[0], s)
+            return out
         A, B, C, D = self._scaled
         upper, basis = scipy.linalg.schur(A, output="complex")
         inputs, outputs, eye = basis.conj().T @ B, C @ basis, np.eye(len(A))
-        out = np.empty((points.size, *D.shape), dtype=complex)
         for k, s in enumerate(points):
             out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
         return out
+
+    @property
+    def _is_large(self) -> bool:
+        """Whether sparse matrices are faster."""
+        return len(self.states) > 2 * _DENSE_FREEDOMS
 
     # --- The same in other forms --------------------------------------------------------------------------------------
 

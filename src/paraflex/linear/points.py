@@ -12,12 +12,13 @@ from paraflex.dynamics.sparse import sparse_jacobian
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.kernel.packed import CONSTRAINT
+from paraflex.linear.coordinates import Coordinates
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask, undeformed_motion
 
 
-def resting_point(system: System, state: State, mode: ActuationMode) -> tuple[MotionPoint, float]:
+def resting_point(coordinates: Coordinates, state: State, mode: ActuationMode) -> tuple[MotionPoint, float]:
     """A pose at rest, held by the motors of a mode and by forces that do not change.
 
     Returns
@@ -26,9 +27,10 @@ def resting_point(system: System, state: State, mode: ActuationMode) -> tuple[Mo
     float
         What the mechanism would start with without the latter [m/s^2]: see `Vibration.acceleration`.
     """
+    system = coordinates.system
     active = [(k, motor.joint) for k, motor in enumerate(system.mechanism.motors) if motor.name in mode.motors]
     joints = list(dict.fromkeys(joint for _, joint in active))
-    found = forces_at_rest(system, state, joints)
+    found = forces_at_rest(system, state, coordinates.inertia(state.time, state.q, joints))
     efforts = dict(zip(joints, found.efforts, strict=True))
     torques = _acting(system, state.time, {k: efforts[joint] for k, joint in active})
     still = np.zeros(system.n)

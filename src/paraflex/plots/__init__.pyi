@@ -20,8 +20,15 @@ from .free_motion import (
     point_motions as point_motions,
     point_paths as point_paths,
 )
+from .linear import (
+    bode as bode,
+    pole_zero_map as pole_zero_map,
+    poles_along_path as poles_along_path,
+    singular_values as singular_values,
+)
 from .measured import sensors as sensors
 from .methods import work_precision as work_precision
+from .mode_shapes import mode_shapes as mode_shapes
 from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
 from .parallel import parallel_coordinates as parallel_coordinates

@@ -14,12 +14,13 @@ from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit, metric_name
 from paraflex.plots.selection import place_of
-from paraflex.results.metrics import METRICS
+from paraflex.results.metrics import JOINT, METRICS, MOTOR
 
 Array = NDArray[np.float64]
 
 # Metrics by which designs are not chosen: of the solver, and that of which more is better.
 _NOT_JUDGED = (*(metric.name for metric in METRICS.values() if metric.of_solver), "safety_factor_min")
+_OF_MEMBERS = tuple(f"{metric.name}." for metric in METRICS.values() if metric.each in (MOTOR, JOINT))
 _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
 _FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
 # A metric that changes by less, as a share of its size, is the same for all designs.
@@ -87,9 +88,9 @@ class DesignTable:
                 )  # fmt: skip
         if names:
             return list(names)
-        # Metrics of single motors only if there are no others.
+        # Metrics of single motors and joints only if there are no others.
         varying = [name for name in self.metrics if self._varies(name) and name not in _NOT_JUDGED]
-        chosen = ([name for name in varying if "." not in name] or varying)[:most]
+        chosen = ([name for name in varying if not name.startswith(_OF_MEMBERS)] or varying)[:most]
         if not chosen:
             raise InputError("no metric varies", field="metric", remedy="run more designs, or wider ranges")
         return chosen
@@ -109,9 +110,9 @@ class DesignTable:
         return tuple(float(values[row]) for values in self.parameters.values())
 
     def label(self, row: int) -> str:
-        """Label of a run: its design's number, its mode, and its path if there are several."""
+        """Label of a run: its design's number, its mode where it has one, and its path if there are several."""
         several = len(set(self.path.tolist())) > 1
-        return f"#{self.design[row]} {self.mode[row]}" + (f" {self.path[row]}" if several else "")
+        return " ".join(filter(None, [f"#{self.design[row]}", str(self.mode[row]), str(self.path[row]) * several]))
 
     @property
     def varied(self) -> list[str]:

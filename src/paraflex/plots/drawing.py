@@ -12,13 +12,14 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain, three_digits
 from paraflex.plots.layout import page_width
-from paraflex.plots.marks import LOOKS, by_look, moving_marks, still_marks
+from paraflex.plots.marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
 from paraflex.plots.scene import (
     Limits,
     Scene,
@@ -42,7 +43,7 @@ _HEAD, _FOOT = 5.0, 5.5
 
 
 # Width of links [pt], and diameters of a body at a single place, a pin and the end-effector.
-_LINK, _DOT, _PIN, _TIP = 3.4, 7.0, 5.4, 4.2
+_LINK, _DOT, PIN_SIZE, _TIP = 3.4, 7.0, 5.4, 4.2
 # Share of the picture; Agg draws nothing of a line without length, nor of one that it snaps to a single pixel.
 _SHORTEST_LINE = 2e-3
 
@@ -71,7 +72,7 @@ class Sketch:
         axes.add_collection(self.links, autolim=False)
         self._moving = by_look(moving_marks(shown, limits))
         self.marks: dict[str, Line2D | PolyCollection] = {
-            kind: self._dots(look.ground, look.ink, _PIN, LOOKS[kind].width, 3.9)
+            kind: self._dots(look.ground, look.ink, PIN_SIZE, LOOKS[kind].width, 3.9)
             if marks[0].places.shape[1] == 1
             else self._symbols(kind, 3.1)
             for kind, marks in self._moving.items()
@@ -155,6 +156,35 @@ def draw_scale_bar(
     figure.text(0.5 * (left + right), bottom + 0.008, name, color=look.ink, fontsize=size, ha="center", va="bottom")
 
 
+def draw_load_keys(
+    figure: Figure,
+    shown: Scene,
+    limits: Limits,
+    look: Theme,
+    corner: tuple[float, float],
+    size: float,
+    share: float = 1.0,
+) -> None:
+    """Arrows of the largest force and torque with their sizes, in a row from a corner of the figure.
+
+    `share` is that of the figure's width which shows the limits.
+    """
+    x, y = corner
+    # Of the figure per metre, and letters as in `name_links`.
+    scale = share / (limits.right - limits.left)
+    up = scale * figure.get_figwidth() / figure.get_figheight()
+    for kind, text in shown.load_keys.items():
+        line, head = key_arrow(kind, limits)
+        first, last = (float(end(np.concatenate([line, head])[:, 0])) for end in (np.min, np.max))
+        left = x - scale * first
+        line, head = (np.array([left, y]) + np.array([scale, up]) * places for places in (line, head))
+        figure.add_artist(Line2D(*line.T, color=look.trail, linewidth=0.2 * size))
+        figure.add_artist(Polygon(head, color=look.trail))
+        x += scale * (last - first) + 0.5 * size / 72.0 / figure.get_figwidth()
+        figure.text(x, y, text, color=look.trail, fontsize=size, va="center", parse_math=False)
+        x += (len(text) + 2.0) * size / 72.0 * 0.6 / figure.get_figwidth()
+
+
 def caption(shown: Scene) -> str:
     """Text on the magnification."""
     if shown.magnified == 1.0:
@@ -210,6 +240,7 @@ def mechanism_drawing(
     sketch = Sketch(axes, shown, limits, look, width=0.5)
     sketch.show(len(shown.time) - 1)
     draw_scale_bar(figure, sketch.limits, look, (0.98, 1.5 / height), 6.5)
+    draw_load_keys(figure, shown, sketch.limits, look, (0.02, 2.5 / height), 6.5)
     title = [shown.mechanism, *([f"mode {plain(shown.mode)}"] if shown.mode else [])]
     figure.text(0.02, 0.985, ", ".join(title), va="top", color=look.ink, fontsize=7.0)
     figure.text(

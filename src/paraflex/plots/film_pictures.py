@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paraflex.plots.drawing import Sketch, bare, caption, draw_scale_bar, name_links
+from paraflex.plots.drawing import Sketch, bare, caption, draw_load_keys, draw_scale_bar, name_links
 from paraflex.plots.labels import plain
 from paraflex.plots.scene import Scene, common_limits
 from paraflex.plots.style import journal_style
@@ -100,6 +100,7 @@ def stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
     figure.text(margin, 0.972, first.mechanism, color=look.ink, fontsize=10.5, va="center", parse_math=False)
     figure.text(margin, 0.03, film.caption, color=look.earth, fontsize=9.0, va="center")
     draw_scale_bar(figure, limits, look, (1.0 - margin, 0.022), 9.0, share=1.0 / count)
+    draw_load_keys(figure, first, limits, look, (margin, 0.925), 9.0, share=1.0 / count)
     name_links(figure, first, look, 8.0, 0.088)
     texts.append(
         figure.text(1.0 - margin, 0.972, "", color=look.ink, fontsize=10.5, ha="right", va="center", parse_math=False)

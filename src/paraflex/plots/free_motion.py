@@ -105,7 +105,7 @@ def point_motions(data: xr.Dataset, mode: str | None = None, points: Sequence[st
     mode : str, optional
         Of a run along a path.
     points : sequence of str
-        "body.point" each; by default those that travel most, up to seven.
+        "body.point" each; by default the end-effector and those that travel most, up to seven.
     """
     run, names = one_run(data, mode), names_of(data, "point")
     shown = [point_number(run, point, "points") for point in points] or moving_points(run)
@@ -124,7 +124,7 @@ def point_motions(data: xr.Dataset, mode: str | None = None, points: Sequence[st
 
 
 def moving_points(run: xr.Dataset) -> list[int]:
-    """Named points that move, each place once; if there are more than seven, those of the longest way."""
+    """Named points that move, each place once, the end-effector first; at most seven, those of the longest way."""
     places = run["point_position"].transpose("time", "point", "axis").values
     names = names_of(run, "point")
     travel = np.nan_to_num(np.nanmax(places, axis=0) - np.nanmin(places, axis=0)).max(axis=1)
@@ -136,7 +136,8 @@ def moving_points(run: xr.Dataset) -> list[int]:
         apart = all(peak(places[:, k] - places[:, other]) > _STILL_SHARE * travel.max() for other in shown)
         if travel[k] > _STILL_SHARE * travel.max() and apart and "._" not in names[k]:
             shown.append(int(k))
-    return sorted(shown[:MOST_LINES])
+    first = [k for k in shown if names[k] == followed]
+    return first + sorted(k for k in shown[:MOST_LINES] if k not in first)
 
 
 def _kind(name: str) -> str:

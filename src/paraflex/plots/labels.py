@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paraflex.results.metrics import metric_label
+from paraflex.units import STRESS, DisplayUnit
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -51,7 +52,7 @@ QUANTITIES = {
     "moment": Quantity("moment", "", "N m"),
     "power": Quantity("power", "", "W"),
     "travel": Quantity("travel", "", "m"),
-    "stress": Quantity("stress", "", "MPa"),
+    "stress": Quantity("stress", "", STRESS.name),
     "place": Quantity("distance from the first end", "", "m"),
     "energy": Quantity("energy", "", "J"),
     "condition": Quantity("condition number", "", "1"),
@@ -93,17 +94,10 @@ def effort_label(units: str) -> str:
     return f"torque, force [{units}]"
 
 
-class DisplayUnit(NamedTuple):
-    """A unit for display: its name, and the factor from SI."""
-
-    name: str
-    factor: float
-
-
 _PREFIXES = {
     "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
     "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
-    "Pa": (DisplayUnit("GPa", 1e-9), DisplayUnit("MPa", 1e-6)),
+    "Pa": (DisplayUnit("GPa", 1e-9), STRESS),
 }
 # The largest value of a unit is at least so many: stresses are in MPa, moduli in GPa.
 _LEAST, _LEAST_OF = 0.1, {"GPa": 2.0}
@@ -111,11 +105,16 @@ _LEAST, _LEAST_OF = 0.1, {"GPa": 2.0}
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
     """The unit in which the largest of lengths, angles or stresses has few digits: "m", "rad", "Pa"; others stay."""
-    largest, choices = peak(values), _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
+    largest, choices = peak(values), display_units(unit)
     if largest == 0.0:
         return next(choice for choice in choices if choice.name not in _LEAST_OF)
     fits = (one for one in choices if largest * one.factor >= _LEAST_OF.get(one.name, _LEAST))
     return next(fits, choices[-1])
+
+
+def display_units(unit: str) -> tuple[DisplayUnit, ...]:
+    """All units in which a quantity of an SI unit may be shown, the largest first."""
+    return _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
 
 
 def peak(values: ArrayLike) -> float:

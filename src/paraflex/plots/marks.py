@@ -8,15 +8,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.plots.scene import BLOCK, DrawnJoint, Limits, Scene
+from paraflex.plots.scene import ARROW, BLOCK, TURN, DrawnJoint, DrawnLoad, Limits, Scene
 
 Array = NDArray[np.float64]
 
 # Sizes as parts of the picture's larger side.
 PIN, TRIANGLE, RAIL, MOTOR = 0.008, 0.028, 0.02, 0.0125
+# Radius of a pin's dot beside the disc of a motor; small pictures have larger dots.
+DOT = 0.0056
+# Length of an arrow's head, and its half width of that; of shorter arrows it is so much of the arrow.
+_HEAD, _HALF_HEAD, _MOST_HEAD = 0.026, 0.36, 0.6
+# From where, and how far the arrow of the largest torque goes round its point [rad].
+_TURN_FROM, _TURN_BY = -0.4, 1.5 * np.pi
+# Circle of a torque's arrow in the key against that in the picture.
+_KEY_TURN = 0.4
 _TEETH = 14
-# Points of a disc.
-_ROUND = 25
+# Points of a disc, and of an arc.
+_ROUND, _ARC = 25, 40
 # A joint that moves by less than this fraction of the picture is drawn at rest.
 _STILL_SHARE = 1e-3
 
@@ -41,6 +49,8 @@ LOOKS = {
     "motor": MarkLook("ink", "ink", 0.8),
     "weld": MarkLook("ink", "ink", 0.8),
     "pin": MarkLook("ground", "ink", 1.3),
+    "load": MarkLook("", "trail", 1.8),
+    "head": MarkLook("trail", "trail", 0.6),
 }
 
 
@@ -66,13 +76,16 @@ def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
 
 
 def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
-    """Symbols of gears, springs, rails, joints and their motors."""
+    """Symbols of gears, springs, rails, joints and their motors, and arrows of loads."""
     out = [Mark("gear", gear.name, line) for gear in shown.gears for line in gear.lines]
     out += [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
     parts = [(joint, look, shape) for joint in shown.joints for look, shape in SYMBOLS.get(joint.kind, {}).items()]
     out += [Mark("rail", "", rail(joint, limits)) for joint in shown.joints if joint.slides and joint.rail is not None]
     out += [Mark(look, joint.name, shape(joint, limits)) for joint, look, shape in parts]
     out += [Mark("motor", "", motor(joint, limits)) for joint in shown.joints if joint.driven]
+    for load in shown.loads:
+        line, head = load_arrow(load, limits)
+        out += [Mark("load", load.name, line), Mark("head", "", head)]
     return sorted(out, key=lambda mark: list(LOOKS).index(mark.look))
 
 
@@ -161,6 +174,52 @@ def motor(joint: DrawnJoint, limits: Limits) -> Array:
         return joint.place[:, None] + 0.5 * (block(joint, limits) - joint.place[:, None])
     angle = np.linspace(0.0, 2.0 * np.pi, _ROUND)
     return joint.place[:, None] + MOTOR * limits.size * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def load_arrow(load: DrawnLoad, limits: Limits) -> tuple[Array, Array]:
+    """Line and head of a load's arrow: to its point along a force, round it with a torque; a point where it is zero."""
+    if np.any(load.torque):
+        return round_arrow(load.place, TURN * limits.size, _TURN_FROM, _TURN_BY * load.torque, limits)
+    return straight_arrow(load.place - ARROW * limits.size * load.force, load.place, limits)
+
+
+def key_arrow(kind: str, limits: Limits) -> tuple[Array, Array]:
+    """Line (n, 2) and head (4, 2) of the arrow of the largest "force", or "torque" on a smaller circle."""
+    middle = np.zeros((1, 2))
+    if kind == "force":
+        line, head = straight_arrow(middle - [ARROW * limits.size, 0.0], middle, limits)
+    else:
+        line, head = round_arrow(middle, _KEY_TURN * TURN * limits.size, _TURN_FROM, np.array([_TURN_BY]), limits)
+    return line[0], head[0]
+
+
+def straight_arrow(tail: Array, tip: Array, limits: Limits, size: float = 1.0) -> tuple[Array, Array]:
+    """The line (f, 2, 2) of an arrow from tails to tips (f, 2), and its head (f, 4, 2) of a size."""
+    length = np.linalg.norm(tip - tail, axis=1, keepdims=True)
+    along = (tip - tail) / np.where(length > 0.0, length, 1.0)
+    head = np.minimum(size * _HEAD * limits.size, _MOST_HEAD * length)
+    return np.stack([tail, tip - head * along], axis=1), _head(tip, along, head)
+
+
+def round_arrow(
+    centre: Array, radius: float, start: float, sweep: Array, limits: Limits, size: float = 1.0
+) -> tuple[Array, Array]:
+    """The line (f, n, 2) of an arrow on circles round centres (f, 2), by angles (f,), and its head (f, 4, 2)."""
+    head = np.minimum(size * _HEAD * limits.size, _MOST_HEAD * radius * np.abs(sweep))
+    ends = start + sweep - np.sign(sweep) * head / radius
+    angle = start + np.linspace(0.0, 1.0, _ARC) * (ends - start)[:, None]
+    line = centre[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    tip = centre + radius * np.column_stack([np.cos(start + sweep), np.sin(start + sweep)])
+    along = tip - line[:, -1]
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    return line, _head(tip, along / np.where(length > 0.0, length, 1.0), head[:, None])
+
+
+def _head(tip: Array, along: Array, length: Array) -> Array:
+    """Triangles (f, 4, 2) with tips (f, 2), directions (f, 2) and lengths (f, 1)."""
+    across = _HALF_HEAD * length * np.column_stack([-along[:, 1], along[:, 0]])
+    foot = tip - length * along
+    return np.stack([tip, foot + across, foot - across, tip], axis=1)
 
 
 def square(joint: DrawnJoint, limits: Limits) -> Array:

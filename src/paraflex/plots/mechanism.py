@@ -88,7 +88,7 @@ def _of_shapes(run: xr.Dataset) -> Scene:
         springs={name: _MM * ends for name, ends in shown.springs.items()},
         gears=tuple(DrawnGear(gear.name, tuple(_MM * line for line in gear.lines)) for gear in shown.gears),
         anchors=tuple(_MM * place for place in shown.anchors),
-        trail=None, desired=None, limits=Limits(*(_MM * side for side in shown.limits)),
+        trail=None, desired=None, loads=(), limits=Limits(*(_MM * side for side in shown.limits)),
     )  # fmt: skip
 
 

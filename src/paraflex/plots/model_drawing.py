@@ -1,4 +1,4 @@
-"""A mechanism as its file says it, before anything runs: names, joints by kind, motors, springs, loads, path."""
+"""A mechanism as its file says it, before anything runs: names, joints by kind, drives, loads, sensors, path."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
-from paraflex.mechanism import GROUND, Load, Mechanism, PointForce, PointRef, TabulatedLaw
+from paraflex.mechanism import GROUND, Mechanism
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import three_digits
 from paraflex.plots.layout import TWO_COLUMNS, page_width
 from paraflex.plots.marks import moving_marks, still_marks
+from paraflex.plots.model_acting import Acting, acting_arrows, load_places
+from paraflex.plots.model_sensors import SENSOR, SensorMark, sensor_marks
 from paraflex.plots.named import Name, place_names
 from paraflex.plots.scene import Limits, Scene, common_limits, figure_of, limits_of, scene
+from paraflex.plots.signs import arrow_sign, draw_arrow, joint_sign, sign_legend
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import Theme, theme
 from paraflex.results.posed import Posed
@@ -26,26 +29,27 @@ from paraflex.results.posed import Posed
 Array = NDArray[np.float64]
 
 _MM = 1.0 / 25.4
+_MM_OF_POINT = 25.4 / 72.0
 # Room round the panel: left, right, below with the legend, above with the title [mm].
 _LEFT, _RIGHT, _BELOW, _ABOVE = 13.0, 2.5, 15.5, 8.0
 _FLATTEST, _TALLEST = 0.36, 0.85
 # Most bodies and joints named: beyond that names would hide what they name.
-_MOST_BODIES, _MOST_JOINTS, _MOST_MOTORS = 40, 60, 24
+_MOST_BODIES, _MOST_JOINTS, _MOST_MOTORS, _MOST_SENSORS = 40, 60, 24, 40
 _TEXT = 7.5
-# Length of arrows of loads and weight, and radius of those of torques, as parts of the picture.
-_ARROW, _TURN = 0.12, 0.045
+# Length of the arrow of weight as a part of the picture.
+_WEIGHT = 0.09
 _OPEN = "#c8102e"
 _GAP: dict[str, Any] = {"color": _OPEN, "linewidth": 1.3, "linestyle": (0, (3, 2)), "marker": "x", "markersize": 5.0}
 _PAYLOAD: dict[str, Any] = {"marker": "s", "markersize": 11.0, "markeredgewidth": 1.2, "linestyle": "none"}
 _START: dict[str, Any] = {"marker": "s", "markersize": 7.0, "markerfacecolor": "none", "linestyle": "none"}
-# Kinds of joints in the legend by their symbols: words, marker, its size [pt], and what it is filled with.
-_KINDS: dict[str, tuple[str, Any, float, str]] = {
-    "pin": ("revolute", "o", 5.0, "ground"),
-    "weld": ("weld", "s", 4.0, "ink"),
-    "slider": ("prismatic", (4, 0, 45), 8.0, "ground"),
-    "slot": ("slot", "$⊡$", 8.0, "ink"),
-    "sliding": ("slides along a beam", "$⊡$", 8.0, "ink"),
-}
+# Kinds of joints in the legend by their symbols.
+_KINDS = {
+    "pin": "revolute", "weld": "weld", "slider": "prismatic", "slot": "slot", "sliding": "slides along a beam",
+}  # fmt: skip
+# Width of dots and lines against those of a film.
+_WIDTH = 0.62
+# Room of an entry of the legend but for its words [pt], and heights of further rows [mm].
+_ENTRY, _ROW = 30.0, 6.0
 
 
 def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str = "light") -> Figure:
@@ -63,12 +67,16 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
     look, mechanism = theme(theme_name), posed.mechanism
     with journal_style():
         shown = _scene(posed)
-        figure, axes, limits = _panel(shown, page_width(width), look)
-        sketch = Sketch(axes, shown, limits, look, width=0.62)
+        limits, aspect = _limits(shown)
+        acting, sensors = acting_arrows(posed, shown, limits), sensor_marks(posed, limits)
+        entries = _entries(posed, shown, acting, sensors, limits, look)
+        rows = _rows([words for words, _ in entries], page_width(width))
+        figure, axes = _panel(limits, aspect, page_width(width), rows, look)
+        sketch = Sketch(axes, shown, limits, look, width=_WIDTH)
         sketch.show(0)
         drawn = _drawn_places(shown, limits)
         drawn += _draw_path(axes, posed, look)
-        drawn += _draw_loads(axes, posed, limits, look)
+        drawn += _draw_acting(axes, acting, look) + _draw_sensors(axes, sensors, look)
         drawn += _draw_gravity(axes, mechanism, limits, look)
         axes.plot(*np.array([*mechanism.ground.values()]).reshape(-1, 2).T, "+", color=look.earth, markersize=4.0)
         _draw_gaps(axes, posed)
@@ -77,8 +85,21 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
             axes.plot(*posed.payload, **_PAYLOAD, **_payload_colours(look), zorder=3.05)
             drawn.append(posed.payload[None])
         named = _body_names(shown, look) + _joint_names(posed, shown, look) + _other_names(posed, shown, limits, look)
+        named += _acting_names(acting, sensors, look)
         place_names(axes, named, drawn, _TEXT)
-        _legend(figure, posed, shown, look)
+        if entries:
+            columns = -(-len(entries) // rows)
+            sign_legend(
+                figure,
+                axes,
+                entries,
+                ncols=columns,
+                fontsize=_TEXT,
+                labelcolor=look.ink,
+                handlelength=2.0,
+                labelspacing=1.2,
+                borderpad=0.5,
+            )
         _title(figure, posed, look)
     return figure
 
@@ -91,21 +112,32 @@ def _scene(posed: Posed) -> Scene:
     # The support of an open joint is not where its body is.
     anchors = [np.array(ground[name]) for name in posed.gaps if name in ground]
     joints = [replace(joint, grounded=joint.grounded and joint.name not in posed.gaps) for joint in shown.joints]
-    places = np.array([*ground.values(), *([] if posed.desired is None else posed.desired)]).reshape(-1, 2)
+    desired = [] if posed.desired is None else posed.desired
+    tails = load_places(posed, shown.limits.size)
+    places = np.array([*ground.values(), *desired, *tails]).reshape(-1, 2)
     if len(places):
         shown = replace(shown, limits=common_limits([shown, replace(shown, limits=limits_of(places))]))
     shown = replace(shown, desired=posed.desired, joints=tuple(joints), anchors=(*shown.anchors, *anchors))
     return shown if posed.mechanism.end_effector is not None else replace(shown, trail=None, followed=None)
 
 
-def _panel(shown: Scene, width: float, look: Theme) -> tuple[Figure, Axes, Limits]:
+def _limits(shown: Scene) -> tuple[Limits, float]:
+    """Limits of the panel, and its height by its width."""
     limits = shown.limits
-    inside = width - _LEFT - _RIGHT
     aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), _FLATTEST, _TALLEST))
-    limits = limits.fitted(1.0 / aspect)
-    height = inside * aspect + _BELOW + _ABOVE
+    return limits.fitted(1.0 / aspect), aspect
+
+
+def _rows(words: list[str], width: float) -> int:
+    """Rows that the legend takes."""
+    return max(1, int(np.ceil(sum(0.58 * _TEXT * len(text) + _ENTRY for text in words) * _MM_OF_POINT / width)))
+
+
+def _panel(limits: Limits, aspect: float, width: float, rows: int, look: Theme) -> tuple[Figure, Axes]:
+    inside, below = width - _LEFT - _RIGHT, _BELOW + (rows - 1) * _ROW
+    height = inside * aspect + below + _ABOVE
     figure = Figure(figsize=(width * _MM, height * _MM), facecolor=look.ground)
-    axes = figure.add_axes((_LEFT / width, _BELOW / height, inside / width, inside * aspect / height))
+    axes = figure.add_axes((_LEFT / width, below / height, inside / width, inside * aspect / height))
     axes.set_facecolor(look.ground)
     axes.set_xlim(limits.left, limits.right)
     axes.set_ylim(limits.bottom, limits.top)
@@ -115,7 +147,7 @@ def _panel(shown: Scene, width: float, look: Theme) -> tuple[Figure, Axes, Limit
     axes.tick_params(colors=look.ink, length=0.0)
     for spine in axes.spines.values():
         spine.set_color(look.faint)
-    return figure, axes, limits
+    return figure, axes
 
 
 def _drawn_places(shown: Scene, limits: Limits) -> list[Array]:
@@ -136,32 +168,31 @@ def _draw_path(axes: Axes, posed: Posed, look: Theme) -> list[Array]:
     return [path]
 
 
-def _draw_loads(axes: Axes, posed: Posed, limits: Limits, look: Theme) -> list[Array]:
-    """Forces as arrows to their points, torques as arrows round them."""
-    lines = []
-    for load in posed.mechanism.loads:
-        at = _point(posed, load.point)
-        value = _shown_value(load)
-        if isinstance(load, PointForce):
-            if not value.any():
-                continue
-            tail = at - _ARROW * limits.size * value / np.linalg.norm(value)
-            _arrow(axes, tail, at, look.trail, 11.0, 1.6)
-            lines.append(np.array([tail, at]))
-        else:
-            turn = np.linspace(-0.4, 1.5 * np.pi - 0.4, 40)[:: 1 if value[0] >= 0.0 else -1]
-            arc = at + _TURN * limits.size * np.column_stack([np.cos(turn), np.sin(turn)])
-            axes.plot(*arc[:-2].T, color=look.trail, linewidth=1.4, zorder=3.7)
-            _arrow(axes, arc[-4], arc[-1], look.trail, 10.0, 1.4)
-            lines.append(arc)
-    return lines
+def _draw_acting(axes: Axes, acting: Acting, look: Theme) -> list[Array]:
+    """Arrows of loads, and of first movements."""
+    for load in acting.loads:
+        draw_arrow(axes, load.arrow, _load_looks(load.later, look))
+    for arrow in acting.moves:
+        draw_arrow(axes, arrow, _move_looks(look))
+    return [arrow.outline for arrow in (*(load.arrow for load in acting.loads), *acting.moves)]
 
 
-def _shown_value(load: Load) -> Array:
-    """Components of a load at the start; where it begins later, when it is largest within the first second."""
-    ends = [law.times[-1] for law in load.laws if isinstance(law, TabulatedLaw)]
-    values = load.evaluate(np.linspace(0.0, min([1.0, *ends]), 101))
-    return values[0] if values[0].any() else values[np.argmax(np.linalg.norm(values, axis=1))]
+def _load_looks(later: bool, look: Theme) -> dict[str, Any]:
+    """Looks of a load's arrow: dashed and pale where it does not act at the start."""
+    looks: dict[str, Any] = {"color": look.trail, "linewidth": 1.6}
+    return looks | ({"linestyle": (0, (2.5, 1.5)), "alpha": 0.55} if later else {})
+
+
+def _move_looks(look: Theme) -> dict[str, Any]:
+    return {"color": look.ink, "linewidth": 1.1}
+
+
+def _draw_sensors(axes: Axes, sensors: list[SensorMark], look: Theme) -> list[Array]:
+    """Diamonds at sensors, with the axes that they measure along or the sense in which they count turns."""
+    for one in sensors:
+        draw_arrow(axes, one.arrow, {"color": look.sensor, "linewidth": 0.9})
+        axes.plot(*one.place, **SENSOR, **_sensor_colours(look), zorder=4.3)
+    return [np.vstack([one.place, one.arrow.outline]) for one in sensors]
 
 
 def _draw_gravity(axes: Axes, mechanism: Mechanism, limits: Limits, look: Theme) -> list[Array]:
@@ -170,7 +201,7 @@ def _draw_gravity(axes: Axes, mechanism: Mechanism, limits: Limits, look: Theme)
     size = float(np.linalg.norm(weight))
     if not size:
         return []
-    room = 0.75 * _ARROW * limits.size
+    room = _WEIGHT * limits.size
     corner = np.array([limits.right - 0.09 * (limits.right - limits.left), limits.top - 0.7 * room])
     ends = np.array([corner - 0.5 * room * weight / size, corner + 0.5 * room * weight / size])
     _arrow(axes, ends[0], ends[1], look.earth, 11.0, 1.4)
@@ -186,7 +217,7 @@ def _draw_gaps(axes: Axes, posed: Posed) -> None:
     directions = posed.data["joint_direction"].values[0]
     for joint, direction in zip(posed.mechanism.joints, directions, strict=True):
         if joint.name in posed.gaps:
-            ends = np.array([_point(posed, joint.a), _point(posed, joint.b)])
+            ends = np.array([posed.place(joint.a), posed.place(joint.b)])
             if joint.slides:
                 along = np.array([np.cos(direction), np.sin(direction)])
                 ends[0] += along * np.dot(ends[1] - ends[0], along)
@@ -235,7 +266,7 @@ def _joint_names(posed: Posed, shown: Scene, look: Theme) -> list[Name]:
 
 
 def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> list[Name]:
-    """The end-effector, the path, springs, gears, loads, and points that no joint names."""
+    """The end-effector, the path, springs, gears, and points that no joint names."""
     mechanism, names = posed.mechanism, []
     if mechanism.end_effector is not None and shown.trail is not None:
         ref = mechanism.end_effector.point
@@ -247,12 +278,6 @@ def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> lis
     for gear in shown.gears:
         line = gear.lines[0][0]
         names.append(Name(f"gear {gear.name}", np.array([_along(line, s) for s in (0.5, 0.25, 0.75)]), look.earth))
-    for load in mechanism.loads:
-        at = _point(posed, load.point)
-        value = _shown_value(load)
-        if isinstance(load, PointForce) and value.any():
-            at = at - 0.8 * _ARROW * limits.size * value / np.linalg.norm(value)
-        names.append(Name(f"load {load.name}", at[None], look.trail))
     held = [joint.place[0] for joint in shown.joints]
     for name, place in mechanism.ground.items():
         if all(np.linalg.norm(np.subtract(place, at)) > 1e-6 * limits.size for at in held):
@@ -260,13 +285,13 @@ def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> lis
     return [name for name in names if np.isfinite(name.places).all()]
 
 
-def _point(posed: Posed, ref: PointRef) -> Array:
-    """Place of a point at the start."""
-    if ref.on_ground:
-        return np.array(posed.mechanism.ground[ref.point], dtype=float)
-    data = posed.data
-    station = int(data["point_station"].values[list(data["point"].values).index(str(ref))])
-    return data["shape"].values[0, station].astype(float)
+def _acting_names(acting: Acting, sensors: list[SensorMark], look: Theme) -> list[Name]:
+    """Loads with their sizes, and sensors."""
+    loads = [Name(f"{one.name} {one.size}", one.named, look.trail) for one in acting.loads]
+    few = sensors if len(sensors) <= _MOST_SENSORS else []
+    places = [np.vstack([one.place, one.arrow.line]) for one in few]
+    marked = [Name(f"{one.kind} {one.name}", at, look.sensor) for one, at in zip(few, places, strict=True)]
+    return loads + marked
 
 
 def _arrow(axes: Axes, tail: Any, head: Any, colour: str, scale: float, width: float = 1.0) -> None:
@@ -275,39 +300,42 @@ def _arrow(axes: Axes, tail: Any, head: Any, colour: str, scale: float, width: f
     axes.add_patch(arrow)
 
 
-def _legend(figure: Figure, posed: Posed, shown: Scene, look: Theme) -> None:
-    """The symbols that occur."""
+def _entries(
+    posed: Posed, shown: Scene, acting: Acting, sensors: list[SensorMark], limits: Limits, look: Theme
+) -> list[tuple[str, Any]]:
+    """Words and signs of all that occurs, signs as they are drawn."""
+    entries: list[tuple[str, Any]] = []
     kinds = {joint.kind for joint in shown.joints}
-    plain: dict[str, Any] = {"linestyle": "none", "markeredgecolor": look.ink, "color": look.ink}
-    entries = [
-        Line2D([], [], **plain, label=text, marker=marker, markersize=size, markerfacecolor=getattr(look, fill))
-        for kind, (text, marker, size, fill) in _KINDS.items()
-        if kind in kinds
-    ]
-    if posed.mechanism.motors:
-        motor: dict[str, Any] = {
-            "marker": "o",
-            "markerfacecolor": look.ground,
-            "markersize": 6.5,
-            "markeredgewidth": 3.0,
-        }
-        entries.append(Line2D([], [], **plain | motor, label="motor"))
+    entries += [(words, joint_sign(kind, limits, look, _WIDTH)) for kind, words in _KINDS.items() if kind in kinds]
+    driven = dict.fromkeys(joint.kind for joint in shown.joints if joint.driven)
+    for kind in driven:
+        said = "motor" if len(driven) == 1 or kind == "pin" else f"motor, {_KINDS.get(kind, kind)}"
+        entries.append((said, joint_sign(kind, limits, look, _WIDTH, driven=True)))
+    if acting.moves:
+        said = "first movement" if posed.mechanism.motors else "prescribed motion"
+        entries.append((said, arrow_sign(acting.moves[0], limits, _move_looks(look))))
+    for later, said in ((False, "load"), (True, "load, not yet at the start")):
+        load = next((one for one in acting.loads if one.later is later), None)
+        if load is not None:
+            entries.append((said, arrow_sign(load.arrow, limits, _load_looks(later, look))))
+    if sensors:
+        entries.append(("sensor", Line2D([], [], **SENSOR, **_sensor_colours(look))))
     if posed.mechanism.end_effector is not None:
-        tip: dict[str, Any] = {"marker": "o", "color": look.trail, "markeredgecolor": look.trail, "markersize": 4.2}
-        entries.append(Line2D([], [], **plain | tip, label="end-effector"))
+        tip = {"marker": "o", "color": look.trail, "markeredgecolor": look.trail, "markersize": 4.2}
+        entries.append(("end-effector", Line2D([], [], linestyle="none", **tip)))
     if posed.payload is not None and posed.mechanism.payload is not None:
-        label = f"payload {posed.mechanism.payload.mass:.4g} kg"
-        entries.append(Line2D([], [], **_PAYLOAD | {"markersize": 6.5}, **_payload_colours(look), label=label))
+        carried = Line2D([], [], **_PAYLOAD | {"markersize": 6.5}, **_payload_colours(look))
+        entries.append((f"payload {posed.mechanism.payload.mass:.4g} kg", carried))
     if posed.path:
-        entries.append(Line2D([], [], color=look.desired, linewidth=1.0, linestyle=(0, (3, 2)), label="path"))
-        entries.append(Line2D([], [], **_START, markeredgecolor=look.desired, label="its start"))
+        entries.append(("path", Line2D([], [], color=look.desired, linewidth=1.0, linestyle=(0, (3, 2)))))
+        entries.append(("its start", Line2D([], [], **_START, markeredgecolor=look.desired)))
     if posed.gaps:
-        entries.append(Line2D([], [], **_GAP, label="open"))
-    if entries:
-        figure.legend(
-            handles=entries, loc="lower center", ncols=len(entries), fontsize=_TEXT, labelcolor=look.ink,
-            handlelength=1.6, bbox_to_anchor=(0.5, 0.0),
-        )  # fmt: skip
+        entries.append(("open", Line2D([], [], **_GAP)))
+    return entries
+
+
+def _sensor_colours(look: Theme) -> dict[str, Any]:
+    return {"markerfacecolor": look.ground, "markeredgecolor": look.sensor}
 
 
 def _payload_colours(look: Theme) -> dict[str, Any]:
@@ -340,6 +368,7 @@ def _left_out(posed: Posed) -> str:
         for word, count, most in (
             ("bodies", len(posed.mechanism.bodies), _MOST_BODIES),
             ("joints", len(posed.mechanism.joints), _MOST_JOINTS),
+            ("sensors", len(posed.mechanism.sensors), _MOST_SENSORS),
         )
         if count > most
     ]

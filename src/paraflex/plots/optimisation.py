@@ -128,10 +128,10 @@ def _target_name(target: Mapping[str, Any], targets: list) -> str:
     """Distinctive name of a target: its mode, and path and metric if they differ."""
     differing = [key for key in ("metric", "path") if len({each[key] for each in targets}) > 1]
     names = [metric_name(target[key]) if key == "metric" else target[key] for key in differing]
-    return " ".join([plain(target["mode"]), *names])
+    return " ".join(filter(None, [plain(target["mode"]), *names])) or metric_name(target["metric"])
 
 
 def _panel_name(name: tuple[str, ...], names: list[tuple[str, ...]]) -> str:
     metric, path, mode = name
     paths = {each[1] for each in names}
-    return ", ".join([metric_name(metric), *([path] if len(paths) > 1 else []), plain(mode)])
+    return ", ".join(filter(None, [metric_name(metric), path if len(paths) > 1 else "", plain(mode)]))

@@ -53,7 +53,7 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
     _draw_axes(axes[0, 0], labels, low, high)
     # In the middle: beside the names there is no room for it in one column.
     axes[0, 0].set_title(
-        " ".join([f"{len(values)} designs,", *([] if is_narrow() else [f"{plain(pair[0])},"]), plain(pair[1])])
+        ", ".join(filter(None, [f"{len(values)} designs", "" if is_narrow() else plain(pair[0]), plain(pair[1])]))
     )
     return lay_out(figure, axes, panel_height=_AXIS_HEIGHT * len(labels))
 

@@ -90,7 +90,7 @@ def _series_name(pair: tuple[str, str], table: DesignTable) -> str:
     """Distinctive name of the runs of a path and mode."""
     path, mode = pair
     several = len(set(table.path.tolist())) > 1
-    return (f"{plain(path)}, " if several else "") + f"mode {plain(mode)}"
+    return ", ".join([plain(path)] * several + [f"mode {plain(mode)}"] * bool(mode)) or "runs"
 
 
 @drawn

@@ -5,8 +5,8 @@ Matplotlib (`plots/drawing.py`), files of SVG (`plots/svg.py`) and the player of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit
 from paraflex.plots.selection import names_of, point_number, select_run
+from paraflex.results.acting import sized
+from paraflex.results.kinds import kind_of
 
 Array = NDArray[np.float64]
 
@@ -25,6 +27,8 @@ JOINT_BASES = {"joint_position": "joint_base", "joint_direction": "joint_directi
 _CIRCLE = 61
 # Length and width of what slides, as parts of the picture's larger side.
 BLOCK = (0.034, 0.022)
+# Length of the arrow of the largest force, and radius of those of torques, as parts of the picture's larger side.
+ARROW, TURN = 0.12, 0.045
 _MARGIN = 0.07
 # Shares of the width that a scale bar may take.
 _SCALE_BAR = 0.28
@@ -87,6 +91,15 @@ class DrawnGear(NamedTuple):
     lines: tuple[Array, ...]
 
 
+class DrawnLoad(NamedTuple):
+    """A load at f times: where it acts (f, 2), its force (f, 2) and torque (f,) as shares of the run's largest."""
+
+    name: str
+    place: Array
+    force: Array
+    torque: Array
+
+
 @dataclass(frozen=True)
 class Scene:
     """A run in pictures, at f times.
@@ -118,6 +131,9 @@ class Scene:
     reached : float
         When the run ended; later pictures hold its last one [s].
     limits : Limits
+    loads : tuple of DrawnLoad
+    load_keys : mapping of str to str
+        What the arrows of the largest "force" and "torque" say, where there are such loads.
     """
 
     mechanism: str
@@ -135,6 +151,8 @@ class Scene:
     desired: Array | None
     reached: float
     limits: Limits
+    loads: tuple[DrawnLoad, ...] = ()
+    load_keys: Mapping[str, str] = field(default_factory=dict)
 
 
 def run_times(data: xr.Dataset) -> tuple[float, float]:
@@ -147,6 +165,11 @@ def run_times(data: xr.Dataset) -> tuple[float, float]:
 
 def check_shapes(data: xr.Dataset) -> None:
     """Check that results have the variables for drawings."""
+    if kind_of(data) == "linear":
+        raise InputError(
+            "these are linear models, not a run", field="results",
+            remedy="their report.html shows mode shapes in motion, paraflex plot draws mode_shapes",
+        )  # fmt: skip
     if "shape" not in data:
         raise InputError(
             "these results hold no shapes of links: they are of an earlier version", field="results",
@@ -209,6 +232,8 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
     springs, followed = _springs(run, drawn), followed_station(run, point)
     seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
     seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
+    loads = _loads(run, drawn, time, times, at)
+    reach = np.concatenate([one.reshape(-1, 2) for one in seen])
     return Scene(
         mechanism=str(run.attrs["mechanism"]),
         mode=str(run["mode"].item()) if "mode" in run.coords else "",
@@ -224,7 +249,9 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
         trail=None if followed is None else at(drawn[:, followed]),
         desired=desired,
         reached=float(time[-1]),
-        limits=limits_of(_with_rails(np.concatenate([one.reshape(-1, 2) for one in seen]), joints)),
+        limits=limits_of(_with_rails(_with_arrows(reach, loads), joints)),
+        loads=loads,
+        load_keys=_load_keys(run),
     )
 
 
@@ -333,6 +360,63 @@ def _gears(run: xr.Dataset, joints: Array, directions: Array) -> tuple[DrawnGear
     )
 
 
+def _loads(
+    run: xr.Dataset, drawn: Array, time: Array, times: Array, at: Callable[[Array], Array]
+) -> tuple[DrawnLoad, ...]:
+    """Loads of a run as shares of its largest force and torque; results of earlier versions have none."""
+    if "load_force" not in run:
+        return ()
+    force, torque = np.nan_to_num(run["load_force"].values), np.nan_to_num(run["load_torque"].values)[..., None]
+    parts = [part / (np.max(np.linalg.norm(part, axis=-1)) or 1.0) for part in (force, torque)]
+    shares = _strongest(np.concatenate(parts, axis=-1), time, times, at)
+    stations = run["load_station"].values
+    return tuple(
+        DrawnLoad(str(name), at(drawn[:, int(stations[k])]), shares[:, k, :2], shares[:, k, 2])
+        for k, name in enumerate(run["load"].values)
+    )
+
+
+def _strongest(values: Array, time: Array, times: Array, at: Callable[[Array], Array]) -> Array:
+    """Values (k, n, c) at the times of pictures, each the largest of the samples nearer to it than to the others.
+
+    A blow between two pictures is seen in one of them.
+    """
+    out = at(values)
+    nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), time)
+    inside = np.flatnonzero((time >= times[0]) & (time <= times[-1]))
+    sizes = np.linalg.norm(values, axis=-1)
+    for n in range(values.shape[1]):
+        # Of several samples of a picture the last one written is the largest.
+        ascending = inside[np.argsort(sizes[inside, n], kind="stable")]
+        largest = out[:, n].copy()
+        largest[nearest[ascending]] = values[ascending, n]
+        more = np.linalg.norm(largest, axis=-1) > np.linalg.norm(out[:, n], axis=-1)
+        out[more, n] = largest[more]
+    return out
+
+
+def _load_keys(run: xr.Dataset) -> dict[str, str]:
+    """Sizes of the longest arrows, by whether they are of forces or of torques."""
+    if "load_force" not in run:
+        return {}
+    keys = {}
+    names = names_of(run, "load")
+    for kind, unit in (("force", "N"), ("torque", "N m")):
+        values = np.nan_to_num(run[f"load_{kind}"].values)
+        sizes = np.max(np.linalg.norm(values, axis=-1) if kind == "force" else np.abs(values), axis=0)
+        acting = np.flatnonzero(sizes)
+        if acting.size:
+            name = f"load {names[acting[0]]}" if acting.size == 1 else "loads"
+            keys[kind] = f"{name}: {sized(float(sizes.max()), unit)}"
+    return keys
+
+
+def _with_arrows(places: Array, loads: tuple[DrawnLoad, ...]) -> Array:
+    """Places, and the tails of the arrows of forces."""
+    size = limits_of(places).size
+    return np.concatenate([places, *(load.place - ARROW * size * load.force for load in loads)])
+
+
 def pitch_lines(ends: Array, directions: Array, radii: Array) -> tuple[Array, ...]:
     """Pitch circles (f, n, 2) of wheels and pitch lines of racks; if radii are NaN, a line from joint to joint.
 
@@ -416,6 +500,9 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
         springs={name: ends[chosen] for name, ends in shown.springs.items()},
         gears=tuple(DrawnGear(gear.name, tuple(line[chosen] for line in gear.lines)) for gear in shown.gears),
         trail=None if shown.trail is None else shown.trail[chosen],
+        loads=tuple(
+            DrawnLoad(load.name, load.place[chosen], load.force[chosen], load.torque[chosen]) for load in shown.loads
+        ),
     )
 
 

@@ -19,15 +19,14 @@ from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import ZERO, look_of
 from paraflex.results.loads import sliding_joints
 from paraflex.results.stress import CONTACT, stresses_of
-
-_MEGA = 1e-6
+from paraflex.units import STRESS
 
 
 @drawn
 def beam_stresses(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Largest magnitude of the stress along every beam in time, bending and axial; at most the seven largest."""
     run = one_run(data, mode)
-    stresses = _MEGA * run["stress"].transpose("time", "body").values
+    stresses = STRESS.factor * run["stress"].transpose("time", "body").values
     _check_stresses(stresses, "beam_stresses")
     return largest_over_time(data, run, stresses, "body", axis_label("stress"))
 
@@ -41,7 +40,7 @@ def stress_envelope(data: xr.Dataset, mode: str | None = None) -> Figure:
     run = one_run(data, mode)
     found = stresses_of(run)
     _check_stresses(found.whole, "stress_envelope")
-    whole, axial = (_MEGA * np.fmax.reduce(each, axis=0) for each in (found.whole, np.abs(found.axial)))
+    whole, axial = (STRESS.factor * np.fmax.reduce(each, axis=0) for each in (found.whole, np.abs(found.axial)))
     place, owners = run["section_place"].values, found.owners
     peaks = {body: peak(whole[owners == body]) for body in names_of(run, "body")}
     shown = [body for body in sorted(peaks, key=lambda name: -peaks[name])[:MOST_LINES] if peaks[body] > 0.0]
@@ -51,7 +50,7 @@ def stress_envelope(data: xr.Dataset, mode: str | None = None) -> Figure:
         axes[0, 0].plot(place[own], whole[own], label=symbol(body), **look)
         axes[0, 0].plot(place[own], axial[own], color=look["color"], linestyle=":", linewidth=0.8)
         for x, stress in _peaks_under_contacts(run, body):
-            axes[0, 0].plot(x, _MEGA * stress, color=look["color"], linestyle="", marker="x", markersize=4.0)
+            axes[0, 0].plot(x, STRESS.factor * stress, color=look["color"], linestyle="", marker="x", markersize=4.0)
     axes[0, 0].set_xlabel(axis_label("place"))
     axes[0, 0].set_ylabel(axis_label("stress"))
     axes[0, 0].set_ylim(bottom=0.0)

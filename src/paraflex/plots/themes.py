@@ -1,4 +1,4 @@
-"""Colours of drawings and films on light and on dark ground."""
+"""Colours of drawings, films and reports on light and on dark ground."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ class Theme:
     earth: str
     desired: str
     trail: str
+    sensor: str
     links: tuple[str, ...]
 
     def link(self, number: int) -> str:
@@ -24,20 +25,22 @@ class Theme:
         return self.links[number % len(self.links)]
 
 
-# Okabe and Ito (2008), Color Universal Design; darker where the ground is light, lighter where it is dark.
+# After Okabe and Ito (2008), Color Universal Design; darker where the ground is light, lighter where it is dark. None
+# is near the trail's colour, or the grey and ink of the desired path.
 THEMES = {
     "light": Theme(
-        "#ffffff", "#1d2327", "#c3c9ce", "#59636b", "#8a949b", "#d55e00",
-        ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#8c5a2b", "#5a4fcf", "#7a7f00"),
+        "#ffffff", "#1d2327", "#c3c9ce", "#59636b", "#8a949b", "#d55e00", "#00676f",
+        ("#0072b2", "#c98700", "#009e73", "#b04a8a", "#4aa8e2", "#6a4fcf", "#7a7f00", "#8c5a2b"),
     ),
     "dark": Theme(
-        "#14181b", "#e8ecef", "#454d53", "#9aa4ab", "#8e989f", "#ff9a4d",
-        ("#4aa8e0", "#f0b93a", "#2ec49a", "#e39cc4", "#9ad4f5", "#c99565", "#a59df0", "#c6cb4a"),
+        "#14181b", "#e8ecef", "#454d53", "#9aa4ab", "#8e989f", "#ff9a4d", "#7fe3e8",
+        ("#56b4e9", "#f0c93a", "#2fd0a0", "#e79bc5", "#8fa8ff", "#b6d24a", "#c08cf0", "#b98a5a"),
     ),
 }  # fmt: skip
 # For a page of unknown background, such as a notebook: colours for both light and dark.
 PAGE = Theme(
     "rgba(128, 128, 128, 0.6)", "currentColor", "currentColor", "currentColor", "currentColor", "currentColor",
+    "currentColor",
     ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"),
 )  # fmt: skip
 

@@ -1,6 +1,7 @@
 """Reports: one HTML file with tables, interactive charts and the mechanism in motion."""
 
 from paraflex.report.film import Animation as Animation, animation as animation
+from paraflex.report.linear import linear_page as linear_page
 from paraflex.report.motion import motion_page as motion_page
 from paraflex.report.page import (
     Chart as Chart,

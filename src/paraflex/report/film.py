@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
+from paraflex.plots.marks import DOT, LOOKS, Mark, key_arrow, moving_marks, still_marks
 from paraflex.plots.scene import (
     JOINT_BASES,
     Limits,
@@ -55,6 +55,8 @@ class Animation:
         Where the end-effector should go [m], in all runs or in each.
     magnify : float
         How many times deflections are drawn at first.
+    periodic : bool
+        Whether it is a turn of something that comes again and again: its time is shown as a phase.
     """
 
     time: Array
@@ -65,6 +67,7 @@ class Animation:
     stiff: Sequence[Scene | None]
     path: Array | None = None
     magnify: float = 1.0
+    periodic: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """The animation in plain values for JSON."""
@@ -83,15 +86,25 @@ class Animation:
             ],
             "looks": LOOKS,
             "magnify": self.magnify,
+            "periodic": self.periodic,
             "marks": [one and [_marks(still_marks(one, limits), 1), _marks(moving_marks(one, limits), self.time.size)]
                       for one in self.scenes],
             # How far the moving symbols are from where they were if nothing bent.
             "swing": [None if one is None or stiff is None else _swing(one, stiff, limits)
                       for one, stiff in zip(self.scenes, self.stiff, strict=True)],
+            "dot": DOT * limits.size,
+            # Arrows of the largest force and torque: line, head, size.
+            "keys": [one and [_key(kind, text, limits) for kind, text in one.load_keys.items()]
+                     for one in self.scenes],
             "tips": [one and one.followed for one in self.scenes],
             "path": None if self.path is None else packed(self.path.reshape(-1, *self.path.shape[-2:])),
             "view": [limits.left, limits.bottom, limits.right, limits.top],
         }  # fmt: skip
+
+
+def _key(kind: str, text: str, limits: Limits) -> list[Any]:
+    line, head = key_arrow(kind, limits)
+    return [line.ravel().tolist(), head.ravel().tolist(), text]
 
 
 def _marks(marks: list[Mark], frames: int) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,38 +12,54 @@ from paraflex.plots.labels import text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.curves import followed
 from paraflex.report.page import Chart, Panel
-from paraflex.report.text import NO_VALUE, number, table
+from paraflex.report.text import NO_VALUE, by_run, number, table
 from paraflex.results.loads import load_figures, ranked, sliding_joints
 from paraflex.results.sensors import sensor_groups
+from paraflex.units import STRESS, speed_text
 
-_MEGA = 1e-6
 # Prescribed motions with a tile of their own.
 _MOST_TILES = 2
 # Tables with more rows than that show the beam with the largest stress of each mode.
 _MOST_ROWS = 40
+# And tables of motors or joints with more rows in all modes are those of one mode.
+_MOST_ROWS_OF_MODES = 200
 
 
 def load_tables(data: xr.Dataset, selected: str = "") -> list[tuple[str, str]]:
     """Titles and tables: stresses of beams, efforts of motors and drives, joints and ground; none of earlier results.
 
+    Tables of motors and joints follow the page's choice of a mode; paper has those of all modes.
+
     Parameters
     ----------
     data : xarray.Dataset
     selected : str
-        The mode whose motors and joints are shown; without modes empty.
+        The mode whose motors and joints are shown where there are too many of all modes; without modes empty.
     """
     modes = names_of(data, "mode") if "mode" in data.dims else [""]
     figures = {mode: load_figures(data.sel(mode=mode) if mode else data) for mode in modes}
-    own = figures[selected]
-    of_mode = f", mode {selected}" if len(modes) > 1 else ""
     out = []
     if stresses := _stresses(figures):
         out.append(("Stresses of beams", stresses))
-    if efforts := {**own.get("motors", {}), **own.get("drives", {})}:
-        out.append((f"Motors and prescribed motions{of_mode}", _efforts(efforts)))
-    if own.get("joints"):
-        out.append((f"Joints and ground{of_mode}", _joints(own)))
+    efforts = {mode: {**one.get("motors", {}), **one.get("drives", {})} for mode, one in figures.items()}
+    joints = {mode: one.get("joints", {}) for mode, one in figures.items()}
+    for title, rows, html in (
+        ("Motors and prescribed motions", efforts, lambda mode: _efforts(efforts[mode])),
+        ("Joints and ground", joints, lambda mode: _joints(figures[mode])),
+    ):
+        if count := sum(map(len, rows.values())):
+            out.append((title, _of_modes(modes, selected, count, html)))
     return out
+
+
+def _of_modes(modes: Sequence[str], selected: str, rows: int, html: Callable[[str], str]) -> str:
+    """A table of every mode, or of the selected one where all of them have too many rows."""
+    if len(modes) == 1:
+        return html(modes[0])
+    if rows <= _MOST_ROWS_OF_MODES:
+        return by_run([(f"mode {mode}", html(mode)) for mode in modes])
+    note = f"Of mode {selected}. All {len(modes)} modes have {rows} rows: they are in summary.json."
+    return f'{html(selected)}<p class="note">{note}</p>'
 
 
 def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, str]]:
@@ -53,13 +69,14 @@ def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str,
         most, run, body, one = stresses[0]
         factor = "" if one["safety_factor"] is None else f", safety factor {number(one['safety_factor'])}"
         where = f"{_whose(run)}{text_symbol(body)} at {number(one['place'])} m, t = {one['time']:.4g} s{factor}"
-        tiles.append(("largest stress", f"{number(most, _MEGA)} MPa", where))
+        tiles.append(("largest stress", f"{_stress(most)} {STRESS.name}", where))
     for most, run, name, one in ranked(figures, "drives", "torque_max")[:_MOST_TILES]:
         unit = one["torque_unit"] or ""
         kind = {"N m": "torque", "N": "force"}.get(unit, "effort")
         of = f"{_whose(run)}{text_symbol(name)}, t = {one['torque_time']:.4g} s"
         if one["power_max"] is not None and one["speed_max"] is not None:
-            of += f"; up to {number(one['speed_max'])} {one['speed_unit'] or ''}, {number(one['power_max'])} W"
+            speed = speed_text(one["speed_max"], one["speed_unit"] or "", ".3g")
+            of += f"; up to {speed}, {number(one['power_max'])} W"
         tiles.append((f"largest drive {kind}", f"{number(most)} {unit}".rstrip(), of))
     forces = ranked(figures, "joints", "force_max")
     if forces and forces[0][0]:
@@ -93,18 +110,23 @@ def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
         note += " Coordinates of a beam without axial stress do not stretch: its stress is of bending alone."
     several = len(figures) > 1
     strengths = any(one["safety_factor"] is not None for _, _, one in rows)
+    unit = f"[{STRESS.name}]"
     heads = [("mode" if several else "beam", ""), *([("beam", "")] if several else []),
-             ("stress", "[MPa]"), *([("safety", "factor")] if strengths else []), ("at", "[m]"), ("time", "[s]"),
-             ("bending", "[MPa]"), ("axial", "[MPa]")]  # fmt: skip
+             ("stress", unit), *([("safety", "factor")] if strengths else []), ("at", "[m]"), ("time", "[s]"),
+             ("bending", unit), ("axial", unit)]  # fmt: skip
     cells = [
         (mode if several else text_symbol(body), [
             *([text_symbol(body)] if several else []),
-            number(one["stress_max"], _MEGA), *([_factor(one)] if strengths else []), number(one["place"]),
-            number(one["time"]), number(one["bending_stress_max"], _MEGA), number(one["axial_stress_max"], _MEGA),
+            _stress(one["stress_max"]), *([_factor(one)] if strengths else []), number(one["place"]),
+            number(one["time"]), _stress(one["bending_stress_max"]), _stress(one["axial_stress_max"]),
         ])
         for mode, body, one in rows
     ]  # fmt: skip
     return table(heads, cells, caption="Largest stresses of the beams", note=note)
+
+
+def _stress(value: float | None) -> str:
+    return number(value, STRESS.factor)
 
 
 def _factor(one: Mapping[str, float | None]) -> str:
@@ -165,32 +187,37 @@ def _joints_of(joints: Mapping[str, Mapping[str, Any]], unit: str, what: str, wi
     return table(heads, rows, caption=what, note=f"{what}. {note}")
 
 
-def load_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
-    """Charts over time of runs (run, time, ...): stresses, joints, drives, ground, sensors; none of earlier results."""
-    charts = []
+def load_panel(data: xr.Dataset, runs: Sequence[str], selecting: str = "mode") -> list[Panel]:
+    """Charts over time of runs (run, time, ...): stresses, joints, drives, ground, sensors; none of earlier results.
+
+    `selecting` is what a run is called.
+    """
+    charts: list[Chart] = []
+
+    def add(chart: Chart, values: xr.DataArray) -> None:
+        charts.append(followed(chart, values, runs, selecting=selecting))
+
     if "stress" in data and np.isfinite(data["stress"].values).any():
         bent = data.isel(body=np.flatnonzero(np.isfinite(data["stress"].values).any(axis=(0, 1))))
-        stress = (_MEGA * bent["stress"]).assign_attrs(units="MPa")
+        stress = (STRESS.factor * bent["stress"]).assign_attrs(units=STRESS.name)
         note = "Largest magnitude along a beam, bending and axial."
-        charts.append(
-            followed(Chart("stresses", "Stresses of beams", "stress", choosing="beam", note=note), stress, runs)
-        )
+        add(Chart("stresses", "Stresses of beams", "stress", choosing="beam", note=note), stress)
     if "joint_coordinate" in data:
-        charts += _joint_charts(data, runs)
+        for chart, values in _joint_charts(data):
+            add(chart, values)
     for name, title, label in (
         ("drive_torque", "Efforts of prescribed motions", "effort"),
         ("drive_power", "Powers of prescribed motions", "power"),
     ):
         if name in data:
-            charts.append(followed(Chart(name.replace("_", "-"), title, label, choosing="motion"), data[name], runs))
+            add(Chart(name.replace("_", "-"), title, label, choosing="motion"), data[name])
     if "motor_speed" in data and data.sizes["motor"]:
-        charts.append(followed(Chart("speeds", "Motor speeds", "speed", choosing="motor"), data["motor_speed"], runs))
+        add(Chart("speeds", "Motor speeds", "speed", choosing="motor"), data["motor_speed"])
     if "motor_power" in data and data.sizes["motor"]:
-        charts.append(followed(Chart("powers", "Motor powers", "power", choosing="motor"), data["motor_power"], runs))
+        add(Chart("powers", "Motor powers", "power", choosing="motor"), data["motor_power"])
     if "frame_force" in data:
         note = "Of all joints and springs that are on the ground: the shaking force."
-        chart = Chart("frame", "Force on the ground", "force", choosing="direction", note=note)
-        charts.append(followed(chart, data["frame_force"], runs))
+        add(Chart("frame", "Force on the ground", "force", choosing="direction", note=note), data["frame_force"])
     loads = [Panel("Loads", charts)] if charts else []
     return [*loads, *_sensor_panel(data, runs)]
 
@@ -205,9 +232,9 @@ def _sensor_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
     return [Panel("Sensors", charts)] if charts else []
 
 
-def _joint_charts(data: xr.Dataset, runs: Sequence[str]) -> list[Chart]:
-    """Angles and rates of joints that turn, travels and speeds of those that slide."""
-    charts, slides = [], sliding_joints(data)
+def _joint_charts(data: xr.Dataset) -> Iterator[tuple[Chart, xr.DataArray]]:
+    """Angles and rates of joints that turn, travels and speeds of those that slide, with the values of their curves."""
+    slides = sliding_joints(data)
     for own, kind, variable, title, unit in (
         (~slides, "angle", "joint_coordinate", "Joint angles", "rad"),
         (slides, "travel", "joint_coordinate", "Joint travels", "m"),
@@ -217,5 +244,4 @@ def _joint_charts(data: xr.Dataset, runs: Sequence[str]) -> list[Chart]:
         if own.any():
             values = data[variable].isel(joint=np.flatnonzero(own)).assign_attrs(units=unit)
             label = "angular velocity" if kind == "rate" else kind
-            charts.append(followed(Chart(f"joint-{kind}", title, label, choosing="joint"), values, runs))
-    return charts
+            yield Chart(f"joint-{kind}", title, label, choosing="joint"), values

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cache
 from html import escape
 from importlib.metadata import version
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError
 from paraflex.folders import added_to
+from paraflex.plots.themes import THEMES
 from paraflex.report.film import Animation
 from paraflex.report.packing import Series
 from paraflex.writing import write_text
@@ -64,6 +65,10 @@ class Curve:
         Which of the chart's choices shows it; every one by default.
     quiet : bool
         Left out of the label at the pointer.
+    mark : str
+        "ring" or "cross": marks at its points instead of a line.
+    texts : sequence of str
+        What the label at the pointer says of each mark.
     """
 
     name: str
@@ -74,6 +79,8 @@ class Curve:
     shown: tuple[int, ...] | None = None
     choice: int | None = None
     quiet: bool = False
+    mark: str = ""
+    texts: Sequence[str] = ()
 
 
 class Picker(NamedTuple):
@@ -99,12 +106,14 @@ class Chart:
         Names of what it shows one at a time: links, motors.
     choosing : str
         What is chosen, for those who hear the page.
-    log, equal : bool
-        A logarithmic vertical axis; the same scale both ways.
+    log, log_x, equal : bool
+        A logarithmic vertical axis, a logarithmic horizontal one; the same scale both ways.
     over_time : bool
         Whether x is time: a line then moves with the animation, else a dot on every curve of a run.
     note : str
         A sentence under it.
+    layout : mapping
+        Parts of Plotly's `layout` that are added: numbers of axes, shapes.
     figure : mapping, optional
         Plotly's own `data` and `layout` instead of curves; colours and fonts of the page are added.
     drawer : str
@@ -121,9 +130,11 @@ class Chart:
     choices: Sequence[str] = ()
     choosing: str = "shown"
     log: bool = False
+    log_x: bool = False
     equal: bool = False
     over_time: bool = True
     note: str = ""
+    layout: Mapping[str, Any] = field(default_factory=dict)
     figure: Mapping[str, Any] | None = None
     drawer: str = ""
     pickers: Sequence[Picker] = ()
@@ -220,6 +231,8 @@ class Page:
         What curves without x are drawn over; empty where nothing moves.
     runs : sequence of str
         Names of what can be selected.
+    groups : sequence of (str, int)
+        Names of groups that one chooses from before a run, and how many of the runs each has; none for few runs.
     selecting : str
         What a run is called in this page: "mode", "model", "design".
     selected : int
@@ -249,6 +262,7 @@ class Page:
     panels: Sequence[Panel] = ()
     time: ArrayLike = ()
     runs: Sequence[str] = ()
+    groups: Sequence[tuple[str, int]] = ()
     selecting: str = "mode"
     selected: int = 0
     film: Animation | None = None
@@ -322,12 +336,14 @@ def _data(page: Page) -> dict[str, Any]:
     return {
         "time": time,
         "runs": list(page.runs),
+        "groups": [list(group) for group in page.groups],
         "selecting": page.selecting,
         "selected": page.selected,
         "panels": panels(page.panels),
         "survey": panels(page.survey),
         "designs": None if page.designs is None else _designs(page.designs, series),
         "film": None if page.film is None else page.film.to_dict(),
+        "palettes": {name: look.links for name, look in THEMES.items()},
         "series": series.to_dict(),
     }
 

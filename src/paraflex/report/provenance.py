@@ -87,7 +87,7 @@ def run_command_line(run: dict[str, Any]) -> str:
     """The `paraflex run` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
-    words = ["paraflex", "run", *_model(run)]
+    words = ["paraflex", "run", *model_words(run)]
     if "path" in run:
         words += ["--path", run["path"], *_modes(run.get("modes", []))]
     for name, flag in _GIVEN.items():
@@ -111,7 +111,7 @@ def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence
     """The `paraflex verify` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
-    words = ["paraflex", "verify", *_model(run), "--path", run["path"]]
+    words = ["paraflex", "verify", *model_words(run), "--path", run["path"]]
     words += _modes(run.get("modes", []))
     for name in (str(model) for model in data["model"].values):
         words += ["--engine" if name in engines else "--model", name]
@@ -123,7 +123,7 @@ def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence
     return shlex.join(words)
 
 
-def _model(run: dict[str, Any]) -> list[str]:
+def model_words(run: dict[str, Any]) -> list[str]:
     """The options of a model, with what was set of it."""
     words = ["--mechanism", mechanism_argument(run["mechanism"])]
     for name, value in (run.get("set") or {}).items():

@@ -44,10 +44,11 @@ def survey(
     if seeks_least and len(metrics) > 1:
         pair = [place[name] for name in in_conflict(designs, designs.judged)]
         first, second = pair if len(pair) == 2 else metrics[:2]
+        mode = " of the same mode" if any(designs.mode) else ""
         charts.append(Chart(
             "front", "Pareto front", "metric", x="metric", over_time=False, drawer="front",
             pickers=[Picker("across", metrics, metrics.index(first)), Picker("up", metrics, metrics.index(second))],
-            note=f"Large, joined: no run of the same mode is better in one and as good in the other. {LOWER}",
+            note=f"Large, joined: no run{mode} is better in one and as good in the other. {LOWER}",
         ))  # fmt: skip
     if metrics:
         charts.append(Chart(
@@ -106,7 +107,7 @@ def drawn_designs(
     """Drawn rows for the page's charts; `shown` gives the page's run of a row."""
     pairs = list(dict.fromkeys(zip(designs.path.tolist(), designs.mode.tolist(), strict=True)))
     several_paths, several_modes = (len({pair[k] for pair in pairs}) > 1 for k in (0, 1))
-    names = [", ".join([mode] * several_modes + [path] * several_paths) or mode for path, mode in pairs]
+    names = [", ".join([mode] * several_modes + [path] * several_paths) or mode or "runs" for path, mode in pairs]
     known = {pair: k for k, pair in enumerate(pairs)}
     return Designs(
         columns=drawn,

@@ -27,6 +27,7 @@ from paraflex.report.curves import (
 )
 from paraflex.report.designs import columns, metric_name, reasons, shown_unit
 from paraflex.report.film import animation
+from paraflex.report.loads import load_panel
 from paraflex.report.page import Page, Panel
 from paraflex.report.search import IDENTIFICATION, search_tables, search_tiles
 from paraflex.report.survey import LOWER, Step, drawn_designs, survey
@@ -38,13 +39,14 @@ _MOST_COLUMNS = 12
 _SHOWN_VARIABLES = (
     "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
     "joint_position", "joint_base", "joint_direction", "joint_direction_base", "spring_position", "point_station",
-    "spring_station", "joint_rail", "gear_radius",
+    "spring_station", "joint_rail", "gear_radius", "load_station", "load_force", "load_torque", "stress",
+    "joint_coordinate", "joint_speed", "drive_torque", "drive_power",
 )  # fmt: skip
-_STATIONS = ("point_station", "spring_station", "joint_rail")
+_STATIONS = ("point_station", "spring_station", "joint_rail", "load_station")
 _DIFFERING = (*_STATIONS, "gear_radius")
 _COORDINATES = (
     "time", "axis", "body", "motor", "joint", "end", "point", "spring", "station_body", "joint_kind", "joint_grounded",
-    "joint_driven", "gear", "gear_joint",
+    "joint_driven", "gear", "gear_joint", "drive", "load",
 )  # fmt: skip
 
 
@@ -152,7 +154,7 @@ def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Datase
     longest = max((one["time"].values for one in runs), key=lambda time: time[-1])
     parts = []
     for one in _with_as_many_stations(runs):
-        kept = one[[name for name in _SHOWN_VARIABLES if name in one]].isel(mode=0)
+        kept = one[[name for name in _SHOWN_VARIABLES if name in one]].isel(mode=0, missing_dims="ignore")
         kept = kept.drop_vars([name for name in kept.coords if name not in _COORDINATES])
         same = np.array_equal(one["time"].values, longest)
         parts.append(kept if same else kept.interp(time=longest))
@@ -214,7 +216,7 @@ def _subtitle(designs: DesignTable, account: StudyAccount) -> str:
     modes = list(dict.fromkeys(designs.mode.tolist()))
     paths = list(dict.fromkeys(designs.path.tolist()))
     parts = [account.mechanism, f"{count(number_of_designs)} designs" if number_of_designs != 1 else "one design"]
-    if modes:
+    if any(modes):
         parts.append(f"modes {', '.join(modes)}" if len(modes) > 1 else f"mode {modes[0]}")
         parts.append(f"paths {', '.join(paths)}" if len(paths) > 1 else f"path “{paths[0]}”")
     return ", ".join(parts)
@@ -303,6 +305,10 @@ def _not_shown(designs: DesignTable, missing: Mapping[int, str]) -> list[str]:
 def _panels(data: xr.Dataset, runs: list[str], account: StudyAccount) -> list[Panel]:
     """The runs shown in motion, over time."""
     data = data.transpose("mode", "time", ...)
+    title = f"The {'best ' if account.seeks_least else ''}designs in motion"
+    if "end_effector_desired" not in data:
+        loads = [chart for panel in load_panel(data, runs, selecting="design") for chart in panel.charts]
+        return [Panel(title, [*loads, compared(STRAIN, data["strain_energy"], runs)])]
     charts = [
         compared(ERRORS, errors(data), runs),
         plane_path(data, runs, common=False),
@@ -311,4 +317,4 @@ def _panels(data: xr.Dataset, runs: list[str], account: StudyAccount) -> list[Pa
     if bending(data).size:
         charts.append(followed(TIPS, bending(data), runs, selecting="design"))
     charts.append(compared(STRAIN, data["strain_energy"], runs))
-    return [Panel(f"The {'best ' if account.seeks_least else ''}designs in motion", charts)]
+    return [Panel(title, charts)]

@@ -6,10 +6,11 @@ import json
 import math
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from paraflex.plots.labels import display_unit, raised
+from paraflex.plots.labels import display_unit, display_units, raised
+from paraflex.units import DisplayUnit
 
 # Magnitudes written out; others as powers of ten.
 _SMALLEST_PLAIN, _LARGEST_PLAIN = 1e-3, 1e5
@@ -42,9 +43,26 @@ def number(value: float | None, factor: float = 1.0, *, beside: float = 0.0) -> 
     return text.replace("-", "−")
 
 
-def quantity(value: float, unit: str) -> str:
-    """A value in a suitable unit: "0.377 mm"."""
-    shown = display_unit(unit, value)
+def common_unit(unit: str, values: Iterable[float | None], *, beside: float = 0.0) -> DisplayUnit:
+    """The unit in which all values are written without powers of ten, or that of the largest where there is none.
+
+    Values are those of `number`, with the same magnitude beside them.
+    """
+    known = [abs(one) for one in values if one is not None and math.isfinite(one) and abs(one) > _ROUNDING * beside]
+    if not known:
+        return display_unit(unit, 0.0)
+    least, most = min(known), max(known)
+    fits = (
+        one
+        for one in display_units(unit)
+        if least * one.factor >= _SMALLEST_PLAIN and most * one.factor < _LARGEST_PLAIN
+    )
+    return next(fits, display_unit(unit, most))
+
+
+def quantity(value: float, unit: str, shown: DisplayUnit | None = None) -> str:
+    """A value in a suitable unit, or in a given one: "0.377 mm"."""
+    shown = shown or display_unit(unit, value)
     return f"{number(value, shown.factor)} {shown.name}"
 
 
@@ -93,6 +111,14 @@ def table(
         f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}"><table{sortable}>'
         f'<caption class="unseen">{escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{below}"
+    )
+
+
+def by_run(tables: Sequence[tuple[str, str]]) -> str:
+    """HTML of tables, one for each run of the page with its title: the screen has the selected run's, paper all."""
+    return "".join(
+        f'<div class="of-run" data-of-run="{run}"><h3>{escape(title)}</h3>{html}</div>'
+        for run, (title, html) in enumerate(tables)
     )
 
 

@@ -98,8 +98,10 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     motors = names_of(data, "motor")
     torques = [data[name].transpose("mode", "motor").values for name in ("peak_torque", "rms_torque")]
     wide, work, effort = largest(data["end_effector_desired"].values), energy_scale(data), largest(torques[0])
+    whole = not failed and bool((data["status"] == "complete").all())
     heads = [
-        ("mode", ""), ("status", ""), ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
+        ("mode", ""), *([] if whole else [("status", "")]),
+        ("error", f"RMS [{length.name}]"), ("largest", f"[{length.name}]"),
         *((name, f"[{unit}]") for name, unit, _ in after),
         *((text_symbol(motor), f"[{torque_unit(data)}]") for motor in motors),
         ("deflection", f"largest [{bend.name}]"), ("strain", "energy [J]"),
@@ -108,7 +110,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     for r, name in enumerate(runs):
         one = data.isel(mode=r)
         rows.append((name, [
-            str(one["status"].item()),
+            *([] if whole else [str(one["status"].item())]),
             number(errors_rms[r].item(), length.factor, beside=wide),
             number(largest(ranked[r]), length.factor, beside=wide),
             *(number(values[r]) for _, _, values in after),
@@ -123,7 +125,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     if after:
         note += "Error after: RMS, after the motion; drift: mean speed then; vibration: RMS about the drift. "
     note += f"{kind}: peak and, below it, RMS. Deflection: from a link's chord. Strain energy: peak."
-    if failed or not bool((data["status"] == "complete").all()):
+    if not whole:
         note += " Of a mode that did not get to its end: until then."
     selects = {name: r for r, name in enumerate(runs)}
     return table(heads, rows, caption="What every mode came to", note=note, runs=selects)

@@ -20,7 +20,7 @@ from paraflex.report.curves import TIPS, errors, labelled, largest, look, thinne
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, verdict_word, verify_command_line
-from paraflex.report.text import NO_VALUE, count, number, quantity, table
+from paraflex.report.text import NO_VALUE, common_unit, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.kinds import check_kind
@@ -28,6 +28,10 @@ from paraflex.results.kinds import check_kind
 _ENGINES = ("exudyn", "mujoco")
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
 _SMALLEST_DISTANCE = 1e-9
+_KED = (
+    "KED, kineto-elastodynamics: the links' bending as small vibrations about the given rigid motion, which it does "
+    "not change; the motors hold the rigid mechanism's angles."
+)
 
 
 class _Runs:
@@ -123,22 +127,28 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
 def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str, wide: float) -> str:
     """Every model in a mode of a mechanism whose path reaches so far from the origin [m]."""
     models = mode["models"]
-    unit = display_unit("m", np.array([one.get("tracking_error") or np.nan for one in models.values()]))
-    away = display_unit("m", np.array([one.get("distance_max") or np.nan for one in models.values()]))
+    unit, away, finer, meshed = (
+        common_unit("m", [one.get(key) for one in models.values() for key in keys], beside=wide)
+        for keys in (
+            ("tracking_error",), ("distance_max", "distance_rms"), ("change_with_finer_step",),
+            ("change_with_finer_mesh",),
+        )
+    )  # fmt: skip
+    whole = all(one["status"] == "complete" for one in models.values())
     heads = [
-        ("model", ""), ("status", ""), ("tracking error", f"RMS [{unit.name}]"),
+        ("model", ""), *([] if whole else [("status", "")]), ("tracking error", f"RMS [{unit.name}]"),
         (f"from {printed(reference)}", f"largest, RMS [{away.name}]"),
-        ("finer step", f"changes it by [{away.name}]"),
-        ("finer mesh", f"changes it by [{away.name}]"), ("imbalance", "of energy [J]"), ("steps", ""),
+        ("finer step", f"changes it by [{finer.name}]"),
+        ("finer mesh", f"changes it by [{meshed.name}]"), ("imbalance", "of energy [J]"), ("steps", ""),
         ("wall time", "[s]"), ("method", ""),
     ]  # fmt: skip
     rows = [
         (printed(model), [
-            one["status"],
+            *([] if whole else [one["status"]]),
             number(one.get("tracking_error"), unit.factor, beside=wide),
             "\n".join(number(one.get(key), away.factor, beside=wide) for key in ("distance_max", "distance_rms")),
-            number(one.get("change_with_finer_step"), away.factor, beside=wide),
-            number(one.get("change_with_finer_mesh"), away.factor, beside=wide),
+            number(one.get("change_with_finer_step"), finer.factor, beside=wide),
+            number(one.get("change_with_finer_mesh"), meshed.factor, beside=wide),
             number(one.get("energy_balance_max")),
             count(one.get("steps")),
             number(one.get("wall_time")),
@@ -148,13 +158,14 @@ def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str, wid
     ]  # fmt: skip
     own = runs.of_mode(runs.modes.index(name)) if name in runs.modes else ()
     selects = {printed(model): run for model, run in zip(runs.models, own, strict=False)}
-    return table(heads, rows, caption=f"Every model in mode {name}", runs=selects)
+    note = _KED if "ked" in models else ""
+    return table(heads, rows, caption=f"Every model in mode {name}", note=note, runs=selects)
 
 
 def _distances(mode: Mapping[str, Any], wide: float) -> str:
     distances = mode["distances"]
     names = list(distances)
-    unit = display_unit("m", [distances[a][b] or np.nan for a in names for b in names if a != b])
+    unit = common_unit("m", [distances[a][b] for a in names for b in names if a != b], beside=wide)
     rows = [
         (printed(a), [NO_VALUE if a == b else number(distances[a][b], unit.factor, beside=wide) for b in names])
         for a in names
@@ -168,16 +179,21 @@ def _differences(mode: Mapping[str, Any], links: Sequence[str], reference: str) 
     others = [
         name for name, one in mode["models"].items() if name != reference and "angle_difference_rms" in one
     ]  # fmt: skip
+    keys = {"rad": "angle_difference_rms", "rad/s": "angular_velocity_difference_rms"}
+    angle, rate = (
+        common_unit(unit, [mode["models"][name][key][link] for name in others for link in links])
+        for unit, key in keys.items()
+    )
     rows = [
         (text_symbol(link), [
-            f"{number(mode['models'][name]['angle_difference_rms'][link])}\n"
-            f"{number(mode['models'][name]['angular_velocity_difference_rms'][link])}"
+            "\n".join(number(mode["models"][name][key][link], shown.factor)
+                      for key, shown in zip(keys.values(), (angle, rate), strict=True))
             for name in others
         ])
         for link in links
     ]  # fmt: skip
     return table(
-        [("link", ""), *((printed(name), "[rad], [rad/s]") for name in others)], rows,
+        [("link", ""), *((printed(name), f"[{angle.name}], [{rate.name}]") for name in others)], rows,
         caption=f"Difference of links from {printed(reference)}",
         note="RMS difference of a link's angle and, below it, of its angular velocity.",
     )  # fmt: skip
@@ -251,15 +267,16 @@ def _tiles(summary: Mapping[str, Any], reference: str) -> list[tuple[str, str, s
         model: one["distance_max"] for model, one in mode["models"].items()
         if model != reference and one.get("distance_max") is not None
     }  # fmt: skip
+    error = mode["models"].get(reference, {}).get("tracking_error")
+    unit = common_unit("m", [*apart.values(), error])
     tiles = []
     for title, pick in (("nearest to the reference", min), ("farthest from it", max)):
         if apart:
             model = pick(apart, key=apart.__getitem__)
-            tiles.append((title, quantity(apart[model], "m"), f"{printed(model)}, mode {name}"))
-    error = mode["models"].get(reference, {}).get("tracking_error")
+            tiles.append((title, quantity(apart[model], "m", unit), f"{printed(model)}, mode {name}"))
     if error is not None:
         span = SPAN_WORDS[ErrorSpan(summary.get("error", ErrorSpan.WHOLE.value))]
-        tiles.append((f"RMS error {span}", quantity(error, "m"), printed(reference)))
+        tiles.append((f"RMS error {span}", quantity(error, "m", unit), printed(reference)))
     whole = all(one["status"] == "complete" for by in summary["modes"].values() for one in by["models"].values())
     tiles.append(("models", str(len(mode["models"])), "all complete" if whole else "not all complete"))
     return tiles

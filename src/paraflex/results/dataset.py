@@ -13,6 +13,7 @@ from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
+from paraflex.results.acting import load_variables
 from paraflex.results.doubts import MODE, keep_findings
 from paraflex.results.following import KEPT_METRICS, ErrorSpan, Part, metric_variables, too_short
 from paraflex.results.labelled import (
@@ -59,7 +60,8 @@ def tracking_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end, section, drive, sensor;
+        Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end, section, drive, load,
+        sensor;
         units and signs in the attributes of every variable. `shape` and what else drawings are made from is float32.
     """
     if not runs:
@@ -72,6 +74,7 @@ def tracking_dataset(
         name: (("mode", "time", *dims), np.stack([padded(frame[name][1], motion.t.size) for frame in frames]))
         for name, (dims, _) in frames[0].items()
     }
+    data |= load_variables(mechanism, motion.t)
     desired = motion.desired
     angles = [motion.system.body(body.name).angle for body in mechanism.bodies]
     twins = {

@@ -197,6 +197,13 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
             "gear_joint": (("gear", "end"), np.array(held, dtype=np.int32)),
             "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, one) for one in related])),
         }
+    of_loads: dict[str, Any] = {}
+    if mechanism.loads:
+        acted = [stations[load.point] for load in mechanism.loads]
+        of_loads = {
+            "load": [load.name for load in mechanism.loads],
+            "load_station": ("load", np.array(acted, dtype=np.int32)),
+        }
     return {
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
         "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
@@ -207,6 +214,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         "joint_rail": ("joint", np.array([_rail_station(joint, stations) for joint in joints], dtype=np.int32)),
         **of_springs,
         **of_gears,
+        **of_loads,
     }
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.folders import added_to
+from paraflex.results.kinds import kind_of
 from paraflex.results.parquet import read_parquet, write_parquet
 from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.results.storage import save_results
@@ -55,6 +56,11 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
         row a model, mode, time and drawn point; `sections`: a row a model, mode, time and place along a beam. Their
         `attrs` hold `units` and `meanings` of columns.
     """
+    if kind_of(data) == "linear":
+        raise InputError(
+            "linear models are matrices, not a table", field="to",
+            remedy='export them as "mat" or "netcdf"; linear.json has poles and zeros',
+        )  # fmt: skip
     drawn = [name for name in data.data_vars if "station" in data[name].dims]
     forces = [name for name in data.data_vars if SECTION in data[name].dims]
     over_time = [name for name in data.data_vars if "time" in data[name].dims and name not in (*drawn, *forces)]

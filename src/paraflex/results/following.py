@@ -55,7 +55,7 @@ def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
 
 # Metrics that are variables of datasets; and those of tracking.
 KEPT_METRICS = tuple(metric.name for metric in METRICS.values() if metric.kept)
-FOLLOWING = tuple(name for name in KEPT_METRICS if not METRICS[name].per_motor)
+FOLLOWING = tuple(name for name in KEPT_METRICS if not METRICS[name].each)
 
 
 def metric_variables(
@@ -77,7 +77,7 @@ def metric_variables(
     traces = [data_traces(runs.isel(dict(zip(dims, at, strict=True))), motion_end) for at in np.ndindex(*shape)]
     out = {}
     for metric in map(METRICS.__getitem__, names):
-        own = [*dims, "motor"] if metric.per_motor else dims
+        own = [*dims, "motor"] if metric.each else dims
         values = np.array([metric.value(one) for one in traces]).reshape([runs.sizes[dim] for dim in own])
         about = {"long_name": metric.label, "units": metric.unit, "comment": metric.meaning}
         out[metric.name] = xr.DataArray(values, {dim: data[dim] for dim in own if dim in data.coords}, own, attrs=about)

@@ -1,4 +1,4 @@
-"""The three kinds of datasets of results, and the error for a wrong one."""
+"""The kinds of datasets of results, and the error for a wrong one."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ _MADE_BY = {
     "tracking": "tracking_dataset or run_study",
     "motion": "motion_dataset",
     "verification": "Verification.dataset",
+    "linear": "linear_dataset",
 }
 
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """Kind of a dataset: "verification", "motion" (without a path), or "tracking"."""
+    """Kind of a dataset: "verification", "motion" (without a path), "linear" (models), or "tracking"."""
     if "model" in data.dims:
         return "verification"
-    return "motion" if data.attrs.get("kind") == "motion" else "tracking"
+    return data.attrs["kind"] if data.attrs.get("kind") in ("motion", "linear") else "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.results.numbers import finite_or_none, largest
+from paraflex.units import STRESS, speed_text
 
 Figures = dict[str, float | str | None]
 # Of the rate of a joint that a torque or a force drives.
@@ -154,7 +155,8 @@ def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
         return ""
     most, name, body, one = known[0]
     whose = f"mode {name}: " if name else ""
-    text = f"{whose}largest stress {1e-6 * most:.4g} MPa in {body} at {one['place']:.3g} m, t = {one['time']:.4g} s"
+    text = f"{whose}largest stress {STRESS.factor * most:.4g} {STRESS.name} in {body} at {one['place']:.3g} m"
+    text += f", t = {one['time']:.4g} s"
     factors = [(beam["safety_factor"], where) for _, _, where, beam in known if beam["safety_factor"] is not None]
     if not factors:
         return text
@@ -168,7 +170,7 @@ def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
     return [
         f"{whose}drive {name}: {_EFFORTS[one['torque_unit']]} up to "
         f"{_with_unit(one['torque_max'], one['torque_unit'])}{_at(one['torque_time'])}; "
-        f"speed up to {_with_unit(one['speed_max'], one['speed_unit'])}; "
+        f"speed up to {speed_text(one['speed_max'], one['speed_unit'] or '').rstrip()}; "
         f"power up to {one['power_max']:.4g} W{_at(one['power_time'])}"
         for name, one in figures.get("drives", {}).items()
         if None not in (one["torque_max"], one["speed_max"], one["power_max"])

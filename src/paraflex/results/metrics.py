@@ -14,8 +14,13 @@ from typing import Any
 import numpy as np
 
 from paraflex.results.formulas import drift_speed, integral, rms, vibration
-from paraflex.results.traces import Trace, Traces
+from paraflex.results.traces import Trace
 
+# Kinds of runs.
+PATH, MOTION = "path", "motion"
+MOTOR, DRIVE, JOINT = "motor", "drive", "joint"
+# Names of a mechanism's motors, drives and joints by these words.
+Members = Mapping[str, Sequence[str]]
 # Of the traces of a run and those of the nominal one. What only some traces have (`RunTraces`) is asked for as well.
 Formula = Callable[[Any, Any], Any]
 
@@ -29,10 +34,11 @@ class Metric:
     name : str
     meaning, unit : str
     formula : callable
-        From `Traces`; a metric per motor gives one number each.
+        From `Traces`; a metric of each motor, drive or joint gives one number each.
     label : str
         What it is called in print; its name by default.
-    per_motor : bool
+    each : str
+        "motor", "drive" (prescribed motion) or "joint", of which it has a number each; empty for one of the whole run.
     smooth : bool
         Whether the formula has derivatives.
     kept : bool
@@ -41,6 +47,12 @@ class Metric:
         Whether it tells of the integration, and not of the design.
     whole : bool
         Whether it is a count.
+    along_path : bool
+        Whether only runs along a path have it.
+    of_motors : bool
+        Whether it is zero without motors.
+    kept_of : tuple of str
+        Kinds of runs, along a "path" or of a mechanism's own "motion", that it is kept of unless metrics are named.
     """
 
     name: str
@@ -48,19 +60,22 @@ class Metric:
     unit: str
     formula: Formula
     label: str = ""
-    per_motor: bool = False
+    each: str = ""
     smooth: bool = True
     kept: bool = False
     of_solver: bool = False
     whole: bool = False
+    along_path: bool = False
+    of_motors: bool = False
+    kept_of: tuple[str, ...] = (PATH, MOTION)
 
-    def value(self, traces: Traces) -> Any:
-        """The metric of a run; an array for a metric per motor."""
+    def value(self, traces: Any) -> Any:
+        """The metric of a run; an array for a metric of each motor, drive or joint."""
         return self.formula(traces, traces)
 
-    def columns(self, motors: Sequence[str]) -> list[str]:
-        """Names of its columns: NAME, or NAME.MOTOR for each motor."""
-        return [f"{self.name}.{motor}" for motor in motors] if self.per_motor else [self.name]
+    def columns(self, members: Members) -> list[str]:
+        """Names of its columns: NAME, or NAME.MOTOR for each motor, NAME.DRIVE or NAME.JOINT."""
+        return [f"{self.name}.{member}" for member in members[self.each]] if self.each else [self.name]
 
 
 def _as_it_is(formula: Callable[[Any], Any]) -> Formula:
@@ -91,11 +106,17 @@ def _largest_magnitude(trace: Callable[[Any], Trace]) -> Formula:
     return value
 
 
-def _peak_torques(run: Any, nominal: Any) -> Any:
-    if not len(nominal.torque):
-        return np.full(nominal.torque.shape[1], np.nan)
-    magnitude = _largest_magnitude(lambda torque: torque)
-    return np.array([magnitude(*pair) for pair in zip(run.torque.T, nominal.torque.T, strict=True)])
+def _largest_of_each(trace: Callable[[Any], Trace]) -> Formula:
+    """Like `_largest_magnitude`, of each column; NaN where there is no sample."""
+    magnitude = _largest_magnitude(lambda column: column)
+
+    def value(run: Any, nominal: Any) -> Any:
+        here, there = trace(run), trace(nominal)
+        if not len(there):
+            return np.full(there.shape[1], np.nan)
+        return np.array([magnitude(*pair) for pair in zip(here.T, there.T, strict=True)])
+
+    return value
 
 
 def _motor_energy(run: Any, nominal: Any) -> Any:
@@ -141,7 +162,7 @@ def _safety_factor(run: Any, nominal: Any) -> Any:
 
 def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = False) -> Metric:
     """A number of the solution of the same name."""
-    formula = _as_it_is(lambda x: getattr(x.run.solution, name))
+    formula = _as_it_is(lambda x: getattr(x.solution, name))
     return Metric(name, meaning, unit, formula, smooth=False, of_solver=True, whole=whole)
 
 
@@ -152,41 +173,50 @@ _AWAY = "distance of the end-effector from its desired place"
 # In this order they are columns of tables.
 _ALL = (
     Metric("tracking_rms_motion", f"root mean square {_AWAY} during the motion", "m",
-           _as_it_is(lambda x: rms(x.distance[x.moving])), "RMS error in the motion", kept=True),
+           _as_it_is(lambda x: rms(x.distance[x.moving])), "RMS error in the motion", kept=True, along_path=True),
     Metric("tracking_max_motion", f"largest {_AWAY} during the motion", "m",
-           _largest(lambda x: x.distance[x.moving]), "largest error in the motion", kept=True),
+           _largest(lambda x: x.distance[x.moving]), "largest error in the motion", kept=True, along_path=True),
     Metric("tracking_rms_after", f"root mean square {_AWAY} after the motion", "m",
-           _as_it_is(lambda x: rms(x.distance[~x.moving])), "RMS error after the motion", kept=True),
+           _as_it_is(lambda x: rms(x.distance[~x.moving])), "RMS error after the motion", kept=True, along_path=True),
     Metric("tracking_max_after", f"largest {_AWAY} after the motion", "m",
-           _largest(lambda x: x.distance[~x.moving]), "largest error after the motion", kept=True),
+           _largest(lambda x: x.distance[~x.moving]), "largest error after the motion", kept=True, along_path=True),
     Metric("tracking_rms", f"root mean square {_AWAY} over the whole run, dwell included", "m",
-           _as_it_is(lambda x: rms(x.distance)), "RMS tracking error", kept=True),
+           _as_it_is(lambda x: rms(x.distance)), "RMS tracking error", kept=True, along_path=True),
     Metric("tracking_max", f"largest {_AWAY} over the whole run", "m",
-           _largest(lambda x: x.distance), "largest tracking error", kept=True),
+           _largest(lambda x: x.distance), "largest tracking error", kept=True, along_path=True),
     Metric("residual_vibration", "root mean square distance of the end-effector from its drift after the motion", "m",
-           _as_it_is(lambda x: vibration(*x.after)), "residual vibration", kept=True),
+           _as_it_is(lambda x: vibration(*x.after)), "residual vibration", kept=True, along_path=True),
     Metric("drift_speed", "mean speed of the end-effector's drift after the motion", "m/s",
-           _as_it_is(lambda x: drift_speed(*x.after)), "drift after the motion", kept=True),
+           _as_it_is(lambda x: drift_speed(*x.after)), "drift after the motion", kept=True, along_path=True),
     Metric("deflection_max", "largest deflection of any body from its chord, the line between its ends", "m",
            _largest_magnitude(lambda x: x.deflection), "largest deflection"),
     Metric("peak_torque_max", "largest magnitude of any motor's torque", "N m",
-           _largest_magnitude(lambda x: x.torque), "peak torque"),
+           _largest_magnitude(lambda x: x.torque), "peak torque", of_motors=True),
     Metric("rms_torque_norm", "root mean square of the torques' Euclidean norm", "N m",
-           _as_it_is(lambda x: np.sqrt(np.mean(np.sum(x.torque**2, axis=1)))), "RMS torque"),
+           _as_it_is(lambda x: np.sqrt(np.mean(np.sum(x.torque**2, axis=1)))), "RMS torque",
+           of_motors=True),
     Metric("peak_torque", "largest magnitude of each motor's torque", "N m",
-           _peak_torques, "peak torque", per_motor=True, kept=True),
+           _largest_of_each(lambda x: x.torque), "peak torque", each=MOTOR, kept=True),
     Metric("rms_torque", "root mean square of each motor's torque", "N m",
-           _as_it_is(lambda x: rms(x.torque)), "RMS torque", per_motor=True, kept=True),
+           _as_it_is(lambda x: rms(x.torque)), "RMS torque", each=MOTOR, kept=True),
     Metric("work", "work done on the mechanism until the end, less what dampers take", "J",
-           _as_it_is(lambda x: x.run.solution.work[-1])),
+           _as_it_is(lambda x: x.solution.work[-1])),
     Metric("motor_energy", "integral of the magnitudes of all motors' powers, from the samples", "J",
-           _motor_energy, "energy of the motors"),
+           _motor_energy, "energy of the motors", of_motors=True),
     Metric("motor_power_max", "largest magnitude of any motor's power", "W",
-           _largest_magnitude(lambda x: x.power), "largest motor power"),
+           _largest_magnitude(lambda x: x.power), "largest motor power", of_motors=True),
+    Metric("drive_torque_max", "largest magnitude of the torque or force of each prescribed motion", "N m",
+           _largest_of_each(lambda x: x.drive_torque), "largest torque", each=DRIVE),
+    Metric("drive_power_max", "largest magnitude of the power of each prescribed motion", "W",
+           _largest_of_each(lambda x: x.drive_power), "largest power", each=DRIVE),
+    Metric("joint_force_max", "largest force in any joint", "N",
+           _largest(lambda x: x.joint_force), "largest joint force", kept_of=(MOTION,)),
+    Metric("joint_speed_max", "largest magnitude of the rate of each joint's angle or travel", "rad/s",
+           _largest_of_each(lambda x: x.joint_speed), "largest speed", each=JOINT, kept_of=()),
     Metric("strain_energy_max", "largest strain energy", "J",
-           _largest(lambda x: x.run.solution.strain_energy), "largest strain energy"),
+           _largest(lambda x: x.solution.strain_energy), "largest strain energy"),
     Metric("kinetic_energy_max", "largest kinetic energy", "J",
-           _largest(lambda x: x.run.solution.kinetic_energy), "largest kinetic energy"),
+           _largest(lambda x: x.solution.kinetic_energy), "largest kinetic energy"),
     Metric("stress_max", "largest magnitude of the stress in any beam, bending and axial; sections need outer_fibre",
            "Pa", _stress, "largest stress"),
     Metric("safety_factor_min", "least strength over stress of any beam; materials need strength", "1",
@@ -194,13 +224,13 @@ _ALL = (
     Metric("section_moment_max", "largest magnitude of the bending moment in any beam", "N m",
            _section_moment, "largest bending moment"),
     Metric("total_mass", "mass of all bodies", "kg",
-           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.run.task.system.bodies])), "mass"),
+           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.system.bodies])), "mass"),
     Metric("actuation_condition_max", "largest condition number of the actuation matrix", "1",
-           _largest(lambda x: x.condition), "largest condition number"),
+           _largest(lambda x: x.condition), "largest condition number", along_path=True),
     _of_the_solver("constraint_position_max", "largest constraint violation in position", "m"),
     _of_the_solver("energy_balance_max", "largest imbalance of energy and work", "J"),
     Metric(VALIDITY, "what the model leaves out, over its limit: it holds up to 1, and 0 where nothing bends", "1",
-           _as_it_is(lambda x: 0.0 if x.run.validity is None else x.run.validity.ratio), smooth=False),
+           _as_it_is(lambda x: 0.0 if x.validity is None else x.validity.ratio), smooth=False),
     _of_the_solver("steps", "accepted steps", whole=True),
     _of_the_solver("rejected", "rejected steps", whole=True),
     _of_the_solver("newton_iterations", "Newton iterations", whole=True),
@@ -215,9 +245,9 @@ def metric_label(column: str, motor: Callable[[str], str] = str) -> str:
     Parameters
     ----------
     column : str
-        NAME or NAME.MOTOR; another name than those of `METRICS` stands for itself.
+        NAME or NAME.MEMBER; another name than those of `METRICS` stands for itself.
     motor : callable
-        How a motor's name is printed.
+        How the name of a motor, drive or joint is printed.
     """
     name, dot, whose = column.partition(".")
     printed = METRICS[name].label if name in METRICS else ""

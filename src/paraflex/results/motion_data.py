@@ -15,6 +15,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of
 from paraflex.mechanism import AngleLaw
 from paraflex.motion import MotionRun
+from paraflex.results.acting import load_variables
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import (
@@ -60,8 +61,8 @@ def motion_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end, section, drive, sensor;
-        units and signs in the attributes of every variable.
+        Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end, section, drive, load,
+        sensor; units and signs in the attributes of every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.mechanism
     q, v = solution.q, solution.v
@@ -75,6 +76,7 @@ def motion_dataset(
     data: dict[str, Any] = {
         name: (("time", *dims), padded(each, run.times.size)) for name, (dims, each) in values.items()
     }
+    data |= load_variables(mechanism, run.times)
     data |= {name: getattr(solution, name) for name in RUN_FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
     if any(isinstance(law, AngleLaw) for law in run.torques.values()):

@@ -16,7 +16,8 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import reference_pose
 from paraflex.errors import InputError, NumericalError
 from paraflex.kinematics import Path, follow_path
-from paraflex.mechanism import Mechanism, Start
+from paraflex.mechanism import Mechanism, PointRef, Start
+from paraflex.results.acting import first_movements, first_movements_along
 from paraflex.results.drawing import drawing_data, system_drawing
 
 Array = NDArray[np.float64]
@@ -48,6 +49,12 @@ class Posed:
         Why the loops do not close, and why the path cannot be followed.
     payload : (2,) array or None
         Centre of mass of what the end-effector carries [m].
+    angles : mapping of str to float
+        Of the frames of bodies [rad].
+    moves : mapping of str to int
+        Signs of the first movement of joints: of prescribed motions, and of motors along the path; 0 of one that stays.
+    duration : float or None
+        How long the study lasts [s], where that is known.
     """
 
     mechanism: Mechanism
@@ -58,6 +65,16 @@ class Posed:
     gaps: Mapping[str, str] = field(default_factory=dict)
     problems: tuple[str, ...] = ()
     payload: Array | None = None
+    angles: Mapping[str, float] = field(default_factory=dict)
+    moves: Mapping[str, int] = field(default_factory=dict)
+    duration: float | None = None
+
+    def place(self, ref: PointRef) -> Array:
+        """Place (2,) of a point [m]."""
+        if ref.on_ground:
+            return np.array(self.mechanism.ground[ref.point], dtype=float)
+        station = int(self.data["point_station"].values[list(self.data["point"].values).index(str(ref))])
+        return self.data["shape"].values[0, station].astype(float)
 
     @property
     def closes(self) -> bool:
@@ -66,7 +83,11 @@ class Posed:
 
 
 def posed(
-    mechanism: Mechanism, assembly: str | None = None, path: tuple[str, Path] | None = None, start: Start | None = None
+    mechanism: Mechanism,
+    assembly: str | None = None,
+    path: tuple[str, Path] | None = None,
+    start: Start | None = None,
+    duration: float | None = None,
 ) -> Posed:
     """The pose that a run starts from; as given, with its open joints, where the loops do not close.
 
@@ -79,14 +100,25 @@ def posed(
         Its name, and the path that the end-effector starts on.
     start : Start, optional
         Of a run without a path.
+    duration : float, optional
+        Of the study [s]; that of the path by default.
 
     Raises
     ------
     InputError
         Nothing says where the bodies are, or an unknown assembly.
     """
+    if duration is None and path is not None:
+        duration = path[1].duration
     if start is not None and path is None:
-        return _started(mechanism, assembly, start)
+        found = _started(mechanism, assembly, start)
+    else:
+        found = _assembled(mechanism, assembly, path)
+    return replace(found, duration=duration, moves={**first_movements(mechanism, duration), **found.moves})
+
+
+def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path] | None = None) -> Posed:
+    """The pose of an assembly, at the start of a path where there is one."""
     if not mechanism.assemblies:
         raise InputError(
             "no assembly: nothing says where the bodies are", field="assembly",
@@ -105,7 +137,8 @@ def posed(
         motion = follow_path(mechanism, path[1], times, assembly=chosen)
     except (InputError, NumericalError) as error:
         return _of(mechanism, rigid, chosen.name, found.state.q[None], path, (f"path {path[0]}: {error}",))
-    return _of(mechanism, rigid, chosen.name, motion.q, path)
+    shown = _of(mechanism, rigid, chosen.name, motion.q, path)
+    return replace(shown, moves=first_movements_along(rigid, motion.q))
 
 
 def _started(mechanism: Mechanism, assembly: str | None, start: Start) -> Posed:
@@ -117,7 +150,7 @@ def _started(mechanism: Mechanism, assembly: str | None, start: Start) -> Posed:
     except (InputError, NumericalError) as error:
         if chosen is None:
             raise
-        instead = posed(mechanism, assembly)
+        instead = _assembled(mechanism, assembly)
         return replace(instead, problems=(*instead.problems, f"start: {error}"))
     return _of(mechanism, system, "" if chosen is None else chosen.name, state.q[None])
 
@@ -131,22 +164,23 @@ def _of(
     problems: tuple[str, ...] = (),
 ) -> Posed:
     data = drawing_data(mechanism, system_drawing(system, q), np.arange(len(q), dtype=float))
-    drawn = Posed(mechanism, assembly, data, problems=problems, payload=_payload(mechanism, system, q[0], data))
+    angles = {body.name: float(q[0][system.body(body.name).angle]) for body in mechanism.bodies}
+    drawn = Posed(mechanism, assembly, data, problems=problems, angles=angles)
+    drawn = replace(drawn, payload=_payload(drawn))
     if path is None:
         return drawn
     name, followed = path
     return replace(drawn, path=name, desired=followed.evaluate(np.linspace(0.0, followed.duration, _PLACES)).position)
 
 
-def _payload(mechanism: Mechanism, system: System, q: Array, data: xr.Dataset) -> Array | None:
+def _payload(drawn: Posed) -> Array | None:
     """Centre of mass of the payload: its offset is turned with the rigid body that carries it."""
-    carried, effector = mechanism.payload, mechanism.end_effector
+    carried, effector = drawn.mechanism.payload, drawn.mechanism.end_effector
     if carried is None or effector is None:
         return None
-    station = int(data["point_station"].values[list(data["point"].values).index(str(effector.point))])
-    angle = q[system.body(effector.point.body).angle]
+    angle = drawn.angles[effector.point.body]
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    return data["shape"].values[0, station].astype(float) + turn @ np.array(carried.offset)
+    return drawn.place(effector.point) + turn @ np.array(carried.offset)
 
 
 def _open(drawn: Posed, rigid: System, q: Array, problem: str) -> Posed:

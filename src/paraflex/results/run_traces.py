@@ -4,21 +4,98 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Generic, TypeVar, overload
 
 import numpy as np
 
-from paraflex.dynamics import joint_coordinate
+from paraflex.dynamics import System, joint_coordinate
+from paraflex.dynamics.joint_loads import drive_torques, joint_parts, load_in
 from paraflex.dynamics.points import point_motion
+from paraflex.integrators import Solution
+from paraflex.motion import MotionRun
 from paraflex.results.formulas import length
 from paraflex.results.outlines import deflections
 from paraflex.results.stress import SectionResult, section_result
 from paraflex.results.traces import Trace, Traces
 from paraflex.tracking import TrackingRun
+from paraflex.validity import Validity
+
+R = TypeVar("R", TrackingRun, MotionRun)
+
+
+class SolutionTraces(Generic[R]):
+    """Traces of what a run's solution gives, along a path or not, at its k samples; it may have a complex step."""
+
+    run: R
+    torque: Trace
+
+    @property
+    def system(self) -> System:
+        """Of the run."""
+        raise NotImplementedError
+
+    @property
+    def solution(self) -> Solution:
+        """Of the run."""
+        return self.run.solution
+
+    @property
+    def validity(self) -> Validity | None:
+        """How far the run is within what its model can describe."""
+        return self.run.validity
+
+    @cached_property
+    def deflection(self) -> Trace:
+        """Deflections of the stations of all flexible bodies from their chords (k, stations) [m], signed."""
+        return deflections(self.system, self.solution.q)
+
+    @cached_property
+    def sections(self) -> SectionResult | None:
+        """Section forces of the beams; None where none is flexible."""
+        solution = self.solution
+        return section_result(self.system, solution.q, solution.v, solution.a, solution.multipliers)
+
+    @cached_property
+    def power(self) -> Trace:
+        """Power of every motor (k, motors) [W]; zero for passive ones."""
+        return self._of_joints([motor.joint for motor in self.system.mechanism.motors]) * self.torque
+
+    @cached_property
+    def drive_torque(self) -> Trace:
+        """Torque [N m] or force [N] of every prescribed motion (k, drives)."""
+        return drive_torques(self.system, self.solution.multipliers)
+
+    @cached_property
+    def drive_power(self) -> Trace:
+        """Power of every prescribed motion (k, drives) [W]."""
+        return self._of_joints([one.joint for one in self.system.mechanism.prescribed]) * self.drive_torque
+
+    @cached_property
+    def joint_force(self) -> Trace:
+        """Magnitude of the force in every joint (k, joints) [N]; zero where it is not known."""
+        system, solution = self.system, self.solution
+        multipliers = np.where(np.isnan(solution.multipliers), 0.0, solution.multipliers)
+        forces = [
+            load_in(system, joint.name, joint_parts(system, joint.name), solution.q, multipliers, self.torque)[0]
+            for joint in system.mechanism.joints
+        ]
+        return np.stack([length(each) for each in forces], axis=1) if forces else np.zeros((len(solution.q), 0))
+
+    @cached_property
+    def joint_speed(self) -> Trace:
+        """Rate of every joint's angle [rad/s], or travel [m/s] (k, joints)."""
+        return self._of_joints([joint.name for joint in self.system.mechanism.joints])
+
+    def _of_joints(self, names: list[str]) -> Trace:
+        """Rates of joints by name (k, joints)."""
+        solution = self.solution
+        rates = [joint_coordinate(self.system, name, solution.q, solution.v).rate for name in names]
+        return np.stack(rates, axis=1) if rates else np.zeros((len(solution.q), 0))
 
 
 @dataclass(frozen=True)
-class RunTraces(Traces):
-    """Traces of a run.
+class RunTraces(Traces, SolutionTraces[TrackingRun]):
+    """Traces of a run along a path.
 
     Attributes
     ----------
@@ -28,37 +105,50 @@ class RunTraces(Traces):
 
     run: TrackingRun
 
-    @cached_property
-    def deflection(self) -> Trace:
-        """Deflections of the stations of all flexible bodies from their chords (k, stations) [m], signed."""
-        return deflections(self.run.task.system, self.run.solution.q)
-
-    @cached_property
-    def sections(self) -> SectionResult | None:
-        """Section forces of the beams; None where none is flexible."""
-        solution = self.run.solution
-        return section_result(self.run.task.system, solution.q, solution.v, solution.a, solution.multipliers)
+    @property
+    def system(self) -> System:
+        """See `SolutionTraces`."""
+        return self.run.task.system
 
     @property
     def condition(self) -> Trace:
         """Condition number of the actuation matrix (k,)."""
         return self.run.condition
 
-    @cached_property
-    def power(self) -> Trace:
-        """Power of every motor (k, motors) [W]; zero for passive ones."""
-        task, solution = self.run.task, self.run.solution
-        power = np.zeros(self.torque.shape, np.result_type(self.torque, solution.q))
-        for k, motor in enumerate(task.mechanism.motors):
-            if motor.name in self.run.mode.motors:
-                rate = joint_coordinate(task.system, motor.joint, solution.q, solution.v).rate
-                power[:, k] = self.torque[:, k] * rate
-        return power
+
+@dataclass(frozen=True)
+class MotionTraces(SolutionTraces[MotionRun]):
+    """Traces of a run without a path.
+
+    Attributes
+    ----------
+    t : (k,) array
+        [s]
+    torque : (k, motors) array
+        [N m], or [N] of motors that slide.
+    run : MotionRun
+    """
+
+    t: Trace
+    torque: Trace
+    run: MotionRun
+
+    @property
+    def system(self) -> System:
+        """See `SolutionTraces`."""
+        return self.run.system
 
 
-def run_traces(run: TrackingRun) -> RunTraces:
+@overload
+def run_traces(run: TrackingRun) -> RunTraces: ...
+@overload
+def run_traces(run: MotionRun) -> MotionTraces: ...
+def run_traces(run: TrackingRun | MotionRun) -> RunTraces | MotionTraces:
     """Traces of a run, at the samples it reached."""
-    task, solution = run.task, run.solution
+    solution = run.solution
+    if isinstance(run, MotionRun):
+        return MotionTraces(solution.t, run.applied, run)
+    task = run.task
     # The state at an event is a sample more than the task's times.
     k = solution.t.size - bool(solution.event)
     effector = task.mechanism.end_effector

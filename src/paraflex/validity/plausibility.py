@@ -17,6 +17,7 @@ from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Mechanism, PointForce, grouped
+from paraflex.units import STRESS, speed_text
 from paraflex.validity.bending import bending_of
 from paraflex.validity.blame import most_likely
 from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
@@ -151,12 +152,16 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
     k, station = np.unravel_index(np.argmax(used), used.shape)
     if used[k, station] > 1.0:
         name = sections.owners[station]
+        stress, strength = (STRESS.factor * one[k, station] for one in (loads.stress, loads.strength))
         yield Finding(
             "stress-over-strength", where.place,
-            f"a stress of {1e-6 * loads.stress[k, station]:.3g} MPa in {name} at {loads.x[k, station]:.3g} m, "
-            f"t = {solution.t[k]:.4g} s: its material bears {1e-6 * loads.strength[k, station]:.3g} MPa, the safety "
-            f"factor is {1.0 / used[k, station]:.2g}",
-            where.blame(name) or f"give {name} a stronger section or material, or move and load it less",
+            f"a stress of {stress:.3g} {STRESS.name} in {name} at {loads.x[k, station]:.3g} m, "
+            f"t = {solution.t[k]:.4g} s: its material bears {strength:.3g} {STRESS.name}, the safety factor is "
+            f"{1.0 / used[k, station]:.2g}",
+            where.blame(name) or (
+                f"give {name} a stronger section or material, or move and load it less"
+                + _moving(where.mechanism, solution)
+            ),
         )  # fmt: skip
 
 
@@ -248,7 +253,7 @@ def _moving(mechanism: Mechanism, solution: Solution) -> str:
     for one in mechanism.prescribed:
         rate = float(np.max(np.abs(one.law.evaluate(solution.t)[1])))
         unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
-        named.append(f"prescribed.{one.name} (up to {rate:.3g} {unit})")
+        named.append(f"prescribed.{one.name} (up to {speed_text(rate, unit, '.3g')})")
     named += [f"load.{load.name} ({load.largest(solution.t):.3g} {load.unit})" for load in mechanism.loads]
     return f": {', '.join(named)}" if named else ""
 

@@ -7,7 +7,15 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from paraflex.cli.commands.options import SECONDS, AssemblyOption, Json, ModelChoice, PathOption
+from paraflex.cli.commands.options import (
+    SECONDS,
+    AssemblyOption,
+    Json,
+    ModelChoice,
+    PathOption,
+    ReplaceOption,
+    ReportOption,
+)
 
 
 @dataclass(frozen=True)
@@ -61,6 +69,59 @@ class ModesRequest:
 
     model: ModelChoice = field(default_factory=ModelChoice)
     path: PathOption = None
+    json: Json = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineariseRequest:
+    """What `paraflex linearise` is asked for."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    modes: Annotated[
+        list[str],
+        Option(
+            "--mode",
+            metavar="MODE|all",
+            help="Actuation mode whose motors are inputs; repeatable, or all. Default: the study's with most motors.",
+        ),
+    ] = field(default_factory=list)
+    pose: Annotated[
+        str | None,
+        Option(
+            metavar="NAME|start|X,Y",
+            help="At rest: an assembly, the file's [start], or the end-effector's place. Default: the model's start.",
+        ),
+    ] = None
+    balanced: Annotated[
+        bool, Option("--balanced", help="About static equilibrium near the pose, the mode's motors held; else there.")
+    ] = False
+    at: Annotated[
+        float | None,
+        Option(
+            metavar="S",
+            parser=SECONDS,
+            help="About the planned motion at a time; of a model without a path, or of results, about the run.",
+        ),
+    ] = None
+    along: Annotated[
+        int | None, Option(metavar="N", help="Poles at so many moments of the motion too, as branches over time.")
+    ] = None
+    path: PathOption = None
+    assembly: AssemblyOption = None
+    forces: Annotated[
+        list[str],
+        Option("--force-at", metavar="BODY.POINT", help="Point with forces along x and y as inputs too; repeatable."),
+    ] = field(default_factory=list)
+    prescribed: Annotated[
+        list[str],
+        Option("--prescribed", metavar="NAME", help="Prescribed motion whose acceleration is an input; repeatable."),
+    ] = field(default_factory=list)
+    out: Annotated[
+        str | None,
+        Option("--out", "--output", metavar="DIR", help="Folder for linear.nc, linear.json, figures and report."),
+    ] = None
+    force: ReplaceOption = False
+    report: ReportOption = True
     json: Json = False
 
 

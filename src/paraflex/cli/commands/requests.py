@@ -18,7 +18,7 @@ def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable
     """A command as Typer takes it, with a parameter for each option of its request; the answer is the exit code."""
 
     def called(**given: Any) -> None:
-        raise typer.Exit(answer(_filled(request, given)) or 0)
+        raise typer.Exit(answer(filled(request, given)) or 0)
 
     called.__signature__ = inspect.Signature([*_parameters(request)])  # type: ignore[attr-defined]
     called.__annotations__ = {}
@@ -48,11 +48,11 @@ def _parameters(request: Any) -> Iterator[inspect.Parameter]:
         yield inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kinds[one.name])
 
 
-def _filled(request: Any, given: dict[str, Any]) -> Any:
+def filled(request: Any, given: dict[str, Any]) -> Any:
     """The request with what a shell has given; what it has not is left to the defaults."""
     kinds = get_type_hints(request)
     values = {
-        one.name: _filled(kinds[one.name], given) if is_dataclass(kinds[one.name]) else given[one.name]
+        one.name: filled(kinds[one.name], given) if is_dataclass(kinds[one.name]) else given[one.name]
         for one in fields(request)
     }
     return request(**{name: value for name, value in values.items() if value is not None})

@@ -13,6 +13,7 @@ import typer
 from paraflex.cli.commands.models import (
     DrawRequest,
     InfoRequest,
+    LineariseRequest,
     MethodsRequest,
     ModesRequest,
     NewRequest,
@@ -97,6 +98,10 @@ COMMANDS = (
         Write results for other programs: tables as CSV or Parquet, a struct for MATLAB, netCDF."""),
     ListedCommand("modes", ModesRequest, "modes.modes_command", """
         List the actuation modes and how well each can drive the path."""),
+    ListedCommand("linearise", LineariseRequest, "linearise.linearise_command", """
+        Linear models at a pose or along a motion: frequencies and damping, poles, zeros, motors held and free.
+
+        With --out it writes linear.nc, linear.json, figures/, and report.html with the mode shapes in motion."""),
     ListedCommand("methods", MethodsRequest, "methods.methods_command", """
         List the methods of integration, what each takes and what keeps the constraints."""),
     ListedCommand("info", InfoRequest, "inspect.info_command", """

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.designs.derivatives.changes import Change, ModeChange
-from paraflex.designs.derivatives.plans import Given, given, size_of
+from paraflex.designs.derivatives.plans import Given, check_has_path, given, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
 from paraflex.designs.derivatives.steps import part, stepped
 from paraflex.designs.measure import measure, metric_columns, metric_values, smooth_metrics
@@ -26,8 +26,7 @@ from paraflex.integrators.sensitivity import (
     run_derivatives,
 )
 from paraflex.integrators.solution import Solution
-from paraflex.results.run_traces import run_traces
-from paraflex.results.traces import Traces
+from paraflex.results.run_traces import RunTraces, run_traces
 from paraflex.tracking import TrackingRun, simulate
 
 Array = NDArray[np.float64]
@@ -87,6 +86,7 @@ def metric_gradients(
 
 def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] | None = None) -> list[ModeGradients]:
     """See `metric_gradients`."""
+    check_has_path(setting)
     planned, options = plan_task(setting, task)
     check_differentiable(options)
     if planned.holds:
@@ -138,7 +138,13 @@ def _with_motion(run: TrackingRun, nominal: Given, motion: Motion) -> TrackingRu
 
 
 def _slopes(
-    setting: Setting, run: TrackingRun, here: Traces, nominal: Given, found: RunDerivatives, k: int, change: ModeChange
+    setting: Setting,
+    run: TrackingRun,
+    here: RunTraces,
+    nominal: Given,
+    found: RunDerivatives,
+    k: int,
+    change: ModeChange,
 ) -> Array:
     """Derivatives of the numbers of metrics by parameter k relative to its size: by a run with a complex step."""
     direction, along = change.direction, Motion(*(each[k] for each in found.derivatives))

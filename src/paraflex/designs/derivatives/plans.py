@@ -88,6 +88,21 @@ def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> 
     return size
 
 
+def check_has_path(setting: Setting) -> None:
+    """None if runs are along paths: how the start of another run changes with a parameter is not derived.
+
+    Raises
+    ------
+    InputError
+        The mechanism has no path.
+    """
+    if not setting.has_path:
+        raise InputError(
+            "derivatives are of runs along a path, which the mechanism does not have", field="mechanism",
+            value=setting.source, remedy="take a sweep, or an optimisation with differences",
+        )  # fmt: skip
+
+
 def check_differentiable_study(setting: Setting, values: Sequence[float], columns: Collection[str]) -> None:
     """Check that metrics of a design's runs have exact derivatives by all of its parameters.
 
@@ -102,8 +117,10 @@ def check_differentiable_study(setting: Setting, values: Sequence[float], column
     Raises
     ------
     InputError
-        A metric that counts or measures what the integration did, a method without derivatives, or such a parameter.
+        A mechanism without a path, a metric that counts or measures what the integration did, a method without
+        derivatives, or such a parameter.
     """
+    check_has_path(setting)
     check_smooth(tuple(column.partition(".")[0] for column in columns))
     _, options = setting.design(tuple(values))
     check_differentiable(options)

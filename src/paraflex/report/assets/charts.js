@@ -2,6 +2,7 @@
 const charts = (() => {
   const { page, state, element } = report;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
+  const MARKS = { ring: "circle-open", cross: "x-thin-open" };
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
   // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
   const PAPER = 640, LOW = 200, LOW_TITLE = 10;
@@ -23,6 +24,11 @@ const charts = (() => {
     const beside = new Set(shown.filter((curve) => curve.run !== null).map((curve) => curve.run)).size > 1;
     return shown.map((curve) => {
       const chosen = beside && curve.run === state.run;
+      if (curve.mark) return {
+        type: "scatter", mode: "markers", name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y),
+        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: curve.mark === "ring" ? 9 : 8, line: { width: 1.6, color: lineColour(curve) } },
+        text: curve.texts.map(plain), hovertemplate: "%{text}<extra>%{fullData.name}</extra>", visible: chart.hidden.has(curve.name) ? "legendonly" : true,
+      };
       return {
         type: "scatter", mode: "lines", name: plain(curve.name),
         x: report.row(curve.x), y: report.row(curve.y),
@@ -66,7 +72,7 @@ const charts = (() => {
   }
 
   function layout(chart) {
-    const { log, equal, over_time: overTime } = chart.description;
+    const { log, log_x: logX, equal, over_time: overTime, layout: added } = chart.description;
     const figure = ownFigure(chart);
     const common = {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false,
@@ -84,8 +90,9 @@ const charts = (() => {
     return {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
-      xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : {}),
-      yaxis: axis(chart.description.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g" }),
+      xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : logX ? { type: "log", dtick: 1, tickformat: "~g", hoverformat: ".4~g" } : added.xaxis || {}),
+      yaxis: axis(chart.description.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g", ...added.yaxis }),
+      shapes: added.shapes || [],
     };
   }
 
@@ -115,7 +122,12 @@ const charts = (() => {
     svg.setAttribute("width", "26"); svg.setAttribute("height", "10"); svg.setAttribute("aria-hidden", "true");
     const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
     for (const [name, value] of Object.entries({ x1: 0, x2: 26, y1: 5, y2: 5, stroke, "stroke-width": 2, "stroke-dasharray": SAMPLES[curve.dash] })) line.setAttribute(name, value);
-    svg.append(line);
+    if (curve.mark) {
+      const mark = document.createElementNS("http://www.w3.org/2000/svg", "path");
+      const d = curve.mark === "ring" ? "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0" : "M9 1L17 9M9 9L17 1";
+      for (const [name, value] of Object.entries({ d, stroke, "stroke-width": 1.6, fill: "none" })) mark.setAttribute(name, value);
+      svg.append(mark);
+    } else svg.append(line);
     return svg;
   }
 

@@ -3,14 +3,19 @@ const player = (() => {
   const { page, state, element } = report;
   const MAGNIFICATIONS = [1, 2, 5, 10, 20, 50, 100, 200];
   const LARGEST = MAGNIFICATIONS.at(-1);
+  // Distances and directions from what is named in which a name is put; more names keep clear of one another only.
+  const GAPS = [7, 16, 30, 46], DIRECTIONS = [0.6, 0, -0.6, Math.PI / 2, -Math.PI / 2, Math.PI - 0.6, Math.PI, Math.PI + 0.6];
+  const MOST_APART = 60;
   const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5];
   const byId = (name) => document.getElementById(name);
   const canvas = byId("canvas"), pen = canvas.getContext("2d");
   const { film } = page;
   let arrays = null, times = [0], speed = 1, last = 0, width = 0, height = 0, place = null, colours = {}, waiting = false;
+  // Where each name was put last.
+  const stands = new Map();
 
   const end = () => times[times.length - 1];
-  const secondsText = (time) => `${time.toFixed(end() < 20 ? 3 : 2)} s`;
+  const secondsText = (time) => (film && film.periodic ? `${Math.round(360 * time / end())}°` : `${time.toFixed(end() < 20 ? 3 : 2)} s`);
 
   function seek(time) {
     report.set("time", Math.min(Math.max(Number(time), times[0]), end()));
@@ -111,32 +116,89 @@ const player = (() => {
     line(points, 0, before + 2);
   }
 
+  // Whether an arrow is of a load that does not act: it is too short to be seen.
+  function hidden(look, points, from, to) {
+    if (look !== "load" && look !== "head") return false;
+    let far = 0;
+    for (let k = from + 1; k < to; k++) far = Math.max(far, Math.hypot(points[2 * k] - points[2 * from], points[2 * k + 1] - points[2 * from + 1]));
+    return !(far * place.scale > 1);
+  }
+
   // Symbols: lines, closed or not, and dots.
   function drawMarks({ pieces }, points) {
+    const dot = Math.max(2.4, Math.min(4.2, film.dot * place.scale));
     for (const [look, , from, to] of pieces) {
+      if (hidden(look, points, from, to)) continue;
       const [fill, stroke, width, dashed] = film.looks[look];
       pen.setLineDash(dashed ? [6, 4] : []);
       pen.lineWidth = 1.3 * width; pen.strokeStyle = colours[stroke];
       if (to - from > 1) trace(points, from, to);
-      else { pen.beginPath(); pen.arc(px(points[2 * from]), py(points[2 * from + 1]), 4.2, 0, 2 * Math.PI); }
+      else { pen.beginPath(); pen.arc(px(points[2 * from]), py(points[2 * from + 1]), dot, 0, 2 * Math.PI); }
       if (fill) { pen.fillStyle = colours[fill]; pen.fill(); }
       pen.stroke();
     }
     pen.setLineDash([]);
   }
 
+  // Names beside what they name, each where it covers least of the others, of symbols and of links, or where it was before.
   function drawNames(drawn, { pieces }, points) {
     pen.font = `600 11.5px ${getComputedStyle(document.body).fontFamily}`;
-    pen.textBaseline = "middle"; pen.lineJoin = "round"; pen.lineWidth = 4; pen.strokeStyle = colours.card;
-    const write = (text, x, y, colour) => {
-      pen.strokeText(text, x, y); pen.fillStyle = colour; pen.fillText(text, x, y);
-    };
+    pen.textBaseline = "middle"; pen.lineJoin = "round";
+    const labels = [], written = new Set([""]), taken = [];
+    for (const [look, name, from, to] of pieces) {
+      if (hidden(look, points, from, to)) continue;
+      const x = px(points[2 * from]), y = py(points[2 * from + 1]);
+      taken.push([x, y], ...(look === "load" || look === "spring" ? along(points, from, to) : []));
+      if (!written.has(name)) labels.push({ text: name, key: `${look} ${name}`, x, y, colour: look === "load" ? colours.trail : colours.soft });
+      written.add(name);
+    }
     film.bodies.forEach(([name, from, to], k) => {
       const middle = (from + to - 1) / 2, a = Math.floor(middle), b = Math.ceil(middle);
-      write(name, px((drawn[2 * a] + drawn[2 * b]) / 2) + 7, py((drawn[2 * a + 1] + drawn[2 * b + 1]) / 2), colours.bodies[k % colours.bodies.length]);
+      const x = px((drawn[2 * a] + drawn[2 * b]) / 2), y = py((drawn[2 * a + 1] + drawn[2 * b + 1]) / 2);
+      labels.push({ text: name, key: name, x, y, colour: colours.bodies[k % colours.bodies.length] });
     });
-    const written = new Set([""]);
-    for (const [, name, k] of pieces) if (!written.has(name)) { written.add(name); write(name, px(points[2 * k]) + 8, py(points[2 * k + 1]) - 9, colours.soft); }
+    if (labels.length <= MOST_APART) film.bodies.forEach(([, from, to]) => taken.push(...along(drawn, from, to)));
+    placed(labels, taken);
+    pen.lineWidth = 1; pen.strokeStyle = colours.soft;
+    for (const one of labels) if (one.gap > GAPS[0]) { pen.beginPath(); pen.moveTo(one.x, one.y); pen.lineTo(one.at[0], one.at[1]); pen.stroke(); }
+    pen.textAlign = "center"; pen.lineWidth = 4; pen.strokeStyle = colours.card;
+    for (const { text, at, colour } of labels) { pen.strokeText(text, ...at); pen.fillStyle = colour; pen.fillText(text, ...at); }
+    pen.textAlign = "start";
+  }
+
+  // Places along a link, some pixels apart.
+  function along(points, from, to) {
+    const out = [];
+    for (let k = from + 1; k < to; k++) {
+      const [x0, y0, x1, y1] = [px(points[2 * k - 2]), py(points[2 * k - 1]), px(points[2 * k]), py(points[2 * k + 1])];
+      const steps = Math.min(Math.ceil(Math.hypot(x1 - x0, y1 - y0) / 8) || 1, 200);
+      for (let step = 0; step <= steps; step++) out.push([x0 + (x1 - x0) * step / steps, y0 + (y1 - y0) * step / steps]);
+    }
+    return out;
+  }
+
+  // The middle of each label, `at`, and how far its box is from what it names, `gap`, in pixels.
+  function placed(labels, taken) {
+    const boxes = [], high = 7;
+    for (const one of labels) {
+      const wide = pen.measureText(one.text).width / 2 + 2;
+      let least = Infinity;
+      GAPS.forEach((gap, far) => DIRECTIONS.forEach((angle, k) => {
+        const [c, s] = [Math.cos(angle), Math.sin(angle)];
+        const edge = Math.min(Math.abs(c) > 1e-9 ? wide / Math.abs(c) : Infinity, Math.abs(s) > 1e-9 ? high / Math.abs(s) : Infinity);
+        const x = one.x + (edge + gap) * c, y = one.y - (edge + gap) * s;
+        let cost = 3 * far + 0.2 * k;
+        for (const [bx, by, half] of boxes) {
+          cost += 40 * Math.max(0, Math.min(1, (wide + half - Math.abs(x - bx)) / wide)) * Math.max(0, Math.min(1, 2 - Math.abs(y - by) / high));
+        }
+        for (const [tx, ty] of taken) if (Math.abs(x - tx) < wide + 2 && Math.abs(y - ty) < high + 1) cost += 1.5;
+        if (x < wide || x > width - wide || y < 26 || y > height - high) cost += 100;
+        if (stands.get(one.key) === DIRECTIONS.length * far + k) cost -= 4;
+        if (cost < least) { least = cost; Object.assign(one, { at: [x, y], gap, choice: DIRECTIONS.length * far + k }); }
+      }));
+      stands.set(one.key, one.choice);
+      boxes.push([...one.at, wide]);
+    }
   }
 
   function drawScale() {
@@ -150,13 +212,31 @@ const player = (() => {
     pen.stroke();
     pen.fillStyle = colours.soft; pen.font = `12px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "alphabetic";
     pen.fillText(text, x + 5, y - 5);
+    return x + length * place.scale;
+  }
+
+  // Arrows of the largest force and torque with their sizes, beside the scale.
+  function drawKeys(x) {
+    for (const [line, head, text] of film.keys[state.run] || []) {
+      const across = [...line, ...head].filter((_, k) => k % 2 === 0), left = Math.min(...across);
+      const from = x + 26, y = height - 16;
+      pen.strokeStyle = pen.fillStyle = colours.trail; pen.lineWidth = 2.2;
+      for (const points of [line, head]) {
+        pen.beginPath();
+        for (let k = 0; k < points.length; k += 2) pen.lineTo(from + place.scale * (points[k] - left), y - place.scale * points[k + 1]);
+        if (points === head) pen.fill(); else pen.stroke();
+      }
+      x = from + place.scale * (Math.max(...across) - left) + 6;
+      pen.textBaseline = "middle"; pen.fillText(text, x, y);
+      x += pen.measureText(text).width;
+    }
   }
 
   function drawCaption(stopped) {
     pen.font = `13px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "top"; pen.fillStyle = colours.soft;
     const run = page.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
-    const by = state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
-    const caption = `t = ${secondsText(state.time)}${by}`;
+    const by = film.periodic ? `   displacements × ${state.magnify}` : state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
+    const caption = `${film.periodic ? "phase" : "t ="} ${secondsText(state.time)}${by}`;
     // On a narrow screen the buttons alone name the run.
     pen.fillText(pen.measureText(run + caption).width < width - 24 ? run + caption : caption, 12, 8);
     if (stopped !== null) { pen.fillStyle = colours.mark; pen.fillText(`this run ended at ${secondsText(stopped)}`, 12, 27); }
@@ -182,7 +262,7 @@ const player = (() => {
       pen.lineCap = pen.lineJoin = "round";
       drawMarks(still, ground);
       pen.globalAlpha = stopped ? 0.45 : 1;
-      if (byId("ghost").checked && state.magnify > 1) {
+      if (byId("ghost").checked && (state.magnify > 1 || film.periodic)) {
         pen.strokeStyle = colours.soft; pen.lineWidth = 1.2; pen.setLineDash([3, 4]);
         for (const [, from, to] of film.bodies) line(base, from, to);
         pen.setLineDash([]);
@@ -203,7 +283,7 @@ const player = (() => {
       if (byId("names").checked) drawNames(drawn, moving, points);
       pen.globalAlpha = 1;
     }
-    drawScale();
+    drawKeys(drawScale());
     drawCaption(stopped ? (farthest < 0 ? times[0] : times[farthest]) : null);
   }
 
@@ -247,7 +327,7 @@ const player = (() => {
     });
     const choose = byId("speed");
     const nearest = SPEEDS.reduce((a, b) => (Math.abs(Math.log(b * 7 / end())) < Math.abs(Math.log(a * 7 / end())) ? b : a));
-    speed = Math.min(nearest, 1);
+    speed = film && film.periodic ? 1 : Math.min(nearest, 1);
     for (const one of SPEEDS) choose.append(new Option(`${one} ×`, one, one === speed, one === speed));
     choose.addEventListener("change", () => { speed = Number(choose.value); });
     for (const name of ["ghost", "trail", "names"]) byId(name).addEventListener("change", repaint);

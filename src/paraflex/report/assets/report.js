@@ -57,13 +57,7 @@ const report = (() => {
 
   const isDark = () => (root.dataset.theme === "auto" ? dark.matches : root.dataset.theme === "dark");
   const colour = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
-  // Okabe and Ito's colours, apart for eyes of all kinds; lighter ones on a dark ground. None is near that of the
-  // end-effector's trail, or the grey and ink of the planned path.
-  const palettes = {
-    light: ["#0072b2", "#c98700", "#009e73", "#b04a8a", "#3fa0db", "#6a4fcf", "#7a7f00", "#8c5a2b"],
-    dark: ["#56b4e9", "#f0c93a", "#2fd0a0", "#e79bc5", "#8fa8ff", "#b6d24a", "#c08cf0", "#b98a5a"],
-  };
-  const palette = () => palettes[isDark() ? "dark" : "light"];
+  const palette = () => page.palettes[isDark() ? "dark" : "light"];
 
   function notify(what) {
     for (const listener of listeners[what]) listener(state[what]);

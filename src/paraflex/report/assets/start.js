@@ -10,7 +10,9 @@ const begin = (() => {
 
   function showRun() {
     for (const row of document.querySelectorAll("tr[data-run]")) row.classList.toggle("selected", Number(row.dataset.run) === state.run);
+    for (const part of document.querySelectorAll(".of-run")) part.classList.toggle("other", Number(part.dataset.ofRun) !== state.run);
     for (const button of document.querySelectorAll("tr[data-run] .pick")) button.setAttribute("aria-pressed", String(Number(button.closest("tr").dataset.run) === state.run));
+    if (page.groups.length && page.runs.length > 1) showGroup();
     const radio = document.querySelector(`#runs input[value="${state.run}"]`);
     if (radio) {
       radio.checked = true;
@@ -22,21 +24,43 @@ const begin = (() => {
     byId("canvas").setAttribute("aria-label", `The mechanism in motion${report.runName() ? `, ${page.selecting} ${report.runName()}` : ""}`);
   }
 
+  // The runs of a group as buttons, chosen after the group.
+  const firstOf = (group) => page.groups.slice(0, group).reduce((sum, [, count]) => sum + count, 0);
+  const groupOf = (run) => page.groups.findIndex(([, count], group) => run < firstOf(group) + count);
+
+  function showGroup() {
+    const holder = byId("members"), group = groupOf(state.run);
+    byId("group").value = String(group);
+    if (holder.dataset.group === String(group)) return;
+    holder.dataset.group = String(group);
+    holder.replaceChildren();
+    addButtons(holder, firstOf(group), page.groups[group][1]);
+  }
+
+  function addButtons(holder, first, count) {
+    for (let k = first; k < first + count; k++) {
+      const radio = element("input", { type: "radio", name: "run", value: k });
+      radio.addEventListener("change", () => selectRun(k));
+      holder.append(element("label", {}, radio, page.groups.length ? page.runs[k].split(": ").at(-1) : page.runs[k]));
+    }
+  }
+
   function makeSelector() {
     const holder = byId("runs");
     if (page.runs.length < 2) { holder.hidden = byId("key-run").hidden = true; return; }
     holder.querySelector("legend").textContent = page.selecting;
-    if (page.runs.length > MOST_BUTTONS) {
+    if (page.groups.length) {
+      const select = element("select", { id: "group", "aria-label": "motors" });
+      page.groups.forEach(([name], k) => select.append(new Option(name, k)));
+      select.addEventListener("change", () => selectRun(firstOf(Number(select.value))));
+      holder.append(select, element("span", { id: "members", style: "display: contents" }));
+    } else if (page.runs.length > MOST_BUTTONS) {
       const select = element("select", { id: "run", "aria-label": page.selecting });
       page.runs.forEach((name, k) => select.append(new Option(name, k)));
       select.addEventListener("change", () => selectRun(Number(select.value)));
       holder.append(select);
     } else {
-      page.runs.forEach((name, k) => {
-        const radio = element("input", { type: "radio", name: "run", value: k });
-        radio.addEventListener("change", () => selectRun(k));
-        holder.append(element("label", {}, radio, name));
-      });
+      addButtons(holder, 0, page.runs.length);
     }
     for (const row of document.querySelectorAll("tr[data-run]")) row.addEventListener("click", () => selectRun(Number(row.dataset.run)));
     report.on("run", () => {
@@ -88,15 +112,16 @@ const begin = (() => {
     });
   }
 
-  // Tables that are wider than the screen fade where they go on, and a line says that they scroll.
+  // What is wider than the screen fades where it goes on; below tables a line says that they scroll.
   function showScrolling() {
-    for (const holder of document.querySelectorAll(".scroll")) {
+    for (const holder of document.querySelectorAll(".scroll, .runs")) {
       const hint = element("p", { class: "swipe", "aria-hidden": "true", hidden: "" }, "the table scrolls sideways →");
-      holder.before(hint);
+      if (holder.matches(".scroll")) holder.before(hint);
       const show = () => {
         const left = holder.scrollWidth - holder.clientWidth;
         hint.hidden = left < 2;
         holder.classList.toggle("goes-on", holder.scrollLeft < left - 2);
+        holder.classList.toggle("goes-back", holder.scrollLeft > 2);
       };
       holder.addEventListener("scroll", show, { passive: true });
       new ResizeObserver(show).observe(holder);

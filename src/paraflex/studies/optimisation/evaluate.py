@@ -51,11 +51,12 @@ class Evaluated:
     def reason(self) -> str:
         """Reason why the design cannot be used; empty if all runs are complete."""
         for row in self.rows:
+            whose = f'{row["path"]}, mode "{row["mode"]}": ' if row["mode"] else ""
             if row["status"] != STATUS_COMPLETE:
-                return f'{row["path"]}, mode "{row["mode"]}": {row["reason"]}'
+                return f"{whose}{row['reason']}"
             for column in self.counting:
                 if not _is_finite(row.get(column)):
-                    return f'{row["path"]}, mode "{row["mode"]}": {column} is no number'
+                    return f"{whose}{column} is no number"
         return ""
 
     @property

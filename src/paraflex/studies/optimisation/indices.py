@@ -149,11 +149,11 @@ def load_indices(
     number = samples if samples is not None else table.sampling.number or _BASE_SAMPLES
     _check_samples(number)
     at_most(number * (len(base.parameters) + 2), DESIGNS, "--samples", "too many designs")
-    wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].per_motor]
+    wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].each]
     columns = _columns(wanted, base)
     points = _salib_sample(base.setting.names, number, chosen)
     designs = np.stack([p.spread(column) for p, column in zip(base.parameters, points.T, strict=True)], axis=1)
-    study = SweepStudy(base.name, base.setting, base.parameters, "saltelli", designs, base.motors)
+    study = SweepStudy(base.name, base.setting, base.parameters, "saltelli", designs, base.members)
     return IndicesStudy(study, columns, number, chosen)
 
 
@@ -200,7 +200,7 @@ def _analysed(
     count = int(np.count_nonzero(kept))
     if count < _FEWEST_BASE_SAMPLES:
         raise InputError(
-            f"only {count} of {study.samples} base samples are complete in {names[1]}", field="vary",
+            f"only {count} of {study.samples} base samples are complete{names[1] and f' in {names[1]}'}", field="vary",
             remedy="narrow the ranges: reasons stand in the table",
         )  # fmt: skip
     values = values.reshape(study.samples, -1)[kept].ravel()
@@ -229,7 +229,7 @@ def _plain(value: Any) -> Any:
 
 
 def _columns(names: list[str], base: SweepStudy) -> tuple[str, ...]:
-    known = [column for name in base.setting.metrics for column in METRICS[name].columns(base.motors)]
+    known = [column for name in base.setting.metrics for column in METRICS[name].columns(base.members)]
     for name in names:
         if name not in known:
             raise InputError("not a metric of the study", field="--metric", value=name, remedy=suggestion(name, known))

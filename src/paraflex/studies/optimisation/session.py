@@ -120,7 +120,7 @@ def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
     """Columns of the table: those of a sweep, and exact derivatives of the metrics."""
     import pyarrow as pa
 
-    schema = table_schema(study.setting, study.base.motors)
+    schema = table_schema(study.setting, study.base.members)
     names = [slope_column(column, name) for column in study.columns for name in study.setting.names] if slopes else []
     for name in names:
         schema = schema.append(pa.field(name, pa.float64()))

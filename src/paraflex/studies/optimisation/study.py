@@ -21,6 +21,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.files.overlay import Place, number_at
 from paraflex.limits import DESIGNS, at_most
 from paraflex.mechanism import quantities
+from paraflex.results.metrics import Members
 from paraflex.studies.optimisation.schema import (
     GradientsName,
     MethodName,
@@ -153,12 +154,12 @@ def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) 
     sampling = SamplingTable(kind=RANDOM, number=1)
     base = make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
     for field, column in columns.items():
-        _check_column(field, column, base.motors)
+        _check_column(field, column, base.members)
     start = [
         _start(base.setting, places, p, table.vary[p.name].start)
         for p, places in zip(base.parameters, base.setting.places, strict=True)
     ]
-    return SweepStudy(base.name, base.setting, base.parameters, "search", np.array([start]), base.motors)
+    return SweepStudy(base.name, base.setting, base.parameters, "search", np.array([start]), base.members)
 
 
 def _check_range(field: str, entry: ParameterTable) -> None:
@@ -174,18 +175,20 @@ def _check_range(field: str, entry: ParameterTable) -> None:
         raise InputError("low and high are equal", field=f"{field}.high", value=entry.high, remedy="leave it out")
 
 
-def _check_column(field: str, column: str, motors: tuple[str, ...]) -> None:
+def _check_column(field: str, column: str, members: Members) -> None:
     """None if a metric is one number of each run."""
-    metric, known = metric_of(column), metric_of(column).columns(motors)
-    if metric.per_motor and column not in known:
+    metric, known = metric_of(column), metric_of(column).columns(members)
+    if metric.each and column not in known:
         raise InputError(
-            "this metric is one of each motor, and no motor is named",
+            f"this metric is one of each {metric.each}, and no {metric.each} is named",
             field=field,
             value=column,
             remedy=suggestion(column, known),
         )
     if column not in known:
-        raise InputError("not a metric per motor", field=field, value=column, remedy=f'say "{metric.name}"')
+        raise InputError(
+            "not a metric per motor, drive or joint", field=field, value=column, remedy=f'say "{metric.name}"'
+        )
 
 
 def _nominal(setting: Setting, place: Place, field: str) -> float:

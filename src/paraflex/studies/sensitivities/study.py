@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, hold_for, no_workers
 from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
-from paraflex.designs.derivatives.plans import nominal_values
+from paraflex.designs.derivatives.plans import check_has_path, nominal_values
 from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
 from paraflex.designs.run import Task
 from paraflex.designs.samples import Varied
@@ -254,6 +254,7 @@ def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> Sensiti
         chosen = list(metrics) or table.metrics
         _check_names(chosen)
         setting, parameters, _ = make_setting(table.model_copy(update={"metrics": chosen}), folder)
+        check_has_path(setting)
         if not chosen:
             setting = replace(setting, metrics=smooth_metrics(setting.metrics))
         if not parameters:

@@ -14,7 +14,7 @@ import xarray as xr
 
 from paraflex.campaign import tables_of
 from paraflex.compilation import compile_kernels_for
-from paraflex.designs.measure import beyond_limits
+from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.reopen import StudyFolder, open_study, run_again
 from paraflex.designs.run import Abandoned
 from paraflex.designs.schema import DEFAULT_NAME
@@ -157,6 +157,9 @@ def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> l
     beyond = int(np.sum(designs.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
     if beyond:
         notes.append(f"{beyond_limits(beyond)}.")
+    coarse = designs.reason[designs.complete & (designs.reason != "")]
+    if coarse.size:
+        notes.append(f"{coarse_runs(coarse.size)}; the first of them: {coarse[0]}.")
     if differ:
         why = "" if study.same_versions else " The versions of the packages are not those of the study."
         names = ", ".join(designs.label(row) for row in differ)

@@ -1,0 +1,96 @@
+"""What `paraflex linearise` prints: frequencies and damping, poles, zeros, and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from paraflex.cli.tables import plain_table, print_titled
+from paraflex.results.linear_summary import (
+    MAP_WORDS,
+    about,
+    common_poles,
+    motors_of_mode,
+    oscillations,
+    poles_of,
+    remarks,
+    roots,
+    zeros_of,
+)
+
+Complex = NDArray[np.complex128]
+Row = tuple[str, str, Complex]
+# Oscillations, poles and zeros of a row; linear.json has all.
+_OSCILLATIONS, _SHOWN = 6, 4
+# A damping ratio below this is none.
+_ROUNDING = 1e-7
+
+
+def print_linear(out: Console, data: xr.Dataset) -> None:
+    """All that is printed of linear models."""
+    modes = [str(mode) for mode in data["mode"].values]
+    states, held = data.sizes["state"], held_rows(data)
+    out.print(f"{data.attrs['mechanism']}, {about(data)}: {states} states", soft_wrap=True)
+    count = min(_OSCILLATIONS, max(len(oscillations(poles)) for _, _, poles in held))
+    if count:
+        damped = any(_percent(one.damping_ratio) for _, _, poles in held for one in oscillations(poles)[:count])
+        title = "Frequencies [Hz]" + (", damping ratios below [%]" if damped else "")
+        print_titled(out, title, _frequencies(held, count, damped))
+    if all(one.on_axis for _, _, poles in held for one in roots(poles)):
+        zero = int(np.count_nonzero(held[0][2] == 0.0))
+        free = f"; {zero} at zero" + (" with motors free" if len(held) > 1 else "") if zero else ""
+        out.print(f"All poles are on the imaginary axis, 2 pi times these frequencies{free}")
+    else:
+        print_titled(out, "Poles", _roots(held, ("mode", "motors")))
+    maps = [str(name) for name in data["map"].values]
+    rows = [(mode, MAP_WORDS[name], zeros_of(data, mode, name)) for name in maps for mode in modes]
+    if rows:
+        print_titled(out, "Zeros", _roots(rows, ("mode", "of")))
+    if any(one.right for _, _, values in (*held, *rows) for one in roots(values)):
+        out.print("* in the right half plane")
+    for sentence in remarks(data):
+        out.print(sentence, soft_wrap=True)
+
+
+def held_rows(data: xr.Dataset) -> list[Row]:
+    """Modes, whether their motors are free or held, and poles; modes in common where all have the same."""
+    modes = [str(mode) for mode in data["mode"].values]
+    common = common_poles(data)
+    rows = [("all", "free", common)] if common is not None else [
+        (mode, "free" if motors_of_mode(data, mode) else "none", poles_of(data, mode, "free")) for mode in modes
+    ]  # fmt: skip
+    return rows + [(mode, "held", poles_of(data, mode, "held")) for mode in modes if motors_of_mode(data, mode)]
+
+
+def _frequencies(rows: Sequence[Row], count: int, damped: bool) -> Table:
+    def cells(poles: Complex) -> list[str]:
+        texts = [f"{one.frequency:.4g}" + (f"\n{_percent(one.damping_ratio) or '0'}" if damped else "")
+                 for one in oscillations(poles)[:count]]  # fmt: skip
+        return texts + [""] * (count - len(texts))
+
+    heads = [str(k + 1) for k in range(count)]
+    return plain_table(
+        "mode", "motors", numbers=heads, rows=([mode, held, *cells(poles)] for mode, held, poles in rows)
+    )
+
+
+def _percent(ratio: float) -> str:
+    """A damping ratio in percent; empty where it is rounding."""
+    return f"{100.0 * ratio:.2g}" if abs(ratio) > _ROUNDING else ""
+
+
+def _roots(rows: Sequence[Row], heads: tuple[str, str]) -> Table:
+    """The lowest poles or zeros of each row, and how many more there are."""
+
+    def text(values: Complex) -> str:
+        found = roots(values)
+        more = f", and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+        return ", ".join(one.text for one in found[:_SHOWN]) + more if found else "none"
+
+    lines = ([mode, which, text(values)] for mode, which, values in rows)
+    return plain_table(*heads, "lowest", rows=lines, wrapped=("lowest",))

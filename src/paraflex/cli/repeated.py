@@ -1,0 +1,95 @@
+"""Runs of a folder of results, made again from what it was asked for: results do not hold all that a run has."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator, Sequence
+
+import xarray as xr
+from typer.main import get_command
+
+from paraflex.cli.commands.requests import filled
+from paraflex.cli.commands.runs import RunRequest
+from paraflex.cli.integration import integration_options
+from paraflex.cli.motion import own_motion, start_of
+from paraflex.cli.request import asked_model, find_path, plan_study
+from paraflex.cli.run import asked_mechanism
+from paraflex.cli.tables import plain_console
+from paraflex.compilation import compile_kernels_for
+from paraflex.errors import InputError
+from paraflex.files import Model
+from paraflex.mechanism import proportional_segments
+from paraflex.motion import MotionRun, simulate_motion
+from paraflex.report.provenance import asked, run_command_line
+from paraflex.results.kinds import kind_of
+from paraflex.results.storage import open_results
+from paraflex.tracking import TrackingRun, simulate
+
+_OTHER = "name the folder of paraflex run"
+
+
+def repeated_runs(results: str, modes: Sequence[str] = ()) -> tuple[Model, Iterator[TrackingRun | MotionRun]]:
+    """The model of some results, and their runs made again: of all their modes, or of some.
+
+    Raises
+    ------
+    InputError
+        They are no run's, of kineto-elastodynamics, do not tell what was asked for, or their model's file has changed;
+        or a mode that they do not have.
+    """
+    data = open_results(results)
+    if kind_of(data) not in ("tracking", "motion"):
+        raise InputError(f"these are results of kind {kind_of(data)}", field=results, remedy=_OTHER)
+    request = _request(data, results)
+    model = _model(data, request, results)
+    names = [str(name) for name in data["mode"].values] if "mode" in data.dims else []
+    for name in modes:
+        if name not in names:
+            raise InputError(
+                "no such mode in these results", field="--mode", value=name,
+                remedy=f"one of {', '.join(names)}" if names else "leave it out: the run has none",
+            )  # fmt: skip
+    return model, _runs(model, request, asked(data).get("path"), modes or names)
+
+
+def _model(data: xr.Dataset, request: RunRequest, results: str) -> Model:
+    """The model that a run was of, from its file, if that says the same as then."""
+    model = asked_model(request.model)
+    then, now = json.loads(data.attrs["parameters"]).get("model"), json.loads(json.dumps(dict(model.parameters)))
+    if then != now:
+        raise InputError(
+            f"these results are of another state of {request.model.name}", field=results,
+            remedy="run it again, then linearise",
+        )  # fmt: skip
+    return model
+
+
+def _request(data: xr.Dataset, results: str) -> RunRequest:
+    from paraflex.cli.app import app  # which imports the commands
+
+    run = asked(data)
+    if not run or run.get("ked"):
+        why = "of kineto-elastodynamics, which has no equations of motion" if run else "not told how they were made"
+        raise InputError(f"these results are {why}", field=results, remedy=_OTHER)
+    command = get_command(app).commands["run"]  # type: ignore[attr-defined]
+    return filled(RunRequest, command.make_context("run", shlex.split(run_command_line(run))[2:]).params)
+
+
+def _runs(
+    model: Model, request: RunRequest, path: str | None, modes: Sequence[str]
+) -> Iterator[TrackingRun | MotionRun]:
+    mechanism, options = asked_mechanism(model, request), integration_options(request, model.study)
+    compile_kernels_for(mechanism, plain_console(stderr=True).print)
+    if path is None:
+        study = own_motion(model, request.plan)
+        start = start_of(model, mechanism, study.assembly, balanced=request.balanced) or study.assembly
+        yield simulate_motion(
+            mechanism, study.duration, samples=study.samples, torques=study.torques, start=start, options=options
+        )
+        return
+    task = plan_study(model, mechanism, *find_path(model, path), request.plan, request.after)
+    if request.segments is not None:
+        task = task.in_segments(proportional_segments(mechanism, request.segments))
+    for mode in modes:
+        yield simulate(task, mode, options=options, warning=False)

@@ -1,0 +1,167 @@
+"""What a run does between the samples that it keeps: whether its largest loads are those of the samples.
+
+A run keeps few samples of many steps. Its time loop takes more at hardly any cost, from which the largest loads are
+found once more; those that were asked for are kept.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.arrays import Array
+from paraflex.dynamics import System
+from paraflex.dynamics.joint_loads import drive_torques, joint_loads
+from paraflex.dynamics.sections import sections_of
+from paraflex.findings import Finding
+from paraflex.integrators.solution import Solution
+
+# Code of the finding, and its place: the number of samples.
+COARSE = "samples-coarse"
+SAMPLES = "study.samples"
+# How many times as many samples are looked at, and how many at least.
+_FINER, _LEAST = 2, 1401
+# Coordinates at all of them together that are at most worth the memory.
+_MOST_NUMBERS = 4_000_000
+# Numbers of one kind of load that are worked on at a time: in a processor's cache.
+_AT_A_TIME = 20_000
+# Loads below these do not matter: stress [MPa], and forces as a part of all weight.
+_NO_STRESS, _NO_FORCE = 1e-3, 1e-3
+_GRAVITY = 9.81
+# By how much larger a load is between samples for a finding, and how nearly those of the remedy have it.
+LARGER, _NEARLY = 0.05, 0.01
+
+
+class Between(NamedTuple):
+    """Times of samples with others between them.
+
+    Attributes
+    ----------
+    times : (k,) array
+        [s]
+    asked : (k,) array of bool
+        Which are to be kept.
+    """
+
+    times: Array
+    asked: NDArray[np.bool_]
+
+    def kept(self, solution: Solution) -> Solution:
+        """The samples that were asked for, and the state at an event."""
+        keep = np.ones(solution.t.size, dtype=bool)
+        count = solution.t.size - bool(solution.event)
+        keep[:count] = self.asked[:count]
+        names = ("t", "q", "v", "a", "multipliers", "kinetic_energy", "strain_energy", "work")
+        return replace(solution, **{name: getattr(solution, name)[keep] for name in names})
+
+
+def with_between(times: Array, coordinates: int) -> Between | None:
+    """Times with others evenly between them; None where there are none between, or these would take too much memory.
+
+    Parameters
+    ----------
+    times : (k,) array
+        Of samples, ascending [s].
+    coordinates : int
+        Of the system.
+    """
+    pieces = times.size - 1
+    if pieces < 1:
+        return None
+    finer = max(_FINER, math.ceil((_LEAST - 1) / pieces))
+    if pieces * finer * coordinates > _MOST_NUMBERS:
+        return None
+    fractions = np.arange(finer) / finer
+    steps = times[:-1, None] + np.diff(times)[:, None] * fractions
+    asked = np.broadcast_to(fractions == 0.0, steps.shape)
+    return Between(np.append(steps.ravel(), times[-1]), np.append(asked.ravel(), True))
+
+
+def samples_too_few(system: System, whole: Solution, kept: Solution, samples: int) -> Finding | None:
+    """A finding on loads that are larger between the samples that a run keeps; None where they are not.
+
+    Parameters
+    ----------
+    system : System
+    whole, kept : Solution
+        Of the run, with the samples in between and without.
+    samples : int
+        That the run was asked for.
+    """
+    if whole.t.size == kept.t.size:
+        return None
+    weight = _GRAVITY * system.total_mass
+    least = {"MPa": _NO_STRESS, "N": _NO_FORCE * weight, "N m": _NO_FORCE * weight * system.size}
+    found, times_as_many = [], 1.0
+    # Of a run that failed, numbers may be beyond all bounds.
+    with np.errstate(all="ignore"):
+        for name, unit, loads in _largest_loads(system, whole):
+            most, most_kept = float(np.max(loads)), float(np.max(loads[np.isin(whole.t, kept.t)]))
+            if most > max((1.0 + LARGER) * most_kept, least[unit]):
+                when = whole.t[np.argmax(loads)]
+                found.append(
+                    f"{name} is up to {most_kept:.4g} {unit} in them and {most:.4g} {unit} at t = {when:.4g} s"
+                )
+                enough = (whole.t.size - 1) / _widest(loads, (1.0 - _NEARLY) * most)
+                times_as_many = max(times_as_many, enough / max(kept.t.size - 1, 1))
+    if not found:
+        return None
+    remedy = _round_number(times_as_many * (samples - 1)) + 1
+    text = f"{samples} samples are too few to show the largest loads: {'; '.join(found)}"
+    return Finding(COARSE, SAMPLES, text, f"say samples = {remedy}")
+
+
+def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, str, Array]]:
+    """The largest of each kind of load at all samples (k,), with its name and unit."""
+    multipliers = np.nan_to_num(solution.multipliers)
+    motion = solution.q, solution.v, solution.a, multipliers
+    sections = sections_of(system)
+    if sections is not None and np.isfinite(sections.modulus).any():
+
+        def stress(q: Array, v: Array, a: Array, multipliers: Array) -> Array:
+            return np.nan_to_num(sections.loads(system, q, v, a, multipliers).stress)
+
+        yield "the stress", "MPa", 1e-6 * _largest(stress, motion, len(sections.owners))
+    # At singular positions forces have poles.
+    if solution.singular_positions:
+        return
+    names = [joint.name for joint in system.mechanism.joints]
+    if names:
+
+        def force(q: Array, v: Array, a: Array, multipliers: Array) -> Array:
+            none = np.zeros((len(q), len(system.mechanism.motors)))
+            return np.linalg.norm(joint_loads(system, names, q, multipliers, none).force, axis=2)
+
+        yield "the force in a joint", "N", _largest(force, motion, 2 * len(names))
+    for one, effort in zip(system.mechanism.prescribed, drive_torques(system, multipliers).T, strict=True):
+        unit = "N" if system.mechanism.slides(one.joint) else "N m"
+        yield f"the {'force' if unit == 'N' else 'torque'} of drive {one.name}", unit, np.abs(effort)
+
+
+def _largest(loads: Callable[..., Array], motion: Sequence[Array], width: int) -> Array:
+    """The largest of loads (j, width) of each of k samples (k,), of some samples at a time."""
+    count = max(_AT_A_TIME // width, 1)
+    parts = [
+        np.max(loads(*(each[first : first + count] for each in motion)), axis=1)
+        for first in range(0, len(motion[0]), count)
+    ]
+    return np.concatenate(parts)
+
+
+def _widest(loads: Array, enough: float) -> int:
+    """The most samples in one, such that all that are closer still have enough as their largest."""
+    step = 1
+    while step + 1 < loads.size and np.max(loads[:: step + 1]) >= enough:
+        step += 1
+    return step
+
+
+def _round_number(number: float) -> int:
+    """The next larger number of two digits and zeros."""
+    unit = 10 ** max(int(math.log10(max(number, 1.0))) - 1, 0)
+    return unit * math.ceil(number / unit)

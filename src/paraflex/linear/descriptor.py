@@ -1,0 +1,147 @@
+"""The equations of small motions at one s without elimination: as sparse as the mechanism.
+
+With dq = q, dv = s q + c and da = s^2 q + d, where c and d are what the rates of the motion itself add,
+
+    [s^2 M + s D + K, H^T] [q; lambda] = [S u - D c - M d; u_d + s x_1 + x_2]
+    [H, 0]
+    G c + G' q = [0; -x_1],    G d + G''_q q + G''_v (s q + c) = [0; -s x_1 - x_2]
+
+G = [Phi_q; T] and H the rows of the constraints and of coordinates that are driven, these times s^2. (x_1, x_2) is
+added to the derivatives of the states: s x = A x + B u + (x_1, x_2). At rest G' and G'' are zero, and c and d known.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from paraflex.arrays import Array, Numbers
+from paraflex.dynamics.sensors import SensorRows
+from paraflex.dynamics.sparse import Factor
+from paraflex.linear.minimal import Minimal
+
+Complex = NDArray[np.complex128]
+# Of the starting vector of the search for poles.
+_SEED = 0
+
+
+class SmallMotion(NamedTuple):
+    """Amplitudes of a small motion: of coordinates and their derivatives (n, k), and of multipliers (m, k)."""
+
+    q: Numbers
+    v: Numbers
+    a: Numbers
+    multipliers: Numbers
+
+
+class Descriptor:
+    """The equations at one s, factored; real where s is.
+
+    Parameters
+    ----------
+    minimal : Minimal
+        Whose matrices they have, none of them dense.
+    s : complex or float
+        [rad/s]
+    """
+
+    def __init__(self, minimal: Minimal, s: complex) -> None:
+        self.minimal: Minimal = minimal
+        self.s: complex = s
+        whole, rows = minimal.tangents.whole, minimal.held_rows
+        mass, damping, stiffness = whole.mass, whole.damping, whole.stiffness
+        weight = np.ones(rows.number.size, dtype=np.result_type(s))
+        weight[weight.size - minimal.driven :] = s**2
+        square = abs(s) ** 2 * mass.diagonal() + np.abs(stiffness.diagonal())
+        column = 1.0 / np.sqrt(np.where(square > 0.0, square, mass.diagonal()))
+        size = 1.0 / scipy.sparse.linalg.norm(rows.jacobian @ scipy.sparse.diags(column), axis=1)
+        held, corner = scipy.sparse.diags(weight) @ rows.jacobian, csr_matrix((rows.number.size, rows.number.size))
+        blocks = [[s**2 * mass + s * damping + stiffness, rows.jacobian.T], [held, corner]]
+        units = [column, size]
+        if not minimal.point.at_rest:
+            along, first, place, rate = self._of_motion
+            blocks[0] += [damping, mass]
+            blocks[1] += [None, None]
+            blocks += [[first, None, along, None], [place + s * rate, None, rate, along]]
+            units += [column, column]
+        self._factor = Factor(csr_matrix(scipy.sparse.bmat(blocks)), np.concatenate(units))
+
+    @cached_property
+    def _of_motion(self) -> tuple[csr_matrix, csr_matrix, csr_matrix, csr_matrix]:
+        """G, G', G''_q and G''_v."""
+        minimal = self.minimal
+        bodies = minimal.chosen.bodies
+        parts = [scipy.sparse.vstack(pair) for pair in zip(minimal.constraints[:4], minimal.joints[:4], strict=True)]
+        own = csr_matrix((np.ones(bodies.size), (np.arange(bodies.size), bodies)), (bodies.size, minimal.system.n))
+        more = [own, *(csr_matrix((bodies.size, minimal.system.n)) for _ in range(3))]
+        whole = [csr_matrix(scipy.sparse.vstack(pair)) for pair in zip(parts, more, strict=True)]
+        return whole[0], whole[1], whole[2], whole[3]
+
+    @cached_property
+    def _inputs(self) -> csr_matrix:
+        """Forces and accelerations of driven coordinates (n + held, inputs) by the inputs."""
+        minimal, held = self.minimal, self.minimal.held_rows.number.size
+        driven = scipy.sparse.eye(held, minimal.driven, minimal.driven - held)
+        return csr_matrix(scipy.sparse.block_diag([minimal.forces, driven]))
+
+    def response(self, inputs: NDArray[np.int64]) -> SmallMotion:
+        """Amplitudes under some of the inputs, each of size one."""
+        return self._solved(self._inputs[:, inputs].toarray(), np.zeros((2, self.minimal.chosen.freedoms, inputs.size)))
+
+    def states(self, added: Array) -> Array:
+        """States (2f,) where this (2f,) is added to their derivatives, of a real s."""
+        minimal = self.minimal
+        x = np.reshape(added, (2, -1, 1))
+        joints = minimal.chosen.joints.size
+        right = np.zeros((minimal.system.n + minimal.held_rows.number.size, 1))
+        if minimal.driven:
+            right[-minimal.driven :] = (self.s * x[0] + x[1])[joints - minimal.driven : joints]
+        q = self._solved(right, x).q
+        y = np.concatenate([minimal.joints.jacobian @ q, q[minimal.chosen.bodies]])
+        return np.concatenate([y, self.s * y - x[0]]).ravel()
+
+    def _solved(self, right: Numbers, added: Array) -> SmallMotion:
+        """The motion from the right-hand side of the first two equations and what is added to the states."""
+        minimal, s, n = self.minimal, self.s, self.minimal.system.n
+        whole, of_rates = minimal.tangents.whole, np.stack([added[0], s * added[0] + added[1]])
+        if not np.any(added):
+            of_rates = np.zeros((2, minimal.chosen.freedoms, right.shape[1]))
+        if minimal.point.at_rest:
+            c, d = (-minimal.coordinates(np.zeros((minimal.chosen.constraints.size, each.shape[1])), each)
+                    for each in of_rates)  # fmt: skip
+            right[:n] -= whole.damping @ c + whole.mass @ d
+            q, lam = np.split(self._factor.solve(right), [n])
+        else:
+            more = np.zeros((2, n, right.shape[1]), dtype=of_rates.dtype)
+            more[:, n - minimal.chosen.freedoms :] = -of_rates
+            found = self._factor.solve(np.vstack([right, *more]))
+            q, lam, c, d = np.split(found, np.cumsum([n, minimal.held_rows.number.size, n]))
+        v, a = s * q + c, s**2 * q + d
+        multipliers = np.zeros((minimal.system.m, q.shape[1]), dtype=q.dtype)
+        multipliers[minimal.held_rows.number] = lam
+        multipliers[minimal.tangents.compliant] = whole.compliant_place @ q + whole.compliant_rate @ v
+        return SmallMotion(q, v, a, multipliers)
+
+
+def response_at(minimal: Minimal, rows: SensorRows, inputs: NDArray[np.int64], s: complex) -> Complex:
+    """Response (outputs, inputs) of sensors' rows to some of the inputs."""
+    found = Descriptor(minimal, complex(s)).response(inputs)
+    out = rows.q @ found.q + rows.v @ found.v + rows.a @ found.a + rows.multipliers @ found.multipliers
+    own = np.nonzero(inputs < minimal.motors.size)[0]
+    out[:, own] += rows.torques[:, minimal.motors[inputs[own]]].toarray()
+    return out
+
+
+def poles_near(minimal: Minimal, distance: float, count: int) -> Complex:
+    """So many poles nearest to a place on the positive real axis [rad/s], by Arnoldi's method on the inverse."""
+    at = Descriptor(minimal, distance)
+    n = 2 * minimal.chosen.freedoms
+    inverse = scipy.sparse.linalg.LinearOperator((n, n), matvec=lambda x: at.states(x.ravel()), dtype=np.dtype(float))
+    start = np.random.default_rng(_SEED).standard_normal(n)
+    theta = scipy.sparse.linalg.eigs(inverse, k=count, v0=at.states(start), return_eigenvectors=False)
+    return np.asarray(distance - 1.0 / np.asarray(theta), dtype=complex)

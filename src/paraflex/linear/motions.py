@@ -1,0 +1,105 @@
+"""Free motions of linear models: undamped modes and poles, some of the motors held."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from paraflex.arrays import Array
+from paraflex.dynamics.linearise import undamped_modes
+
+Complex = NDArray[np.complex128]
+# Damping of a modal coordinate below this part of the largest is rounding.
+_ROUNDING = 1e-13
+
+
+class Motions(NamedTuple):
+    """Free motions about a point of a motion, inputs zero.
+
+    Attributes
+    ----------
+    frequencies : (k,) array
+        Of the undamped modes, ascending [rad/s]; zero for motions that are free or grow.
+    shapes : (n, k) array
+        Changes of all coordinates of the system in them, of unit modal mass.
+    poles : (2k,) array
+        By magnitude [rad/s].
+    pole_shapes : (n, 2k) array
+        Changes of all coordinates in the motion of each pole.
+    """
+
+    frequencies: Array
+    shapes: Array
+    poles: Complex
+    pole_shapes: Complex
+
+
+class SecondOrder(NamedTuple):
+    """mass y'' + damping y' + stiffness y = 0 in coordinates y, each (f, f), and a low frequency squared.
+
+    `vibrating` says that the stiffness is symmetric: undamped poles are then exact square roots.
+    """
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    typical: float
+    vibrating: bool
+
+    def within(self, basis: Array) -> SecondOrder:
+        """The same in coordinates z of a subspace (f, k), y = basis z."""
+        mass, damping, stiffness = (basis.T @ part @ basis for part in self[:3])
+        return SecondOrder(mass, damping, stiffness, self.typical, self.vibrating)
+
+
+def modal_damping(damping: Array, shapes: Array) -> Array:
+    """Damping (k, k) between modes of unit mass (f, k), zero where it is rounding."""
+    found = shapes.T @ damping @ shapes
+    return np.where(np.abs(found) > _ROUNDING * np.max(np.abs(found), initial=0.0), found, 0.0)
+
+
+def motions(equations: SecondOrder, directions: Array) -> Motions:
+    """Free motions of second-order equations.
+
+    Parameters
+    ----------
+    equations : SecondOrder
+    directions : (n, k) array
+        Changes of all coordinates of the system with those of the equations.
+    """
+    squares, shapes = undamped_modes(
+        equations.mass, 0.5 * (equations.stiffness + equations.stiffness.T), equations.typical
+    )
+    drawn, k = directions @ shapes, squares.size
+    damping = modal_damping(equations.damping, shapes)
+    stiffness = np.diag(squares) if equations.vibrating else shapes.T @ equations.stiffness @ shapes
+    if equations.vibrating and not np.any(damping):
+        root = np.sqrt(-squares.astype(complex))
+        poles, vectors = np.concatenate([root, -root]), np.hstack([np.eye(k), np.eye(k)]).astype(complex)
+    else:
+        # Free motions without damping have double poles, which an eigenvalue solver would take apart.
+        free = (squares == 0.0) & ~np.any(damping, axis=1) & equations.vibrating
+        omega = np.sqrt(np.maximum(squares, 0.0) + equations.typical)
+        poles, vectors = _first_order(omega, stiffness, damping, np.flatnonzero(~free))
+        poles = np.concatenate([np.zeros(2 * int(free.sum()), dtype=complex), poles])
+        vectors = np.hstack([np.eye(k)[:, free], np.eye(k)[:, free], vectors])
+    order = np.argsort(np.abs(poles), kind="stable")
+    return Motions(
+        np.sqrt(np.maximum(squares, 0.0)), drawn, poles[order], np.asarray(drawn @ vectors[:, order], dtype=complex)
+    )
+
+
+def _first_order(omega: Array, stiffness: Array, damping: Array, kept: NDArray[np.intp]) -> tuple[Complex, Complex]:
+    """Poles (2 kept,) of eta'' + damping eta' + stiffness eta = 0, and eta (k, 2 kept) in their motions.
+
+    States are omega eta, of sizes alike, and eta'.
+    """
+    m, within = kept.size, np.ix_(kept, kept)
+    scaled = np.hstack([-stiffness[within] / omega[kept], -damping[within]])
+    poles, vectors = scipy.linalg.eig(np.vstack([np.diag(omega[kept]) @ np.eye(m, 2 * m, m), scaled]))
+    out = np.zeros((omega.size, 2 * m), dtype=complex)
+    out[kept] = vectors[:m] / omega[kept, None]
+    return np.asarray(poles, dtype=complex), out

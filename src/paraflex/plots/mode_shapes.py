@@ -1,0 +1,82 @@
+"""The mechanism in its lowest undamped modes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from paraflex.errors import InputError
+from paraflex.plots.drawing import Sketch, bare
+from paraflex.plots.given import drawn
+from paraflex.plots.labels import plain
+from paraflex.plots.layout import MM, TWO_COLUMNS, is_narrow, page_width
+from paraflex.plots.scene import Scene, common_limits, scene
+from paraflex.plots.selection import default_mode, names_of, place_of
+from paraflex.plots.themes import theme
+from paraflex.results.linear_data import HOLDINGS
+from paraflex.results.linear_motion import SWING, DrawnMode, drawn_modes, modal_motion
+from paraflex.results.linear_summary import HELD_WORDS
+
+# Room for a panel's title, and for that of a row [mm].
+_TITLE, _ROW = 4.5, 5.0
+# Shapes are drawn magnified twice: beside what is magnified the undeformed mechanism is drawn.
+_QUARTER = np.array([np.pi / 2.0])
+
+
+@drawn
+def mode_shapes(data: xr.Dataset, mode: str | None = None, count: int = 4, theme_name: str = "light") -> Figure:
+    """Shapes of the lowest undamped modes that vibrate, motors free above and those of the mode held below.
+
+    The undeformed mechanism is pale. Displacements are drawn linear, of one size.
+
+    Parameters
+    ----------
+    count : int
+        Shapes in a row.
+    theme_name : str
+        "light" or "dark".
+    """
+    mode = default_mode(data) if mode is None else mode
+    place_of(mode, names_of(data, "mode"), "mode")
+    own = [one for one in drawn_modes(data, rigid=False) if one.mode in ("", mode)]
+    rows = {holding: [one for one in own if one.holding == holding][: max(count, 1)] for holding in HOLDINGS}
+    rows = {holding: shown for holding, shown in rows.items() if shown}
+    if not rows:
+        raise InputError("nothing vibrates", field="data", remedy="look at the poles")
+    scenes = {one: _scene(data, one) for shown in rows.values() for one in shown}
+    return _panels(rows, scenes, mode, theme_name)
+
+
+def _scene(data: xr.Dataset, one: DrawnMode) -> Scene:
+    found = scene(modal_motion(data, one, _QUARTER, 0.6 * SWING), _QUARTER, 2.0)
+    return replace(found, trail=None, followed=None)
+
+
+def _panels(rows: dict[str, list[DrawnMode]], scenes: dict[DrawnMode, Scene], mode: str, theme_name: str) -> Figure:
+    """A panel for each shape, a row for each way to hold the motors, or more where a column of print is narrow."""
+    look, width = theme(theme_name), page_width(TWO_COLUMNS)
+    columns = min(2 if is_narrow() else 4, max(map(len, rows.values())))
+    limits = common_limits([*scenes.values()])
+    aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), 0.4, 1.6))
+    limits, wide = limits.fitted(1.0 / aspect), width / columns
+    high = wide * aspect + _TITLE
+    lines = {holding: -(-len(shown) // columns) for holding, shown in rows.items()}
+    height = sum(lines.values()) * high + len(rows) * _ROW
+    figure, top = Figure(figsize=(width * MM, height * MM), facecolor=look.ground), height
+    for holding, shown in rows.items():
+        title = f"{HELD_WORDS[holding]}" + (f", mode {plain(mode)}" if holding == "held" else "")
+        figure.text(0.01, (top - 0.8) / height, title, va="top", fontsize=8.0, color=look.ink, fontweight="bold")
+        top -= _ROW
+        for k, one in enumerate(shown):
+            line, column = divmod(k, columns)
+            bottom = top - (line + 1) * high
+            axes = bare(
+                figure.add_axes((column / columns, bottom / height, 1.0 / columns, wide * aspect / height)), limits
+            )
+            Sketch(axes, scenes[one], limits, look, width=0.45).show(0)
+            axes.set_title(f"{one.frequency:.4g} Hz", fontsize=8.0, color=look.ink, pad=1.0)
+        top -= lines[holding] * high
+    return figure

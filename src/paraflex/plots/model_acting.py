@@ -1,0 +1,113 @@
+"""Arrows of what acts on a mechanism before it runs: loads with their sizes, and which way it is driven first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.plots.marks import round_arrow, straight_arrow
+from paraflex.plots.scene import ARROW, BLOCK, TURN, DrawnJoint, Limits, Scene
+from paraflex.plots.signs import Arrow
+from paraflex.results.acting import ActingLoad, acting_load
+from paraflex.results.posed import Posed
+
+Array = NDArray[np.float64]
+
+# Shortest arrow of a load against that of the largest.
+_SHORTEST = 0.35
+# From where and how far a torque's arrow goes, and that of a first turn, anticlockwise [rad].
+_TURN_FROM, _TURN_BY = -0.4, 1.5 * np.pi
+_MOVE_FROM, _MOVE_BY = -0.15, np.pi + 0.3
+# Radius of the arrow of a first turn, how much larger the next at its place is, and half the length of that of a first
+# travel, as parts of the picture's larger side.
+_MOVE, _NEXT, _TRAVEL = 0.028, 0.012, 0.028
+_HEAD = 0.6
+
+
+@dataclass(frozen=True)
+class LoadArrow:
+    """A load's arrow, its name and size, where these may stand (k, 2), and whether it does not act at the start."""
+
+    arrow: Arrow
+    name: str
+    size: str
+    later: bool
+    named: Array
+
+
+@dataclass(frozen=True)
+class Acting:
+    """Arrows of the loads, and of first movements of motors and prescribed motions."""
+
+    loads: tuple[LoadArrow, ...]
+    moves: tuple[Arrow, ...]
+
+
+def acting_arrows(posed: Posed, shown: Scene, limits: Limits) -> Acting:
+    """Arrows of a mechanism at the pose it starts from."""
+    acting = [acting_load(load, posed.duration) for load in posed.mechanism.loads]
+    largest = {kind: max((one.largest for one in acting if one.load.kind == kind), default=0.0) for kind in
+               ("force", "torque")}  # fmt: skip
+    loads = [_load_arrow(posed, one, largest[one.load.kind], limits) for one in acting]
+    return Acting(tuple(loads), tuple(_moves(posed, shown, limits)))
+
+
+def load_places(posed: Posed, size: float) -> Array:
+    """Tails (n, 2) of the arrows of forces, each as long as the longest, in a picture of a size [m]."""
+    tails = [np.zeros((0, 2))]
+    for load in posed.mechanism.loads:
+        shown = acting_load(load, posed.duration).shown
+        if load.kind == "force" and shown.any():
+            tails.append((posed.place(load.point) - ARROW * size * shown / np.linalg.norm(shown))[None])
+    return np.concatenate(tails)
+
+
+def _load_arrow(posed: Posed, one: ActingLoad, largest: float, limits: Limits) -> LoadArrow:
+    at, size = posed.place(one.load.point)[None], float(np.linalg.norm(one.shown))
+    share = max(_SHORTEST, size / largest) if size else 0.0
+    if one.load.kind == "force":
+        tail = at - ARROW * limits.size * share * one.shown / (size or 1.0)
+        line, head = straight_arrow(tail, at, limits)
+        named = np.vstack([0.8 * tail + 0.2 * at, tail])
+    else:
+        sweep = np.sign(one.shown) * share * _TURN_BY
+        line, head = round_arrow(at, TURN * limits.size, _TURN_FROM, sweep, limits)
+        named = np.vstack([line[0, 0], line[0, 20], at[0]])
+    arrow = Arrow(line[0], head[0], round=one.load.kind != "force")
+    return LoadArrow(arrow, one.load.name, one.size, one.later, named)
+
+
+def _moves(posed: Posed, shown: Scene, limits: Limits) -> list[Arrow]:
+    """Arrows of joints that begin to move; those at one place beside one another."""
+    arrows: list[Arrow] = []
+    placed: list[Array] = []
+    for joint in shown.joints:
+        sign = posed.moves.get(joint.name, 0)
+        if not sign or joint.name in posed.gaps:
+            continue
+        # What is seen to move is not the ground.
+        sign = -sign if posed.mechanism.joint(joint.name).b.on_ground else sign
+        before = sum(bool(np.allclose(joint.place[0], place, atol=1e-6 * limits.size)) for place in placed)
+        placed.append(joint.place[0])
+        arrows.append(_slide(joint, sign, before, limits) if joint.slides else _turn(joint, sign, before, limits))
+    return arrows
+
+
+def _turn(joint: DrawnJoint, sign: int, before: int, limits: Limits) -> Arrow:
+    start = _MOVE_FROM if sign > 0 else _MOVE_FROM + _MOVE_BY
+    radius = (_MOVE + before * _NEXT) * limits.size
+    line, head = round_arrow(joint.place[:1], radius, start, np.array([sign * _MOVE_BY]), limits, _HEAD)
+    return Arrow(line[0], head[0], round=True)
+
+
+def _slide(joint: DrawnJoint, sign: int, before: int, limits: Limits) -> Arrow:
+    along = np.array([[np.cos(joint.direction[0]), np.sin(joint.direction[0])]])
+    across = along[:, ::-1] * [-1.0, 1.0]
+    # On the side that the ground is not drawn on.
+    across = across if across[0, 1] > 0.0 or (across[0, 1] == 0.0 and across[0, 0] < 0.0) else -across
+    middle = joint.place[:1] + (0.5 * BLOCK[1] + (before + 1) * _NEXT) * limits.size * across
+    half = sign * _TRAVEL * limits.size * along
+    line, head = straight_arrow(middle - half, middle + half, limits, _HEAD)
+    return Arrow(line[0], head[0])

@@ -1,0 +1,153 @@
+"""What acts on a mechanism over a study: sizes of its loads, and which way its joints are driven."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.dynamics import System, joint_coordinate
+from paraflex.mechanism import AngleLaw, Load, Mechanism, PrescribedAngle, TabulatedLaw
+from paraflex.mechanism.laws import marks
+
+Array = NDArray[np.float64]
+
+# Times that a law is looked at, besides its knots and rows; of a study without a duration within the first second.
+_LOOKS, _FIRST = 1001, 1.0
+# Values below this share of the largest are none: rounding of expressions.
+_NOTHING = 1e-9
+# A joint has moved by more than this share of its travel.
+_MOVED = 1e-2
+_HALVINGS = 50
+# A load that begins before this share of the study acts from its start.
+_AT_ONCE = 1e-6
+# From here on loads are in kN and kN m.
+_LARGE = 1e4
+
+
+@dataclass(frozen=True)
+class ActingLoad:
+    """A load over a study.
+
+    Attributes
+    ----------
+    load : Load
+    shown : (c,) array
+        Its components at the start; of a load that is zero there, when it is largest [N, N m].
+    begins : float or None
+        When it first acts [s]; None if it never does.
+    largest : float
+        Its largest magnitude [N, N m].
+    grows : bool
+        Whether it is zero at the start only.
+    """
+
+    load: Load
+    shown: Array
+    begins: float | None
+    largest: float
+    grows: bool = False
+
+    @property
+    def later(self) -> bool:
+        """Whether it does not act at the start."""
+        return self.begins != 0.0
+
+    @property
+    def size(self) -> str:
+        """Its size with unit: at the start, or from when it acts, with the largest where that is more."""
+        unit = self.load.unit
+        if self.begins is None:
+            return f"0 {unit}"
+        if self.later:
+            return f"{sized(self.largest, unit)} from {self.begins:.3g} s"
+        if self.grows:
+            return f"up to {sized(self.largest, unit)}"
+        first = float(np.linalg.norm(self.shown))
+        more = f", up to {sized(self.largest, unit)}" if self.largest > (1.0 + 1e-6) * first else ""
+        return sized(first, unit) + more
+
+
+def acting_load(load: Load, duration: float | None = None) -> ActingLoad:
+    """A load over a study of a duration [s]; without one over the first second and all its knots."""
+    times = _times(load.laws, duration)
+    values = load.evaluate(times)
+    sizes = np.linalg.norm(values, axis=1)
+    least = _NOTHING * float(sizes.max())
+    acts = np.flatnonzero(sizes > least)
+    if not acts.size:
+        return ActingLoad(load, values[0], None, 0.0)
+    first = int(acts[0])
+    if first == 0:
+        return ActingLoad(load, values[0], 0.0, float(sizes.max()))
+    begins = _onset(load, float(times[first - 1]), float(times[first]), least)
+    grows = begins < _AT_ONCE * float(times[-1])
+    return ActingLoad(load, values[int(np.argmax(sizes))], 0.0 if grows else begins, float(sizes.max()), grows)
+
+
+def _onset(load: Load, before: float, after: float, least: float) -> float:
+    """When a load first exceeds a size, between two times."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (before + after)
+        acts = float(np.linalg.norm(load.evaluate(np.array([middle])))) > least
+        before, after = (before, middle) if acts else (middle, after)
+    return after
+
+
+def drive_speed(drive: PrescribedAngle, slides: bool, duration: float | None = None) -> str:
+    """The largest speed of a prescribed motion over a study, with its unit."""
+    rates = np.abs(drive.law.evaluate(_times((drive.law,), duration))[1])
+    constant = np.ptp(rates) <= _NOTHING * rates.max()
+    return ("" if constant else "up to ") + sized(float(rates.max()), "m/s" if slides else "rad/s")
+
+
+def first_movements(mechanism: Mechanism, duration: float | None = None) -> dict[str, int]:
+    """Signs of the first movement of joints with prescribed motions; 0 of those that stay."""
+    return {
+        drive.joint: _first_sign(drive.law.evaluate(_times((drive.law,), duration))[1], _NOTHING)
+        for drive in mechanism.prescribed
+    }
+
+
+def first_movements_along(system: System, q: Array) -> dict[str, int]:
+    """Signs of the first movement of joints with motors along a motion (k, n)."""
+    mechanism, moved = system.mechanism, {}
+    for motor in mechanism.motors:
+        travel = joint_coordinate(system, motor.joint, q).value
+        moved[motor.joint] = _first_sign(travel - travel[0], _MOVED) if np.ptp(travel) > _NOTHING else 0
+    return moved
+
+
+def load_variables(mechanism: Mechanism, times: Array) -> Mapping[str, tuple[tuple[str, ...], Array]]:
+    """Forces and torques of all loads at times (k,), zero of what a load has not; none without loads."""
+    if not mechanism.loads:
+        return {}
+    force, torque = np.zeros((len(times), len(mechanism.loads), 2)), np.zeros((len(times), len(mechanism.loads)))
+    for k, load in enumerate(mechanism.loads):
+        values = load.evaluate(times)
+        if load.kind == "force":
+            force[:, k] = values
+        else:
+            torque[:, k] = values[:, 0]
+    return {"load_force": (("time", "load", "axis"), force), "load_torque": (("time", "load"), torque)}
+
+
+def sized(value: float, unit: str) -> str:
+    """A size with its unit, large forces and torques in thousands: "800 N", "12.5 kN"."""
+    return f"{value / 1e3:.4g} k{unit}" if value >= _LARGE and unit[0] == "N" else f"{value:.4g} {unit}"
+
+
+def _times(laws: tuple[AngleLaw, ...], duration: float | None) -> Array:
+    """Times at which laws are looked at: over a study, no further than tables go, and at their knots and rows."""
+    known = [time for law in laws for time in marks(law)]
+    end = max([_FIRST, *known]) if duration is None else duration
+    end = min([end, *(law.times[-1] for law in laws if isinstance(law, TabulatedLaw))])
+    return np.unique([*np.linspace(0.0, end, _LOOKS), *(time for time in known if 0.0 <= time <= end)])
+
+
+def _first_sign(values: Array, least: float) -> int:
+    """Sign of the first value above a share of the largest; 0 where all are zero."""
+    moves = np.flatnonzero(np.abs(values) > least * np.max(np.abs(values)))
+    return int(np.sign(values[moves[0]])) if moves.size else 0

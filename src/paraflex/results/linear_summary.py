@@ -1,0 +1,284 @@
+"""Linear models in plain numbers and in words: poles, zeros, which of them are in the right half plane."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.arguments import checked_arguments
+from paraflex.dynamics.linearise import BALANCED
+from paraflex.results.kinds import check_kind
+from paraflex.results.linear_data import ENCODERS, END_EFFECTOR, HOLDINGS
+
+Complex = NDArray[np.complex128]
+
+# A value nearer to the imaginary axis than this part of its size is on it, as far as numbers tell.
+_ON_AXIS = 1e-4
+# Zeros that grow by less than this part of their size limit no bandwidth: in motion, and where double ones come apart.
+_BESIDE_AXIS = 0.05
+# Poles or zeros that agree this well are one, several times: rounding takes double ones apart.
+_SAME = 1e-4
+# Free poles of modes that differ by less are the same.
+_COMMON = 1e-6
+# Poles and zeros below this part of their median are zero: double ones at zero come apart by the root of rounding.
+_ZERO = 1e-7
+MAP_WORDS = {ENCODERS: "motors to their encoders", END_EFFECTOR: "motors to the end-effector"}
+HELD_WORDS = {"free": "motors free", "held": "motors held"}
+SOURCES = {
+    "a pose at rest": "about a pose at rest", "static equilibrium": "about static equilibrium",
+    "a planned motion": "about the planned motion at t = {time:.6g} s", "a run": "about the run at t = {time:.6g} s",
+}  # fmt: skip
+
+
+class Root(NamedTuple):
+    """A pole or zero: its value in the upper half plane, whether its mirror image is one too, and how often."""
+
+    value: complex
+    mirrored: bool
+    times: int
+
+    @property
+    def on_axis(self) -> bool:
+        """Whether it is on the imaginary axis."""
+        return not self.mirrored and abs(self.value.real) <= _ON_AXIS * abs(self.value)
+
+    @property
+    def right(self) -> bool:
+        """Whether it, or its mirror image, is in the right half plane."""
+        return self.mirrored or self.value.real > _ON_AXIS * abs(self.value)
+
+    @property
+    def text(self) -> str:
+        """As people say it: "51.35 Hz", "±1409 rad/s", "-3.20 ± 45.1i rad/s"; an asterisk in the right half plane."""
+        size = abs(self.value)
+        times = f" ×{self.times}" if self.times > 1 else ""
+        if size == 0.0:
+            return f"0{times}"
+        if self.on_axis:
+            return f"{_digits(size / (2.0 * np.pi))} Hz{times}"
+        sign = "±" if self.mirrored else "-" if self.value.real < 0.0 else "+"
+        real = f"{sign}{_digits(abs(self.value.real))}"
+        imaginary = f" ± {_digits(self.value.imag)}i" if self.value.imag > _ON_AXIS * size else ""
+        return f"{real}{imaginary} rad/s{times}{'*' if self.right else ''}"
+
+
+def _digits(value: float) -> str:
+    """Four digits, without an exponent below a million."""
+    return f"{value:.4g}" if value < 1e4 or value >= 1e6 else f"{value:.0f}"
+
+
+def roots(values: Complex) -> list[Root]:
+    """Poles or zeros, by magnitude, conjugates and mirror images together."""
+    known, out = _without_rounding(values[np.isfinite(values.real)]), list[Root]()
+    left = list(known[np.argsort(np.abs(known), kind="stable")])
+    while left:
+        value = left[0]
+        near = [one for one in left if _alike(one, value)]
+        mirrors = [one for one in left if _alike(-one, value)] if abs(value.real) > _ON_AXIS * abs(value) else []
+        left = [one for one in left if not any(one is each for each in (*near, *mirrors))]
+        complex_pair = abs(value.imag) > _ON_AXIS * abs(value)
+        count = max(1, len(near) // 2) if complex_pair else len(near)
+        shown = complex(value.real, abs(value.imag))
+        out.append(Root(complex(abs(value.real), abs(value.imag)) if mirrors else shown, bool(mirrors), count))
+    return out
+
+
+def _without_rounding(values: Complex) -> Complex:
+    """Values, zero where they are that but for rounding."""
+    return np.where(np.abs(values) <= _ZERO * np.median(np.abs(values)), 0.0, values) if values.size else values
+
+
+def _alike(one: complex, other: complex) -> bool:
+    """Whether values are the same, or conjugates."""
+    return abs(complex(one.real, abs(one.imag)) - complex(other.real, abs(other.imag))) <= _SAME * abs(other)
+
+
+def poles_of(data: xr.Dataset, mode: str, holding: str) -> Complex:
+    """Poles of a mode [rad/s], motors free or held."""
+    return _known(data, "pole", mode=mode, holding=holding)
+
+
+def zeros_of(data: xr.Dataset, mode: str, channels: str) -> Complex:
+    """Zeros of a mode [rad/s], motors to "encoders" or to the "end_effector"."""
+    return _known(data, "zero", mode=mode, map=channels)
+
+
+def _known(data: xr.Dataset, name: str, **chosen: str) -> Complex:
+    real, imag = (data[f"{name}_{part}"].sel(chosen).values for part in ("real", "imag"))
+    return (real + 1j * imag)[np.isfinite(real)]
+
+
+def common_poles(data: xr.Dataset) -> Complex | None:
+    """Poles with motors free [rad/s], where all modes have the same; None where they differ, or there is one mode."""
+    first, *others = (poles_of(data, mode, "free") for mode in data["mode"].values.tolist())
+    same = (one.size == first.size and np.allclose(abs(one), abs(first), rtol=_COMMON, atol=0.0) for one in others)
+    return first if others and all(same) else None
+
+
+def gains_of(data: xr.Dataset, mode: str, channels: str) -> NDArray[np.float64]:
+    """Singular values (frequencies, k), descending, of a mode's motors to "encoders" or to the "end_effector"."""
+    motors = motors_of_mode(data, mode)
+    inputs, outputs = motors or inputs_of_mode(data, mode), _outputs(data, channels, motors)
+    if not (inputs and outputs):
+        return np.full((data.sizes["frequency"], 1), np.nan)
+    chosen = data.sel(mode=mode, input=inputs, output=outputs).transpose("frequency", "output", "input", ...)
+    response = chosen["response_real"].values + 1j * chosen["response_imag"].values
+    return np.asarray(np.linalg.svd(response, compute_uv=False), dtype=float)
+
+
+def _outputs(data: xr.Dataset, channels: str, motors: Sequence[str]) -> list[str]:
+    joints = json.loads(data.attrs["motor_joints"])
+    return json.loads(data.attrs["end_effector_outputs"]) if channels == END_EFFECTOR else [joints[k] for k in motors]
+
+
+def gain_unit(data: xr.Dataset, channels: str) -> str:
+    """Unit of the gains of motors to "encoders" or to the "end_effector"."""
+    motors = [*json.loads(data.attrs["motor_joints"])]
+    return channel_unit(data, motors or data["input"].values.tolist(), _outputs(data, channels, motors))
+
+
+def channel_unit(data: xr.Dataset, inputs: Sequence[str], outputs: Sequence[str]) -> str:
+    """Unit of responses of some outputs to some inputs; "SI units" where they differ."""
+    unit = {
+        what: dict(zip(data[what].values.tolist(), data[f"{what}_unit"].values.tolist(), strict=True))
+        for what in ("input", "output")
+    }
+    into = [unit["input"][name] for name in inputs if name in unit["input"]]
+    below = [f"({one})" if " " in one or "/" in one else one for one in into]
+    units = {f"{unit['output'][name]}/{one}" for name in outputs for one in below}
+    return units.pop() if len(units) == 1 else "SI units"
+
+
+class Oscillation(NamedTuple):
+    """A pair of poles: its frequency |s| / 2 pi [Hz] and damping ratio."""
+
+    frequency: float
+    damping_ratio: float
+
+
+def oscillations(poles: Complex) -> list[Oscillation]:
+    """Pairs of complex poles, by frequency."""
+    upper = poles[poles.imag > _ON_AXIS * np.abs(poles)]
+    return [Oscillation(float(abs(s) / (2.0 * np.pi)), float(-s.real / abs(s)) + 0.0) for s in upper]
+
+
+def inputs_of_mode(data: xr.Dataset, mode: str) -> list[str]:
+    """Inputs that a mode has."""
+    own = np.isfinite(data["B"].sel(mode=mode).values).any(axis=0)
+    return [str(name) for name in data["input"].values[own]]
+
+
+def motors_of_mode(data: xr.Dataset, mode: str) -> list[str]:
+    """Motors that a mode has."""
+    motors = json.loads(data.attrs["motor_joints"])
+    return [name for name in inputs_of_mode(data, mode) if name in motors]
+
+
+def about(data: xr.Dataset) -> str:
+    """What the linear models are about, in words."""
+    return SOURCES[data.attrs["about"]].format(time=data.attrs["time"])
+
+
+@checked_arguments()
+def linear_summary(data: xr.Dataset) -> dict[str, Any]:
+    """Linear models in plain values, for JSON.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `linear_dataset`.
+    """
+    check_kind(data, "linear")
+    attrs = data.attrs
+    return {
+        "kind": "linear model",
+        "mechanism": attrs["mechanism"],
+        "about": attrs["about"],
+        "time": float(attrs["time"]),
+        **{
+            f"{key}s": dict(zip(data[key].values.tolist(), data[f"{key}_unit"].values.tolist(), strict=True))
+            for key in ("state", "input", "output")
+        },
+        "modes": {mode: _mode_summary(data, mode) for mode in data["mode"].values.tolist()},
+        "parameters": json.loads(attrs["parameters"]),
+        "version": attrs["paraflex_version"],
+    }
+
+
+def _mode_summary(data: xr.Dataset, mode: str) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "inputs": inputs_of_mode(data, mode),
+        "unbalanced": float(data["unbalanced"].sel(mode=mode)),
+    }
+    for holding in HOLDINGS:
+        natural = data["natural_frequency"].sel(mode=mode, holding=holding).values
+        poles = poles_of(data, mode, holding)
+        out[f"motors_{holding}"] = {
+            "natural_frequencies": natural[np.isfinite(natural)].tolist(),
+            "oscillations": [one._asdict() for one in oscillations(poles)],
+            "poles": _pairs(poles),
+        }
+    out["zeros"] = {str(name): _zero_summary(zeros_of(data, mode, str(name))) for name in data["map"].values}
+    return out
+
+
+def _zero_summary(zeros: Complex) -> dict[str, Any]:
+    right = right_half_plane(zeros)
+    return {
+        "zeros": _pairs(zeros), "right_half_plane": _pairs(right), "minimum_phase": not right.size,
+        "limiting_zero": limiting_zero(zeros) or None,
+    }  # fmt: skip
+
+
+def right_half_plane(values: Complex) -> Complex:
+    """Those of some poles or zeros that are in the right half plane."""
+    values = _without_rounding(values)
+    return values[values.real > _ON_AXIS * np.abs(values)]
+
+
+def phase_sentences(data: xr.Dataset) -> Iterator[str]:
+    """What zeros in the right half plane mean: a sentence for each map that is not of minimum phase."""
+    for name in (str(each) for each in data["map"].values):
+        said: dict[str, list[str]] = {}
+        for mode in data["mode"].values.tolist():
+            if limit := limiting_zero(zeros_of(data, mode, name)):
+                said.setdefault(_digits(limit), []).append(mode)
+        if said:
+            listed = "; ".join(f"{', '.join(modes)} from {limit} rad/s on" for limit, modes in said.items())
+            yield (
+                f"{MAP_WORDS[name]}: not of minimum phase in {listed}. No controller that follows these outputs is "
+                "faster than about the lowest of these zeros"
+            )
+
+
+def remarks(data: xr.Dataset) -> list[str]:
+    """What to know of the models: that a pose is no equilibrium, what zeros mean, that motion is frozen."""
+    values = {str(mode): float(data["unbalanced"].sel(mode=mode)) for mode in data["mode"].values}
+    largest = max(values, key=lambda mode: values[mode])
+    out = []
+    if values[largest] > BALANCED:
+        of = f" (mode {largest})" if len(values) > 1 else ""
+        out.append(
+            f"not in equilibrium: let go, the mechanism would start with {values[largest]:.3g} m/s^2{of}; "
+            "here forces that do not change hold it (--balanced linearises about equilibrium)"
+        )
+    out += phase_sentences(data)
+    if data.attrs["about"] in ("a planned motion", "a run"):
+        out.append("in motion, models are frozen at an instant: their poles say nothing about stability")
+    return out
+
+
+def limiting_zero(zeros: Complex) -> float:
+    """Size of the lowest zero in the right half plane that is not beside the imaginary axis; zero for none."""
+    zeros = _without_rounding(zeros)
+    sizes = np.abs(zeros[zeros.real > _BESIDE_AXIS * np.abs(zeros)])
+    return float(sizes.min()) if sizes.size else 0.0
+
+
+def _pairs(values: Complex) -> list[list[float]]:
+    return [[float(one.real), float(one.imag)] for one in values]
