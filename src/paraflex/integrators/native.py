@@ -30,7 +30,6 @@ from paraflex.kernel.run_state import (
     POSITION,
     PROJECTION,
     REJECTED,
-    RESERVE,
     ROOT,
     ROOT_RATE,
     SAMPLE,
@@ -63,9 +62,6 @@ _NEAR_AHEAD = 0.2
 # The smallest step, as a fraction of the run, and in units of the clock's last digit: by so little a step may differ
 # from what the clock moves by.
 _LEAST, _DIGITS = 1e-12, 64.0
-# Part of the tolerance for the fast vibrations that jumps excite, all jumps together. However small these are, steps
-# would have to follow them to the end of the run by their share of the tolerance alone; a longer one damps them, once.
-JUMP_PART = 1.0 / 3.0
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
 _BAUMGARTE_GAIN = 0.1
 _TREATMENTS = {
@@ -164,7 +160,6 @@ class NativeRun:
         arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
         start(*arguments, self.state, self.workspace, empty_samples(np.zeros(0), self.problem.system))
         self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
-        self.state.clock[RESERVE] += self.controls.jump_error
 
 
 def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
@@ -182,14 +177,6 @@ def _least_step(problem: Problem) -> float:
     return max(_LEAST * problem.span, _DIGITS * float(np.spacing(latest)))
 
 
-def loaded_at_start(problem: Problem) -> bool:
-    """Whether a load given in time acts at the start: to a mechanism that is undeformed then this is a jump."""
-    import os
-    if "BSTART" in os.environ: return os.environ["BSTART"] == "1"
-    start = np.array([problem.initial.time])
-    return any(load.largest(start) > 0.0 for load in problem.system.mechanism.loads)
-
-
 def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     """Set up a run."""
     system, initial, span = problem.system, problem.initial, problem.span
@@ -201,11 +188,8 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     state.q[:], state.v[:] = initial.q, initial.v
     state.clock[TIME], state.clock[STEP] = initial.time, min(FIRST_STEP * span, options.max_step)
     workspace = system.workspace()
-    jumps = problem.jumps.size + loaded_at_start(problem)
-    reserved = JUMP_PART if jumps else 0.0
     controls = Controls(
-        tolerance_per_second=(1.0 - reserved) * options.tolerance / span,
-        jump_error=reserved * options.tolerance / max(1, jumps),
+        tolerance_per_second=options.tolerance / span,
         newton_fraction=options.newton_fraction or method.newton_fraction,
         newton_memory=_NEWTON_MEMORY * span,
         memory=MEMORY * span,
@@ -220,7 +204,6 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         dependent_part=ROUNDING_PART,
         dependent_rows=_mark_redundant(system, initial.q, workspace),
     )
-    state.clock[RESERVE] = controls.jump_error if loaded_at_start(problem) else 0.0
     return NativeRun(
         problem=problem,
         scheme=scheme,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from paraflex.integrators.run import Problem, empty_samples
 from paraflex.kernel.krylov import make_krylov
 from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
 from paraflex.kernel.rounding import History, make_history, sample_energies, solve_steps_to_rounding
-from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, RESERVE, STEPS, TIME, make_march
+from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
 from paraflex.kernel.sensitivity import make_piece, sensitivity_steps
 from paraflex.kernel.sensitivity_samples import DIFFERENCE_STEP, PLACES, Sensitivity, make_sensitivity
 from paraflex.kernel.tangent import make_tangent
@@ -146,9 +146,6 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
     """
     check_differentiable(options)
     run = prepare(problem, options)
-    # Steps that end on the constraints by projection are not differentiated.
-    run = replace(run, controls=run.controls._replace(jump_error=0.0))
-    run.state.clock[RESERVE] = 0.0
     varied = _Varied(problem, run, directions)
     for chunk in _chunks(run):
         varied.go_through(chunk)

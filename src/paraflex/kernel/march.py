@@ -38,8 +38,6 @@ from paraflex.kernel.run_state import (
     PREPARED,
     PROJECTION,
     REJECTED,
-    RESERVE,
-    RETURNS,
     ROOT_RATE,
     ROOT_STEP,
     SAMPLE,
@@ -52,7 +50,7 @@ from paraflex.kernel.run_state import (
     WORK,
 )
 from paraflex.kernel.stage import equations
-from paraflex.kernel.step import RESERVE_SHARE, attempt, input_power
+from paraflex.kernel.step import attempt, input_power
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
 # Errors of vibrations rise and fall within a period: the error before has a say as well (Gustafsson 1994). None counts
@@ -223,15 +221,13 @@ def accept(system, signals, tableau, controls, t, h, march, work, out):
     last = tableau.c.size - 1
     if march.counts[NEAR] > 0:
         note_crossing(system, t, h, march, work)
-    returns = march.counts[RETURNS] > 0 and controls.treatment == BAUMGARTE
-    if (controls.treatment == PROJECTION or returns) and march.counts[NEAR] == 0:
+    if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
     write_samples(system, tableau, t, h, march, work, out)
     copy(march.stage_q[last], march.q)
     copy(march.stage_v[last], march.v)
     march.clock[WORK] += step_work(tableau, h, march)
     march.clock[LAST_STEP] = h
-    march.clock[RESERVE] *= 1.0 - RESERVE_SHARE
     copy(march.stage_t[1], march.stage_t[0])
     for s in range(last + 1):
         copy(march.stage_a[1, s], march.stage_a[0, s])

@@ -24,8 +24,6 @@ PART_END, PART = range(15, 17)
 # and of the row nearest to dependence: the root of the part of its square left, how fast that changes [1/s], and the
 # largest part so far.
 ROOT, ROOT_RATE, WIDEST = range(12, 15)
-# and what is left of the error that steps after a jump may have besides their share [m].
-RESERVE = 17
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
 # and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
@@ -39,8 +37,6 @@ ROOT_STEP = 13
 PREPARED = 14
 # Whether rows were not trusted at the end of the last step attempted, and of the last one taken.
 HELD_END, DRIFTED = 15, 16
-# Whether the last step attempted takes of the reserve of a jump, and so has to end on the constraints.
-RETURNS = 17
 
 
 # What keeps the constraints, as integers for kernels; index 3 is POSITION.
@@ -85,7 +81,6 @@ class Controls(NamedTuple):
     max_step: float
     fixed_step: float  # zero where steps are chosen by their errors
     near_error: float  # error allowed in a step near a singular position, where that is more [m]
-    jump_error: float  # error that the steps after a jump may have together, besides their share [m]
     dependent_rows: int
     dependent_part: float  # a row with less than this of its diagonal left when others are eliminated depends on them
 
@@ -134,8 +129,8 @@ def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGA
     """Allocate the state of a run with n coordinates and m constraint rows."""
     stage_v = apart((stages, n))
     return March(
-        clock=apart(18),
-        counts=apart(18, np.int64),
+        clock=apart(17),
+        counts=apart(17, np.int64),
         q=apart(n),
         v=apart(n),
         stage_t=apart((2, stages)),

@@ -50,8 +50,6 @@ from paraflex.kernel.run_state import (
     POSITION,
     PREPARED,
     PROJECTION,
-    RESERVE,
-    RETURNS,
     REUSED,
     WIDEST,
 )
@@ -66,9 +64,6 @@ IMPATIENCE = 20
 # So many times a stage is gone on with: with slopes of friction where it has come to, or because it contracts and the
 # step is fixed.
 ROUNDS = 6
-# What a step may take of the reserve after a jump, the rest being for later ones: half of it makes the first step too
-# long for its estimate.
-RESERVE_SHARE = 0.1
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
 
@@ -179,29 +174,6 @@ def constraint_weights(controls, h):
 
 
 @routine
-def step_error(system, tableau, g, gains, h, controls, march, work, slow):
-    """Error of the step, of its positions or the later effect of its velocities, whichever is larger [m]."""
-    if tableau.error.size > 0:
-        embedded_error(tableau, h, march)
-    else:
-        history_error(h, march)
-    error_q, error_v = filtered_error(system, g, gains, controls.memory, march, work, slow)
-    return max(error_q, error_v)
-
-
-@routine
-def error_after_jump(system, tableau, g, h, allowed, controls, march, work, slow):
-    """Error of a step that takes of the reserve of a jump, relative to what it is allowed then.
-
-    It ends on the constraints, so the part of its error that leaves them does not count.
-    """
-    gains = (0.0, 0.0, 0.0)
-    error = step_error(system, tableau, g, gains, h, controls, march, work, slow)
-    march.counts[RETURNS] = 1
-    return error / (allowed + RESERVE_SHARE * march.clock[RESERVE])
-
-
-@routine
 def attempt(system, signals, tableau, controls, t, h, march, work, slow):
     """One step from t: all stages and the error estimate, relative to the allowed error.
 
@@ -224,7 +196,6 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
     note_root(march, work)
     perhaps_near = work.least[0] < NEAR_PART * march.clock[WIDEST] and march.counts[PREPARED] >= 0
     march.counts[NEAR], march.counts[HELD_END] = 0, 0
-    march.counts[RETURNS] = 0
     if perhaps_near and comes_near(h, march):
         if march.counts[PREPARED] == 0:
             return ENTERS, 0.0
@@ -297,11 +268,14 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         moved = return_to_constraints(system, signals, t + h, held, march, work) / controls.near_error
     error = 0.0
     if controls.fixed_step == 0.0:
+        if tableau.error.size > 0:
+            embedded_error(tableau, h, march)
+        else:
+            history_error(h, march)
+        error_q, error_v = filtered_error(system, b**0.5, gains, controls.memory, march, work, slow)
         if march.counts[NEAR] > 0:
             allowed = max(allowed, controls.near_error * share_of_passage(h, march))
-        error = max(step_error(system, tableau, b**0.5, gains, h, controls, march, work, slow) / allowed, moved)
-        if error > 1.0 and march.clock[RESERVE] > 0.0 and march.counts[NEAR] == 0:
-            error = error_after_jump(system, tableau, b**0.5, h, allowed, controls, march, work, slow)
+        error = max(max(error_q, error_v) / allowed, moved)
     if not isfinite(error):
         return NOT_FINITE, 0.0
     return PAUSED, error
