@@ -3,30 +3,36 @@
 The constraints leave f free directions at a pose. Their coordinates y = T q are the angles and travels of the joints
 that have motors, as far as these are independent (of flexible links mostly all), then as many flexible coordinates of
 bodies as are missing, and places and angles of bodies where these do not suffice. Bodies are chosen by a QR
-factorisation with pivots, soft coordinates first.
+factorisation with pivots, soft coordinates first. Instead of the joints the end-effector's place and angle may come
+first.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, build_system
+from paraflex.dynamics import System, build_system, joint_coordinate
 from paraflex.dynamics.constraints import coordinate_kind
+from paraflex.dynamics.joint_coordinates import marker_place, material_angle
 from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents
 from paraflex.errors import InputError
-from paraflex.mechanism import ConstantSpeed, Mechanism, PrescribedAngle
+from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
 
 # A direction with less than this part of its size independent of others follows from them.
-_DEPENDENT = 1e-8
+DEPENDENT = 1e-8
 # Places and angles of bodies count as much less than flexible coordinates: they are chosen last.
 _LAST = 1e-5
+# A pin between the end-effector and the ground frame's origin, whose rows are the end-effector's coordinates.
+_TASK = "the end-effector"
 
 
 class Variable(NamedTuple):
@@ -34,6 +40,13 @@ class Variable(NamedTuple):
 
     name: str
     unit: str
+
+
+def named_axes(states: Sequence[Variable], inputs: Sequence[Variable], outputs: Sequence[Variable]) -> dict[str, Any]:
+    """Names and units of the dimensions state, state_of, input and output, for labelled arrays of matrices."""
+    named = {"state": states, "state_of": states, "input": inputs, "output": outputs}
+    names = {key: [one.name for one in values] for key, values in named.items()}
+    return names | {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
 
 
 class Chosen(NamedTuple):
@@ -44,7 +57,7 @@ class Chosen(NamedTuple):
     constraints : array of int
         Independent rows among the constraints.
     joints : array of int
-        Rows of the joints whose coordinates are states, among `Coordinates.joints`.
+        Rows of the coordinates of the end-effector and of joints that are states, among `Coordinates.measured`.
     bodies : array of int
         Coordinates of bodies that are states.
     """
@@ -120,20 +133,64 @@ class Coordinates:
         Joints whose coordinates become states where they are independent; those of `driven` last, in their order.
     driven : tuple of str
         Prescribed motions that are inputs: their joints' coordinates are states.
+    task : tuple of str
+        Coordinates "x", "y" and "angle" of the end-effector that become states, before those of joints.
     """
 
     system: System
     joints: tuple[str, ...]
     driven: tuple[str, ...] = ()
+    task: tuple[str, ...] = ()
+
+    @cached_property
+    def measured(self) -> tuple[Variable, ...]:
+        """Coordinates of the end-effector and of the joints, which may become states."""
+        slides = [self.system.mechanism.joint(joint).slides for joint in self.joints]
+        return (
+            *(Variable(axis, "rad" if axis == "angle" else "m") for axis in self.task),
+            *(Variable(joint, "m" if each else "rad") for joint, each in zip(self.joints, slides, strict=True)),
+        )
+
+    def values(self, chosen: Chosen, q: Array, v: Array) -> Array:
+        """Minimal coordinates and then their rates (k, 2f) of coordinates (k, n) and velocities (k, n)."""
+        found = [self._measured(k, q, v) for k in chosen.joints.tolist()]
+        found += [(q[:, k], v[:, k]) for k in chosen.bodies.tolist()]
+        return np.concatenate([np.stack(part, axis=1) for part in zip(*found, strict=True)], axis=1)
+
+    def _measured(self, k: int, q: Array, v: Array) -> tuple[Array, Array]:
+        """A coordinate of `measured` and its rate."""
+        if k >= len(self.task):
+            coordinate = joint_coordinate(self.system, self.joints[k - len(self.task)], q, v)
+            return coordinate.value, coordinate.rate
+        axis, marker = self.task[k], self.system.marker(self._effector)
+        if axis == "angle":
+            # The slope is linear in the coordinates.
+            return material_angle(self.system, self._effector, q), material_angle(self.system, self._effector, v)
+        place, rows = marker_place(self.system, marker, q)
+        component = ("x", "y").index(axis)
+        return place[:, component], np.sum(rows[:, component] * v, axis=1)
+
+    @property
+    def _effector(self) -> PointRef:
+        effector = self.system.mechanism.end_effector
+        assert effector is not None
+        return effector.point
 
     @cached_property
     def tangency(self) -> Tangency:
-        """Of the system with a row for every joint's coordinate, which prescribes nothing."""
+        """Of the system with a row for every coordinate of `measured`, which holds nothing."""
         mechanism, held = self.system.mechanism, {one.joint for one in self.system.mechanism.prescribed}
         more = tuple(PrescribedAngle(_row(joint), joint, ConstantSpeed(0.0, 0.0))
-                     for joint in self.joints if joint not in held)  # fmt: skip
-        if not more:
+                     for joint in (*self.joints, *([_TASK] if "angle" in self.task else [])) if joint not in held
+                     )  # fmt: skip
+        if not (more or self.task):
             return Tangency(self.system)
+        if self.task:
+            origin = PointRef(GROUND, _TASK)
+            mechanism = replace(
+                mechanism, ground={**mechanism.ground, _TASK: (0.0, 0.0)},
+                joints=(*mechanism.joints, RevoluteJoint(_TASK, origin, self._effector)),
+            )  # fmt: skip
         extended = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *more)))
         # Damping ratios are those of links whose motors turn freely, as in the system.
         own, bodies = self.system.packed, extended.packed.bodies.copy()
@@ -143,11 +200,12 @@ class Coordinates:
 
     @cached_property
     def _rows(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Rows of the system with more rows: those of the joints' coordinates; and their numbers in the system."""
+        """Rows of the system with more rows: those of `measured`; and the numbers of all in the system."""
         extended = self.tangency.system
         mechanism, names = extended.mechanism, {name: k for k, name in enumerate(extended.rows)}
         by_joint = {one.joint: one.name for one in mechanism.prescribed}
-        rows = [names[f"{by_joint[joint]} {coordinate_kind(mechanism.joint(joint))}"] for joint in self.joints]
+        rows = [names[f"{_row(_TASK)} angle" if axis == "angle" else f"{_TASK} {axis}"] for axis in self.task]
+        rows += [names[f"{by_joint[joint]} {coordinate_kind(mechanism.joint(joint))}"] for joint in self.joints]
         own = {name: k for k, name in enumerate(self.system.rows)}
         return np.array(rows, dtype=int), np.array([own.get(name, -1) for name in extended.rows])
 
@@ -165,20 +223,28 @@ class Coordinates:
                 whole.second_rate[at].toarray(), number[wanted],
             )  # fmt: skip
 
-        holding = whole.rows[~np.isin(whole.rows, coordinates)]
+        # Of the end-effector's pin no row holds, whether it is a coordinate or not.
+        added = [k for k, name in enumerate(self.tangency.system.rows) if name.startswith(_TASK)]
+        holding = whole.rows[~np.isin(whole.rows, [*coordinates, *added])]
         return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant])
 
-    def choose(self, tangents: PointTangents) -> Chosen:
-        """Choose minimal coordinates at a pose."""
+    def choose(self, tangents: PointTangents, without: Collection[int] = ()) -> Chosen:
+        """Choose minimal coordinates at a pose, without some of `measured`.
+
+        Raises
+        ------
+        InputError
+            The end-effector's coordinates are to be states, but do not describe the motion.
+        """
         scale = self.scale
         constraints = unit_rows(tangents.constraints.jacobian * scale)
         rows = unit_rows(tangents.joints.jacobian * scale)
         kept, free = _independent(constraints)
         joints: list[int] = []
-        for k in self._order(rows.shape[0]):
+        for k in (k for k in self._order(rows.shape[0]) if k not in without):
             moved = rows[k] @ free
             size = np.linalg.norm(moved)
-            if size <= _DEPENDENT:
+            if size <= DEPENDENT:
                 continue
             joints.append(k)
             free = free @ _complement(moved / size)
@@ -186,7 +252,26 @@ class Coordinates:
         for body in self.system.bodies:
             weights[body.flexible] = 1.0
         order = scipy.linalg.qr(free.T * weights, mode="r", pivoting=True)[-1]
-        return Chosen(kept, np.array(sorted(joints), dtype=int), np.sort(np.asarray(order)[: free.shape[1]]))
+        chosen = Chosen(kept, np.array(sorted(joints), dtype=int), np.sort(np.asarray(order)[: free.shape[1]]))
+        if self.task:
+            self._check_task(chosen)
+        return chosen
+
+    def _check_task(self, chosen: Chosen) -> None:
+        """Refuse coordinates of the end-effector that follow from others, or leave rigid bodies free."""
+        rigid = [body.name for body in self.system.bodies
+                 if np.isin(chosen.bodies, np.arange(body.offset, body.offset + 3)).any()]  # fmt: skip
+        follow = [axis for k, axis in enumerate(self.task) if k not in chosen.joints]
+        if not (rigid or follow):
+            return
+        reason = (
+            f"{', '.join(follow)} cannot change by itself" if follow
+            else f"{', '.join(rigid)} can move while {', '.join(self.task)} and all deflections stay"
+        )  # fmt: skip
+        raise InputError(
+            f"the end-effector's coordinates do not describe the motion here: {reason}",
+            field="coordinates", value="task", remedy='choose "motors", or another pose',
+        )  # fmt: skip
 
     def _order(self, rows: int) -> list[int]:
         """Rows of coordinates of joints, those that are driven first: these must be states."""
@@ -206,9 +291,7 @@ class Coordinates:
 
     def names(self, chosen: Chosen) -> tuple[Variable, ...]:
         """The states that are coordinates; their rates follow in the same order."""
-        mechanism, quantities = self.system.mechanism, []
-        for joint in (self.joints[k] for k in chosen.joints.tolist()):
-            quantities.append(Variable(joint, "m" if mechanism.joint(joint).slides else "rad"))
+        quantities = [self.measured[k] for k in chosen.joints.tolist()]
         for k in chosen.bodies.tolist():
             body = next(one for one in self.system.bodies if one.all.start <= k < one.all.stop)
             local = k - body.offset
@@ -217,13 +300,22 @@ class Coordinates:
         return tuple(quantities)
 
 
-def coordinates_of(system: System, driven: tuple[str, ...] = ()) -> Coordinates:
-    """Coordinates with the joints of all motors, and those that are driven.
+class FirstCoordinates(Enum):
+    """Which coordinates are the first states: those of the motors' joints, or those of the end-effector."""
+
+    MOTORS = "motors"
+    TASK = "task"
+
+
+def coordinates_of(
+    system: System, driven: tuple[str, ...] = (), first: FirstCoordinates = FirstCoordinates.MOTORS
+) -> Coordinates:
+    """Coordinates with the joints of all motors, or of the end-effector, and those that are driven.
 
     Raises
     ------
     InputError
-        A driven motion that the mechanism does not have.
+        A driven motion or an end-effector that the mechanism does not have.
     """
     mechanism: Mechanism = system.mechanism
     known = {one.name: one.joint for one in mechanism.prescribed}
@@ -233,8 +325,14 @@ def coordinates_of(system: System, driven: tuple[str, ...] = ()) -> Coordinates:
                 "is no prescribed motion", field="prescribed", value=name,
                 remedy="choose from " + ", ".join(known) if known else "the mechanism has none",
             )  # fmt: skip
+    moved = [known[name] for name in driven]
+    if first is FirstCoordinates.TASK:
+        if mechanism.end_effector is None:
+            raise InputError("needs an end-effector, which the mechanism does not have", field="coordinates",
+                             value="task", remedy='choose "motors", or name an end-effector')  # fmt: skip
+        return Coordinates(system, tuple(moved), driven, mechanism.end_effector.coordinates)
     joints = dict.fromkeys(motor.joint for motor in mechanism.motors if motor.joint not in set(known.values()))
-    return Coordinates(system, (*joints, *(known[name] for name in driven)), driven)
+    return Coordinates(system, (*joints, *moved), driven)
 
 
 def _row(joint: str) -> str:
@@ -253,7 +351,7 @@ def _independent(rows: Array) -> tuple[NDArray[np.int64], Array]:
         return np.zeros(0, dtype=int), np.eye(rows.shape[1])
     factors = scipy.linalg.qr(rows.T, pivoting=True)
     size = np.abs(np.diag(factors[1]))
-    rank = int(np.sum(size > _DEPENDENT * size.max(initial=1.0)))
+    rank = int(np.sum(size > DEPENDENT * size.max(initial=1.0)))
     return np.sort(np.asarray(factors[2])[:rank]), np.asarray(factors[0])[:, rank:]
 
 

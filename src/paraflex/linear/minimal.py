@@ -91,25 +91,52 @@ class Minimal:
         """Those joints' coordinates that are states."""
         return self.tangents.joints.taken(self.chosen.joints)
 
-    @cached_property
-    def _factor(self) -> tuple[tuple[Array, Array], Array]:
-        """LU factor of the rows [Phi_q; T] in units of the coordinates and of the rows, and the latter."""
+    @property
+    def _rows(self) -> Array:
+        """The rows [Phi_q; T] in units of the coordinates."""
         bodies = np.zeros((self.chosen.bodies.size, self.system.n))
         bodies[np.arange(self.chosen.bodies.size), self.chosen.bodies] = 1.0
-        rows = np.vstack([self.constraints.jacobian, self.joints.jacobian, bodies]) * self.scale
+        return np.vstack([self.constraints.jacobian, self.joints.jacobian, bodies]) * self.scale
+
+    @cached_property
+    def _factor(self) -> tuple[tuple[Array, Array], Array, float]:
+        """LU factor of `_rows` in units of the rows, these, and its condition number."""
+        rows = self._rows
         size = np.linalg.norm(rows, axis=1, keepdims=True)
         factor = scipy.linalg.lu_factor(rows / size)
-        condition = scipy.linalg.lapack.dgecon(factor[0], np.linalg.norm(rows / size, 1))[0]
-        if not condition * _SINGULAR > 1.0:
+        inverse = scipy.linalg.lapack.dgecon(factor[0], np.linalg.norm(rows / size, 1))[0]
+        if not inverse * _SINGULAR > 1.0:
             cause = "the coordinates chosen for the linear model do not describe its motion"
             raise SingularPositionError(
                 cause, Moment(self.point.time, 0), remedy="linearise away from this singular position"
             )
-        return factor, size
+        return factor, size, 1.0 / float(inverse)
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the coordinates, infinite where they do not describe the motion."""
+        try:
+            return self._factor[2]
+        except SingularPositionError:
+            return np.inf
+
+    @property
+    def orientation(self) -> float:
+        """Sign of the determinant of `_rows`: another one lies beyond a pose where the coordinates are singular."""
+        factor, pivots = self._factor[0]
+        return float(np.prod(np.sign(np.diag(factor)))) * (-1.0) ** np.sum(pivots != np.arange(pivots.size))
+
+    def most_dependent(self) -> int | None:
+        """Which of `chosen.joints` has the largest part in rows that nearly depend on one another; None without any."""
+        size = np.linalg.norm(self._rows, axis=1, keepdims=True)
+        part = np.abs(scipy.linalg.svd(self._rows / size)[0][:, -1])
+        first = self.constraints.number.size
+        part = part[first : first + self.chosen.joints.size]
+        return int(np.argmax(part)) if part.size else None
 
     def _coordinates(self, right: Array) -> Array:
         """Changes of all coordinates, from those of Phi and y."""
-        factor, size = self._factor
+        factor, size, _ = self._factor
         return self.scale[:, None] * scipy.linalg.lu_solve(factor, right / size)
 
     @cached_property

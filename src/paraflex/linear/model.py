@@ -14,11 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
+from paraflex.dynamics import joint_coordinate
 from paraflex.dynamics.linearise import typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
-from paraflex.linear.coordinates import Variable
+from paraflex.linear.coordinates import DEPENDENT, Variable, named_axes, unit_rows
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
@@ -126,11 +127,11 @@ class LinearModel:
     @cached_property
     def _modes(self) -> tuple[Array, Array]:
         """Squares of the undamped frequencies (f,), ascending, and shapes (f, f) of unit mass, in the coordinates y."""
-        return self._undamped(np.arange(len(self.states) // 2))
+        return self._undamped(np.eye(len(self.states) // 2))
 
-    def _undamped(self, free: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Squares and shapes of the undamped modes in some of the coordinates y, the others held."""
-        mass, _, stiffness = (part[np.ix_(free, free)] for part in self._reduced)
+    def _undamped(self, basis: Array) -> tuple[Array, Array]:
+        """Squares and shapes of the undamped modes in the motions y of a basis (f, free)."""
+        mass, _, stiffness = (basis.T @ part @ basis for part in self._reduced)
         return undamped_modes(mass, 0.5 * (stiffness + stiffness.T), self._typical)
 
     @cached_property
@@ -146,6 +147,20 @@ class LinearModel:
         shapes = self._modes[1]
         damping = shapes.T @ self._reduced[1] @ shapes
         return np.where(np.abs(damping) > _ROUNDING * np.max(np.abs(damping), initial=0.0), damping, 0.0)
+
+    @property
+    def modal_states(self) -> tuple[Array, Array]:
+        """States in undamped modes of unit mass from states, and the reverse, (2f, 2f) each.
+
+        Displacements are multiplied by their frequencies. The sum of squares is twice the energy;
+        what is free has a low frequency in place of zero.
+        """
+        squares, shapes = self._modes
+        omega = np.sqrt(np.maximum(squares, 0.0) + self._typical)
+        inverse = shapes.T @ self._reduced[0]
+        return scipy.linalg.block_diag(omega[:, None] * inverse, inverse), scipy.linalg.block_diag(
+            shapes / omega, shapes
+        )
 
     @cached_property
     def _scaled(self) -> StateSpace:
@@ -183,9 +198,9 @@ class LinearModel:
         Raises
         ------
         InputError
-            A motor that the mechanism does not have, or whose joint is no state, as it follows from others.
+            A motor that the mechanism does not have.
         """
-        return np.sqrt(np.maximum(self._undamped(self._free(motors))[0], 0.0))
+        return np.sqrt(np.maximum(self._undamped(self._held(motors))[0], 0.0))
 
     @checked_arguments()
     def held_compliance(self, point: str, motors: Sequence[str] | None = None) -> Array:
@@ -199,29 +214,20 @@ class LinearModel:
             That are held: by default all that are inputs.
         """
         forces = self.select([f"{point}.{axis}" for axis in ("x", "y")])._force_rows
-        free = self._free(motors)
-        stiffness = self._reduced[2][np.ix_(free, free)]
-        return np.asarray(forces[free].T @ scipy.linalg.solve(stiffness, forces[free]))
+        basis = self._held(motors)
+        moved = basis.T @ forces
+        return np.asarray(moved.T @ scipy.linalg.solve(basis.T @ self._reduced[2] @ basis, moved))
 
-    def _free(self, motors: Sequence[str] | None) -> NDArray[np.intp]:
-        """Coordinates y that move where motors are held, by default all that are inputs."""
-        own = [motor.name for motor in self.minimal.system.mechanism.motors]
-        names = [one.name for one in self.inputs if one.name in own] if motors is None else motors
-        return np.setdiff1d(np.arange(len(self.states) // 2), [self._joint_state(name) for name in names])
-
-    def _joint_state(self, motor: str) -> int:
-        joints = {one.name: one.joint for one in self.minimal.system.mechanism.motors}
-        if motor not in joints:
-            raise InputError("is no motor", field="motors", value=motor, remedy="choose from " + ", ".join(joints))
-        names = [one.name for one in self.states]
-        if joints[motor] not in names:
-            raise InputError(
-                "moves only as other motors do",
-                field="motors",
-                value=motor,
-                remedy="leave it out: it is held with them",
-            )
-        return names.index(joints[motor])
+    def _held(self, motors: Sequence[str] | None) -> Array:
+        """Basis (f, free) of the motions with motors held, by default all that are inputs."""
+        joints = {motor.name: motor.joint for motor in self.minimal.system.mechanism.motors}
+        names = [one.name for one in self.inputs if one.name in joints] if motors is None else motors
+        for name in names:
+            if name not in joints:
+                raise InputError("is no motor", field="motors", value=name, remedy="choose from " + ", ".join(joints))
+        q, Z = self.minimal.point.q[None], self.minimal.directions
+        rows = [joint_coordinate(self.minimal.system, joints[name], q).rows[0] @ Z for name in names]
+        return _kernel(np.array(rows).reshape(-1, Z.shape[1]), 1.0 / np.sqrt(np.diag(self._reduced[0])))
 
     def poles(self) -> Complex:
         """Poles (2f,), by magnitude [rad/s]."""
@@ -327,20 +333,35 @@ class LinearModel:
         """A, B, C and D by names of states, inputs and outputs, with units."""
         import xarray as xr
 
-        named = {"state": self.states, "state_of": self.states, "input": self.inputs, "output": self.outputs}
-        names = {key: [one.name for one in values] for key, values in named.items()}
-        units = {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
         data = {
             "A": (("state", "state_of"), self.A), "B": (("state", "input"), self.B),
             "C": (("output", "state_of"), self.C), "D": (("output", "input"), self.D),
         }  # fmt: skip
         attrs: dict[str, Any] = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}
-        return xr.Dataset(data, coords=names | units, attrs=attrs)
+        return xr.Dataset(data, coords=named_axes(self.states, self.inputs, self.outputs), attrs=attrs)
 
 
 def plain_name(name: str) -> str:
     """A name without dots and spaces, for programs that take none."""
     return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
+
+
+def _kernel(rows: Array, scale: Array) -> Array:
+    """Basis (f, free) of what rows (h, f) do not see, in coordinates of given sizes (f,): the others follow from some.
+
+    Rows that are coordinates themselves take out these, and leave the others as they are.
+    """
+    f = rows.shape[1]
+    if not rows.size:
+        return np.eye(f)
+    factor, order = scipy.linalg.qr(unit_rows(rows * scale), mode="r", pivoting=True)
+    size = np.abs(np.diag(factor))
+    rank = int(np.sum(size > DEPENDENT * size.max(initial=0.0)))
+    taken, free = np.asarray(order)[:rank], np.sort(np.asarray(order)[rank:])
+    basis = np.zeros((f, free.size))
+    basis[free, np.arange(free.size)] = 1.0
+    basis[taken] = -np.linalg.lstsq((rows * scale)[:, taken], rows[:, free], rcond=None)[0] * scale[taken, None]
+    return basis
 
 
 def _by_size(values: Complex) -> Complex:
