@@ -379,3 +379,54 @@ def test_state_as_a_start():
         hub_beam(0.1, 0.0, 0.0), start=State(0.0, np.zeros(build_system(hub_beam(0.1, 0.0, 0.0)).n), None)
     )
     assert model.at_rest
+
+
+# --- Coordinates of the end-effector ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", ["++++", "+-+-"])
+def test_coordinates_of_the_end_effector_change_nothing_but_the_states(raparm_at_q, mode):
+    """Poles, zeros, responses and frequencies with motors held are the same; A and B are similar by x = W x."""
+    mechanism, start = raparm_at_q
+    motors = linearise(mechanism, mode=mode, start=start)
+    task = linearise(mechanism, mode=mode, start=start, coordinates="task")
+    assert [one.name for one in task.states[:3]] == ["x", "y", "link1.elastic1"]
+    assert [one.unit for one in task.states[:2]] == ["m", "m"]
+    assert task.poles() == pytest.approx(motors.poles(), rel=1e-8, abs=1e-6)
+    for outputs in (["x", "y"], joints_of(motors)):
+        low = motors.zeros(outputs=outputs)[:8]
+        assert task.zeros(outputs=outputs)[:8] == pytest.approx(low, rel=1e-8)
+    assert task.held_frequencies() == pytest.approx(motors.held_frequencies(), rel=1e-8)
+    found, expected = (model.frequency_response([5.0, 50.0, 500.0]) for model in (task, motors))
+    assert found == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
+    # Minimal coordinates of the one from those of the other, by the motion of all coordinates that both describe.
+    place, f = np.linalg.lstsq(task.minimal.directions, motors.minimal.directions, rcond=None)[0], len(task.states) // 2
+    assert place[:2] == pytest.approx(motors.C[-2:, :f], rel=1e-8, abs=1e-8)
+    W = np.kron(np.eye(2), place)
+    size = np.abs(task.A @ W).max(axis=1, keepdims=True)
+    assert task.A @ W / size == pytest.approx(W @ motors.A / size, abs=1e-8)
+    assert pytest.approx(W @ motors.B, rel=1e-7, abs=1e-7) == task.B
+
+
+def test_the_angle_of_the_end_effector_is_a_coordinate():
+    """Of a beam on a hub its tip's slope, which turns with the hub: the same poles."""
+    beam = hub_beam(0.1, 0.5, 0.01)
+    turned = replace(beam, end_effector=EndEffector(PointRef("beam", "T"), ("angle",)))
+    model = linearise(turned, coordinates="task")
+    assert (model.states[0].name, model.states[0].unit) == ("angle", "rad")
+    assert model.poles()[:6] == pytest.approx(linearise(beam).poles()[:6], rel=1e-8, abs=1e-8)
+
+
+def test_coordinates_of_the_end_effector_that_do_not_describe_the_motion():
+    with pytest.raises(InputError, match="needs an end-effector"):
+        linearise(parallelogram(), coordinates="task")
+    # Along a straight beam the tip moves as the beam stretches, not as it turns.
+    beam = replace(hub_beam(0.1, 0.0, 0.0), end_effector=EndEffector(PointRef("beam", "T"), ("x",)))
+    with pytest.raises(InputError, match="beam can move while x and all deflections stay"):
+        linearise(beam, coordinates="task")
+    # A rigid link has one freedom: two coordinates are one too many.
+    both = replace(beam.rigid(), end_effector=EndEffector(PointRef("beam", "T"), ("x", "y")))
+    with pytest.raises(InputError, match="x cannot change by itself"):
+        linearise(both, coordinates="task")
+    with pytest.raises(InputError, match="coordinates"):
+        linearise(beam, coordinates="joints")
