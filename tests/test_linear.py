@@ -21,6 +21,7 @@ from paraflex.kinematics import Line
 from paraflex.linear import linearise
 from paraflex.linear.coordinates import coordinates_of
 from paraflex.linear.linearise import Ports, linear_model
+from paraflex.linear.zeros import zeros
 from paraflex.mechanism import (
     ActuationMode,
     Assembly,
@@ -211,9 +212,9 @@ def test_parallelogram_with_two_motors():
     # with more or less of it on other processors. Their sum and product are exact, and only those of a double zero fit.
     pairs = other[other.real > 0.0][:4].reshape(2, 2)
     assert np.abs(pairs.imag).max() < 0.1
-    zeros = np.array([11.186642724, 60.451695864])
-    assert np.sum(pairs, axis=1) == pytest.approx(2.0 * zeros, rel=1e-6)
-    assert np.prod(pairs, axis=1) == pytest.approx(zeros**2, rel=1e-6)
+    pairs_at = np.array([11.186642724, 60.451695864])
+    assert np.sum(pairs, axis=1) == pytest.approx(2.0 * pairs_at, rel=1e-6)
+    assert np.prod(pairs, axis=1) == pytest.approx(pairs_at**2, rel=1e-6)
     assert upper(model.zeros(outputs=["A", "B"]))[:2] == pytest.approx([2.016298981807, 15.41820571698], rel=1e-6)
 
 
@@ -272,6 +273,16 @@ def test_zeros_of_motors_to_the_end_effector(raparm_at_q, mode, positive):
     real = np.sort(found.real[np.abs(found.imag) < 1e-6 * np.abs(found)])
     assert real[real > 0.0][: len(positive)] == pytest.approx(positive, rel=1e-3)
     assert real[real < 0.0][::-1][: len(positive)] == pytest.approx([-zero for zero in positive], rel=1e-3)
+
+
+def test_more_motors_than_coordinates_have_few_zeros(raparm_at_q):
+    """Motors to C, of both ways to find zeros: none of ++++; of +++- those of the bar that one motor alone moves."""
+    mechanism, start = raparm_at_q
+    for mode, known in (("++++", []), ("+++-", [-1409.123, 1409.123, -6097.341j, 6097.341j])):
+        model = linearise(mechanism, mode=mode, start=start).select(outputs=["x", "y"])
+        for found in (model.zeros(), zeros(model._scaled, 100.0)):
+            low = found[np.abs(found) < 8000.0]
+            assert np.sort_complex(low) == pytest.approx(np.sort_complex(np.array(known, dtype=complex)), rel=1e-6)
 
 
 # --- Damping ----------------------------------------------------------------------------------------------------------
