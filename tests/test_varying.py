@@ -12,7 +12,7 @@ import paraflex as pf
 from paraflex.dynamics import State
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, SingularPositionError
-from paraflex.linear.discrete import Hold, transitions
+from paraflex.linear.discrete import InputHold, transitions
 from paraflex.mechanism import Motor, PointRef
 
 OPTIONS = pf.IntegrationOptions(method="esdirk5", tolerance=1e-11)
@@ -182,7 +182,7 @@ def exact():
     return np.array(ends).T
 
 
-@pytest.mark.parametrize("hold", Hold)
+@pytest.mark.parametrize("hold", InputHold)
 def test_transitions_are_those_of_integration_and_their_error_is_estimated(exact, hold):
     """Of fourth order, and as exact as the estimate says."""
     apart, size = [], np.array([1.0, 200.0, 1.0, 1.0])
@@ -190,10 +190,10 @@ def test_transitions_are_those_of_integration_and_their_error_is_estimated(exact
         found, _ = sampled(samples, hold, 2)
         Phi, Gamma, following = found.Phi[0], found.Gamma[0], found.Gamma_next[0]
         expected = exact * size[:, None]
-        assert np.any(following) == (hold is Hold.FIRST)
-        inputs = Gamma + following if hold is Hold.FIRST else Gamma
+        assert np.any(following) == (hold is InputHold.FIRST)
+        inputs = Gamma + following if hold is InputHold.FIRST else Gamma
         errors = [Phi - expected[:, :4] / size, inputs[:, 0] - expected[:, 4]]
-        if hold is Hold.FIRST:
+        if hold is InputHold.FIRST:
             errors.append(following[:, 0] - expected[:, 5])
         apart.append([np.linalg.norm(error) for error in errors])
         assert 0.2 * found.error[0] < np.linalg.norm(errors[0], 2) < 1.5 * found.error[0]

@@ -37,7 +37,7 @@ _RICHARDSON = 15.0
 _SAME = 1e-6
 
 
-class Hold(Enum):
+class InputHold(Enum):
     """Inputs between samples: constant, or straight lines."""
 
     ZERO = "zero"
@@ -71,7 +71,7 @@ class SampledModel:
         Names and units.
     times : (k,) array
         [s]
-    hold : Hold
+    hold : InputHold
         Inputs between samples.
     Phi : (k - 1, 2f, 2f) array
     Gamma, Gamma_next : (k - 1, 2f, inputs) arrays
@@ -86,7 +86,7 @@ class SampledModel:
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
     times: Array
-    hold: Hold
+    hold: InputHold
     Phi: Array
     Gamma: Array
     Gamma_next: Array
@@ -158,7 +158,7 @@ def _fitting(value: Any, field: str, shape: tuple[int, ...]) -> Array:
 # --- Exponentials -----------------------------------------------------------------------------------------------------
 
 
-def transitions(times: Array, A: Array, B: Array, ends: Array, hold: Hold) -> Transitions:
+def transitions(times: Array, A: Array, B: Array, ends: Array, hold: InputHold) -> Transitions:
     """Transition matrices between given times of x' = A x + B u.
 
     Parameters
@@ -169,7 +169,7 @@ def transitions(times: Array, A: Array, B: Array, ends: Array, hold: Hold) -> Tr
         In states of one size, as the error is a part of their root sum of squares.
     ends : (p + 1,) array
         Ends of the periods [s].
-    hold : Hold
+    hold : InputHold
     """
     unit = float(np.mean(np.diff(ends)))
     parts = max(1, math.ceil(unit * (times.size - 1) / (times[-1] - times[0]) - _SAME))
@@ -180,7 +180,7 @@ def transitions(times: Array, A: Array, B: Array, ends: Array, hold: Hold) -> Tr
     steps = np.array([every.step(*step) for step in pairwise(grid)])
     n, m = B.shape[1:]
     whole = _composed(steps, parts)
-    rising = whole[:, :n, n + m :] * (unit / np.diff(ends))[:, None, None] * (hold is Hold.FIRST)
+    rising = whole[:, :n, n + m :] * (unit / np.diff(ends))[:, None, None] * (hold is InputHold.FIRST)
     error = _errors(second, grid, steps, parts, n)
     return Transitions(whole[:, :n, :n], whole[:, :n, n : n + m] - rising, rising, error)
 

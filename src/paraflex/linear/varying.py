@@ -25,7 +25,7 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, coordinates_of, named_axes
-from paraflex.linear.discrete import Hold, Predicted, SampledModel, transitions
+from paraflex.linear.discrete import InputHold, Predicted, SampledModel, transitions
 from paraflex.linear.linearise import (
     Moving,
     Ports,
@@ -126,7 +126,7 @@ class VaryingModel:
 
     @checked_arguments()
     @solvable("the sampled model")
-    def discretised(self, period: float | None = None, *, hold: Hold | str = Hold.ZERO) -> SampledModel:
+    def discretised(self, period: float | None = None, *, hold: InputHold | str = InputHold.ZERO) -> SampledModel:
         """The model at samples, each period's matrices by exponentials of A(t), which splines give between samples.
 
         Parameters
@@ -146,7 +146,7 @@ class VaryingModel:
         InputError
             A period that is not positive, or longer than the motion.
         """
-        hold, times = as_enum(Hold, hold, "hold"), self.times
+        hold, times = as_enum(InputHold, hold, "hold"), self.times
         if period is not None:
             times = _every(period, times)
         there, back = self.modal
@@ -175,7 +175,7 @@ class VaryingModel:
 
     @cached_property
     def _between_samples(self) -> SampledModel:
-        return self.discretised(hold=Hold.FIRST)
+        return self.discretised(hold=InputHold.FIRST)
 
     def to_xarray(self) -> xr.Dataset:
         """Matrices and nominal values by time and by names of states, inputs and outputs, with units."""
