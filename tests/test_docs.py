@@ -32,7 +32,7 @@ import documented  # noqa: E402
         ("python-mechanisms.md", 6),
         ("stresses.md", 2),
         ("quick-return.md", 4),
-        ("linear-models.md", 2),
+        ("linear-models.md", 3),
     ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):

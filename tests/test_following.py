@@ -1,11 +1,14 @@
 """How a motion is followed: errors during it and after it, drift and vibration, deflections from the chord."""
 
 import json
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from paraflex.cli.tables import below_tolerance
 from paraflex.dynamics import (
     across_chord,
     build_system,
@@ -338,3 +341,12 @@ def test_tracking_errors_below_the_tolerance_are_named():
     assert line.startswith("tracking errors below the tolerance of 1e-06 m")
     assert ": +++; choose a finer tolerance (--tol)" in line
     assert below_tolerance_line({"++-": 1.1e-6, "---": None}, 1e-6) == ""
+
+
+def test_the_command_names_them_unless_steps_are_fixed():
+    said = StringIO()
+    out = Console(file=said, width=200)
+    modes = {"++": {"tracking_rms_motion": 1e-7}}
+    for settings in ({"step": None, "tolerance": 1e-6}, {"step": 1e-4, "tolerance": 1e-6}):
+        below_tolerance(out, {"line": {"error": "motion", "parameters": {"run": settings}}}, modes)
+    assert said.getvalue().count("tracking errors below the tolerance of 1e-06 m") == 1

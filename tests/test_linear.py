@@ -21,6 +21,7 @@ from paraflex.kinematics import Line
 from paraflex.linear import linearise
 from paraflex.linear.coordinates import coordinates_of
 from paraflex.linear.linearise import Ports, linear_model
+from paraflex.linear.zeros import zeros
 from paraflex.mechanism import (
     ActuationMode,
     Assembly,
@@ -211,9 +212,9 @@ def test_parallelogram_with_two_motors():
     # with more or less of it on other processors. Their sum and product are exact, and only those of a double zero fit.
     pairs = other[other.real > 0.0][:4].reshape(2, 2)
     assert np.abs(pairs.imag).max() < 0.1
-    zeros = np.array([11.186642724, 60.451695864])
-    assert np.sum(pairs, axis=1) == pytest.approx(2.0 * zeros, rel=1e-6)
-    assert np.prod(pairs, axis=1) == pytest.approx(zeros**2, rel=1e-6)
+    pairs_at = np.array([11.186642724, 60.451695864])
+    assert np.sum(pairs, axis=1) == pytest.approx(2.0 * pairs_at, rel=1e-6)
+    assert np.prod(pairs, axis=1) == pytest.approx(pairs_at**2, rel=1e-6)
     assert upper(model.zeros(outputs=["A", "B"]))[:2] == pytest.approx([2.016298981807, 15.41820571698], rel=1e-6)
 
 
@@ -272,6 +273,16 @@ def test_zeros_of_motors_to_the_end_effector(raparm_at_q, mode, positive):
     real = np.sort(found.real[np.abs(found.imag) < 1e-6 * np.abs(found)])
     assert real[real > 0.0][: len(positive)] == pytest.approx(positive, rel=1e-3)
     assert real[real < 0.0][::-1][: len(positive)] == pytest.approx([-zero for zero in positive], rel=1e-3)
+
+
+def test_more_motors_than_coordinates_have_few_zeros(raparm_at_q):
+    """Motors to C, of both ways to find zeros: none of ++++; of +++- those of the bar that one motor alone moves."""
+    mechanism, start = raparm_at_q
+    for mode, known in (("++++", []), ("+++-", [-1409.123, 1409.123, -6097.341j, 6097.341j])):
+        model = linearise(mechanism, mode=mode, start=start).select(outputs=["x", "y"])
+        for found in (model.zeros(), zeros(model._scaled, 100.0)):
+            low = found[np.abs(found) < 8000.0]
+            assert np.sort_complex(low) == pytest.approx(np.sort_complex(np.array(known, dtype=complex)), rel=1e-6)
 
 
 # --- Damping ----------------------------------------------------------------------------------------------------------
@@ -379,3 +390,54 @@ def test_state_as_a_start():
         hub_beam(0.1, 0.0, 0.0), start=State(0.0, np.zeros(build_system(hub_beam(0.1, 0.0, 0.0)).n), None)
     )
     assert model.at_rest
+
+
+# --- Coordinates of the end-effector ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", ["++++", "+-+-"])
+def test_coordinates_of_the_end_effector_change_nothing_but_the_states(raparm_at_q, mode):
+    """Poles, zeros, responses and frequencies with motors held are the same; A and B are similar by x = W x."""
+    mechanism, start = raparm_at_q
+    motors = linearise(mechanism, mode=mode, start=start)
+    task = linearise(mechanism, mode=mode, start=start, coordinates="task")
+    assert [one.name for one in task.states[:3]] == ["x", "y", "link1.elastic1"]
+    assert [one.unit for one in task.states[:2]] == ["m", "m"]
+    assert task.poles() == pytest.approx(motors.poles(), rel=1e-8, abs=1e-6)
+    for outputs in (["x", "y"], joints_of(motors)):
+        low = motors.zeros(outputs=outputs)[:8]
+        assert task.zeros(outputs=outputs)[:8] == pytest.approx(low, rel=1e-8)
+    assert task.held_frequencies() == pytest.approx(motors.held_frequencies(), rel=1e-8)
+    found, expected = (model.frequency_response([5.0, 50.0, 500.0]) for model in (task, motors))
+    assert found == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
+    # Minimal coordinates of the one from those of the other, by the motion of all coordinates that both describe.
+    place, f = np.linalg.lstsq(task.minimal.directions, motors.minimal.directions, rcond=None)[0], len(task.states) // 2
+    assert place[:2] == pytest.approx(motors.C[-2:, :f], rel=1e-8, abs=1e-8)
+    W = np.kron(np.eye(2), place)
+    size = np.abs(task.A @ W).max(axis=1, keepdims=True)
+    assert task.A @ W / size == pytest.approx(W @ motors.A / size, abs=1e-8)
+    assert pytest.approx(W @ motors.B, rel=1e-7, abs=1e-7) == task.B
+
+
+def test_the_angle_of_the_end_effector_is_a_coordinate():
+    """Of a beam on a hub its tip's slope, which turns with the hub: the same poles."""
+    beam = hub_beam(0.1, 0.5, 0.01)
+    turned = replace(beam, end_effector=EndEffector(PointRef("beam", "T"), ("angle",)))
+    model = linearise(turned, coordinates="task")
+    assert (model.states[0].name, model.states[0].unit) == ("angle", "rad")
+    assert model.poles()[:6] == pytest.approx(linearise(beam).poles()[:6], rel=1e-8, abs=1e-8)
+
+
+def test_coordinates_of_the_end_effector_that_do_not_describe_the_motion():
+    with pytest.raises(InputError, match="needs an end-effector"):
+        linearise(parallelogram(), coordinates="task")
+    # Along a straight beam the tip moves as the beam stretches, not as it turns.
+    beam = replace(hub_beam(0.1, 0.0, 0.0), end_effector=EndEffector(PointRef("beam", "T"), ("x",)))
+    with pytest.raises(InputError, match="beam can move while x and all deflections stay"):
+        linearise(beam, coordinates="task")
+    # A rigid link has one freedom: two coordinates are one too many.
+    both = replace(beam.rigid(), end_effector=EndEffector(PointRef("beam", "T"), ("x", "y")))
+    with pytest.raises(InputError, match="x cannot change by itself"):
+        linearise(both, coordinates="task")
+    with pytest.raises(InputError, match="coordinates"):
+        linearise(beam, coordinates="joints")

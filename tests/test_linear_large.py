@@ -11,6 +11,7 @@ import scipy
 
 import paraflex as pf
 from paraflex.dynamics import build_system, consistent_state, linearise as vibrations, natural_frequencies
+from paraflex.dynamics.sparse import Factor
 from paraflex.linear import linearise
 from paraflex.linear.descriptor import Descriptor, poles_near, response_at
 from paraflex.linear.independent import independent_dense, independent_sparse
@@ -173,3 +174,11 @@ def test_a_stiffness_that_the_typical_square_cancels(monkeypatch):
     known = natural_frequencies(system, state).squares
     monkeypatch.setattr(vibrations, "DENSE_COORDINATES", 0)
     assert natural_frequencies(system, state).squares == pytest.approx(known)
+
+
+def test_the_sign_of_a_factor_is_that_of_the_determinant():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        matrix = rng.normal(size=(7, 7)) * (rng.random((7, 7)) < 0.5) + np.diag(rng.normal(size=7))
+        factor = Factor(scipy.sparse.csr_matrix(matrix), np.full(7, 0.5))
+        assert factor.sign == np.sign(np.linalg.det(matrix))

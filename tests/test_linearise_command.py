@@ -252,6 +252,8 @@ def test_about_motions():
     assert numbers["time"] == found.time
     poles = [complex(*pair) for pair in numbers["modes"]["++"]["motors_free"]["poles"]]
     assert np.array_equal(poles, found.poles())
+    task = paraflex("linearise", "five_bar", "--path", "line", "--at", "0.05", "--coordinates", "task", "--json")
+    assert json.loads(task.stdout)["parameters"]["run"]["coordinates"] == "task"
     own = paraflex("linearise", "slider_crank_flexible", "--at", "0.02")
     assert own.returncode == 0, own.stderr
     assert "about the run at t = 0.02 s" in own.stdout
@@ -320,6 +322,8 @@ BAD = [
     (["four_bar", "--pose", "1,2"], "--pose: no end-effector with a place"),
     (["five_bar", "--pose", "1,2", "--assembly", "x"], "--assembly: names the pose as --pose does"),
     (["five_bar", "--force-at", "link1.Z"], "--force-at: unknown body"),
+    (["five_bar", "--coordinates", "x"], "--coordinates: unknown first coordinates (got 'x')"),
+    (["four_bar", "--coordinates", "task"], "--coordinates: needs an end-effector"),
     (["five_bar", "--prescribed", "x"], "--prescribed: is no prescribed motion"),
 ]  # fmt: skip
 

@@ -77,7 +77,13 @@ from .integrators import (
 )
 
 # Linear models
-from .linear import linearise as linearise, LinearModel as LinearModel
+from .linear import (
+    linearise as linearise,
+    linearise_along as linearise_along,
+    LinearModel as LinearModel,
+    VaryingModel as VaryingModel,
+    SampledModel as SampledModel,
+)
 
 # Studies
 from .campaign import Workers as Workers

@@ -141,7 +141,7 @@ def _everything(mechanism: Mechanism) -> ActuationMode:
 
 def _data(model: Model, modes: Sequence[ActuationMode], request: LineariseRequest) -> xr.Dataset:
     """Linear models in all modes, and along the motion."""
-    ports: dict[str, Any] = {"forces": request.forces, "prescribed": request.prescribed}
+    ports = _ports(request)
     with flagged(request):
         if request.at is None and request.along is None and request.path is None:
             pose = _pose(model, request)
@@ -151,6 +151,11 @@ def _data(model: Model, modes: Sequence[ActuationMode], request: LineariseReques
         return _moving([motion] * len(modes), modes, request, _parameters(model, modes, request))
 
 
+def _ports(request: LineariseRequest) -> dict[str, Any]:
+    """Inputs and first states."""
+    return {"forces": request.forces, "prescribed": request.prescribed, "coordinates": request.coordinates}
+
+
 def _moving(
     motions: Sequence[TrackingTask | TrackingRun | MotionRun],
     modes: Sequence[ActuationMode],
@@ -158,7 +163,7 @@ def _moving(
     parameters: dict[str, Any],
 ) -> xr.Dataset:
     """Linear models about motions, one for each mode, and along them."""
-    ports: dict[str, Any] = {"forces": request.forces, "prescribed": request.prescribed}
+    ports = _ports(request)
     with flagged(request):
         pairs = list(zip(motions, modes, strict=True))
         about = [_in_motion(motion, mode, request.at or 0.0, ports) for motion, mode in pairs]
@@ -278,8 +283,8 @@ def _in_motion(
 def _parameters(model: Model, modes: Iterable[ActuationMode], request: LineariseRequest) -> dict[str, Any]:
     """What was asked for."""
     asked = {name: getattr(request, name) for name in ("pose", "balanced", "at", "along", "path", "assembly", "forces",
-                                                        "prescribed")}  # fmt: skip
-    run = {name: value for name, value in asked.items() if value not in (None, False, [])}
+                                                        "prescribed", "coordinates")}  # fmt: skip
+    run = {name: value for name, value in asked.items() if value not in (None, False, [], "motors")}
     return {
         "model": dict(model.parameters),
         "run": {

@@ -246,3 +246,17 @@ class Factor:
             (n, n), matvec=self._factor.solve, rmatvec=lambda x: self._factor.solve(x, "T"), dtype=np.dtype(float)
         )
         return float(scipy.sparse.linalg.norm(self._matrix, 1) * scipy.sparse.linalg.onenormest(inverse, t=1))
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant; not to be compared with those of matrices whose entries are elsewhere."""
+        odd = sum(_is_odd(order) for order in (self._factor.perm_r, self._factor.perm_c))
+        return float(np.prod(np.sign(self._factor.U.diagonal()))) * (-1.0) ** odd
+
+
+def _is_odd(order: NDArray[np.int64]) -> bool:
+    """Whether a permutation is made of an odd number of exchanges."""
+    cycles = scipy.sparse.csgraph.connected_components(
+        scipy.sparse.csr_matrix((np.ones(order.size), (np.arange(order.size), order)), shape=(order.size,) * 2)
+    )[0]
+    return bool((order.size - cycles) % 2)

@@ -1,4 +1,6 @@
 """Linear models of mechanisms with named inputs and sensors: poles, zeros, frequency responses."""
 
+from paraflex.linear.discrete import SampledModel as SampledModel
 from paraflex.linear.linearise import linearise as linearise
 from paraflex.linear.model import LinearModel as LinearModel
+from paraflex.linear.varying import VaryingModel as VaryingModel, linearise_along as linearise_along

@@ -2,15 +2,17 @@
 
 The constraints leave f free directions at a pose. Their coordinates y = T q are the angles and travels of the joints
 that have motors, as far as these are independent (of flexible links mostly all), then as many flexible coordinates of
-bodies as are missing, and places and angles of bodies where these do not suffice: see `independent`.
+bodies as are missing, and places and angles of bodies where these do not suffice: see `independent`. Instead of the
+joints the end-effector's place and angle may come first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -18,19 +20,22 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System
+from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.constraints import coordinate_kind
+from paraflex.dynamics.joint_coordinates import marker_place, material_angle
 from paraflex.dynamics.linearise import Inertia
 from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents, rows_of
 from paraflex.errors import InputError
 from paraflex.linear.independent import independent_dense, independent_sparse
-from paraflex.mechanism import ConstantSpeed, Mechanism, PrescribedAngle
+from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
 
 # A matrix of so many entries BLAS factors in one thread.
 _FEW_ENTRIES = 8192
 # Places and angles of bodies count as much less than flexible coordinates: they are chosen last.
 _LAST = 1e-5
+# A pin between the end-effector and the ground frame's origin, whose rows are the end-effector's coordinates.
+_TASK = "the end-effector"
 
 
 class Variable(NamedTuple):
@@ -38,6 +43,13 @@ class Variable(NamedTuple):
 
     name: str
     unit: str
+
+
+def named_axes(states: Sequence[Variable], inputs: Sequence[Variable], outputs: Sequence[Variable]) -> dict[str, Any]:
+    """Names and units of the dimensions state, state_of, input and output, for labelled arrays of matrices."""
+    named = {"state": states, "state_of": states, "input": inputs, "output": outputs}
+    names = {key: [one.name for one in values] for key, values in named.items()}
+    return names | {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
 
 
 class Chosen(NamedTuple):
@@ -48,7 +60,7 @@ class Chosen(NamedTuple):
     constraints : array of int
         Independent rows among the constraints.
     joints : array of int
-        Rows of the joints whose coordinates are states, among `Coordinates.joints`.
+        Rows of the coordinates of the end-effector and of joints that are states, among `Coordinates.measured`.
     bodies : array of int
         Coordinates of bodies that are states.
     """
@@ -121,34 +133,93 @@ class Coordinates:
     ----------
     system : System
     joints : tuple of str
-        Joints whose coordinates become states where they are independent; those of `driven` last, in their order.
+        Joints of the motors, and those of `driven` last, in their order; their coordinates become states where they
+        are independent.
     driven : tuple of str
         Prescribed motions that are inputs: their joints' coordinates are states.
+    task : tuple of str
+        Coordinates "x", "y" and "angle" of the end-effector that become states in place of those of motors' joints.
     """
 
     system: System
     joints: tuple[str, ...]
     driven: tuple[str, ...] = ()
+    task: tuple[str, ...] = ()
+
+    @cached_property
+    def measured(self) -> tuple[Variable, ...]:
+        """Coordinates of the end-effector and of the joints, which may become states."""
+        slides = [self.system.mechanism.joint(joint).slides for joint in self._candidates]
+        return (
+            *(Variable(axis, "rad" if axis == "angle" else "m") for axis in self.task),
+            *(Variable(joint, "m" if each else "rad") for joint, each in zip(self._candidates, slides, strict=True)),
+        )
+
+    @property
+    def _candidates(self) -> tuple[str, ...]:
+        """Joints whose coordinates may become states: beside the end-effector's those that are driven."""
+        return self.joints[len(self.joints) - len(self.driven) :] if self.task else self.joints
+
+    def values(self, chosen: Chosen, q: Array, v: Array) -> Array:
+        """Minimal coordinates and then their rates (k, 2f) of coordinates (k, n) and velocities (k, n)."""
+        found = [self._measured(k, q, v) for k in chosen.joints.tolist()]
+        found += [(q[:, k], v[:, k]) for k in chosen.bodies.tolist()]
+        return np.concatenate([np.stack(part, axis=1) for part in zip(*found, strict=True)], axis=1)
+
+    def _measured(self, k: int, q: Array, v: Array) -> tuple[Array, Array]:
+        """A coordinate of `measured` and its rate."""
+        if k >= len(self.task):
+            coordinate = joint_coordinate(self.system, self._candidates[k - len(self.task)], q, v)
+            return coordinate.value, coordinate.rate
+        axis, marker = self.task[k], self.system.marker(self._effector)
+        if axis == "angle":
+            # The slope is linear in the coordinates.
+            return material_angle(self.system, self._effector, q), material_angle(self.system, self._effector, v)
+        place, rows = marker_place(self.system, marker, q)
+        component = ("x", "y").index(axis)
+        return place[:, component], np.sum(rows[:, component] * v, axis=1)
+
+    @property
+    def _effector(self) -> PointRef:
+        effector = self.system.mechanism.end_effector
+        assert effector is not None
+        return effector.point
 
     @cached_property
     def tangency(self) -> Tangency:
-        """Of the system with a row for every joint's coordinate, which prescribes nothing."""
+        """Of the system with a row for every coordinate of `measured`, which holds nothing."""
         mechanism, held = self.system.mechanism, {one.joint for one in self.system.mechanism.prescribed}
         more = tuple(PrescribedAngle(_row(joint), joint, ConstantSpeed(0.0, 0.0))
-                     for joint in self.joints if joint not in held)  # fmt: skip
-        if not more:
+                     for joint in (*self.joints, *([_TASK] if "angle" in self.task else [])) if joint not in held
+                     )  # fmt: skip
+        if not (more or self.task):
             return Tangency(self.system)
+        if self.task:
+            origin = PointRef(GROUND, _TASK)
+            mechanism = replace(
+                mechanism, ground={**mechanism.ground, _TASK: (0.0, 0.0)},
+                joints=(*mechanism.joints, RevoluteJoint(_TASK, origin, self._effector)),
+            )  # fmt: skip
         return Tangency(with_constraints_of(self.system, replace(mechanism, prescribed=(*mechanism.prescribed, *more))))
 
     @cached_property
     def _rows(self) -> tuple[dict[str, int], NDArray[np.int64]]:
-        """Rows of the system with more rows: those of joints' coordinates; and the numbers of all in the system."""
+        """Rows of the system with more rows: those of coordinates by joint; and the numbers of all in the system."""
         extended = self.tangency.system
         mechanism, names = extended.mechanism, {name: k for k, name in enumerate(extended.rows)}
         rows = {one.joint: names[f"{one.name} {coordinate_kind(mechanism.joint(one.joint))}"]
                 for one in mechanism.prescribed}  # fmt: skip
         own = {name: k for k, name in enumerate(self.system.rows)}
         return rows, np.array([own.get(name, -1) for name in extended.rows], dtype=int)
+
+    @property
+    def _task_rows(self) -> NDArray[np.int64]:
+        """Rows of the system with more rows that are coordinates of the end-effector."""
+        names = self.tangency.system.rows
+        return np.array(
+            [self._rows[0][_TASK] if axis == "angle" else names.index(f"{_TASK} {axis}") for axis in self.task],
+            dtype=int,
+        )
 
     def _rows_of(self, joints: Sequence[str]) -> NDArray[np.int64]:
         return np.array([self._rows[0][joint] for joint in joints], dtype=int)
@@ -163,7 +234,8 @@ class Coordinates:
 
     def at(self, point: MotionPoint) -> PointTangents:
         """The tangent matrices at a point of a motion."""
-        coordinates, number = self._rows_of(self.joints), self._rows[1]
+        number = self._rows[1]
+        coordinates = np.concatenate([self._task_rows, self._rows_of(self._candidates)])
         lam = np.zeros(number.size)
         lam[number >= 0] = point.multipliers[number[number >= 0]]
         whole = self.tangency.at(point._replace(multipliers=lam))
@@ -173,25 +245,53 @@ class Coordinates:
             parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
             return RowTangents(*rows_of(at, *parts), number=number[wanted])
 
-        holding = whole.rows[~np.isin(whole.rows, coordinates)]
+        # Of the end-effector's pin no row holds, whether it is a coordinate or not.
+        pin = [k for k, name in enumerate(self.tangency.system.rows) if name.startswith(_TASK)]
+        holding = whole.rows[~np.isin(whole.rows, [*self._rows_of(self.joints), *coordinates, *pin])]
         motors = self._rows_of([motor.joint for motor in self.system.mechanism.motors])
         acting = rows_of(np.searchsorted(whole.rows, motors), whole.jacobian)[0]
         return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant], acting)
 
-    def choose(self, tangents: PointTangents) -> Chosen:
-        """Choose minimal coordinates at a pose."""
+    def choose(self, tangents: PointTangents, without: Collection[int] = ()) -> Chosen:
+        """Choose minimal coordinates at a pose, without some of `measured`.
+
+        Raises
+        ------
+        InputError
+            The end-effector's coordinates are to be states, but do not describe the motion.
+        """
         constraints, joints = (_unit(part.jacobian, self.scale) for part in (tangents.constraints, tangents.joints))
         # Those that are driven must be states.
-        free, driven = np.split(np.arange(len(self.joints)), [len(self.joints) - len(self.driven)])
+        free, driven = np.split(np.arange(len(self.measured)), [len(self.measured) - len(self.driven)])
+        free = np.array([k for k in free.tolist() if k not in without], dtype=int)
         weights = np.full(self.system.n, _LAST)
         for body in self.system.bodies:
             weights[body.flexible] = 1.0
-        few = (tangents.constraints.number.size + len(self.joints)) * self.system.n <= _FEW_ENTRIES
+        few = (tangents.constraints.number.size + len(self.measured)) * self.system.n <= _FEW_ENTRIES
         choose = independent_dense if few else independent_sparse
         found = choose([constraints, joints[driven], joints[free]], weights)
         states = np.concatenate([free[found.groups[2]], driven[found.groups[1]]])
         bodies = np.setdiff1d(np.arange(self.system.n), found.columns)
-        return Chosen(found.groups[0], states, bodies)
+        chosen = Chosen(found.groups[0], states, bodies)
+        if self.task:
+            self._check_task(chosen)
+        return chosen
+
+    def _check_task(self, chosen: Chosen) -> None:
+        """Refuse coordinates of the end-effector that follow from others, or leave rigid bodies free."""
+        rigid = [body.name for body in self.system.bodies
+                 if np.isin(chosen.bodies, np.arange(body.offset, body.offset + 3)).any()]  # fmt: skip
+        follow = [axis for k, axis in enumerate(self.task) if k not in chosen.joints]
+        if not (rigid or follow):
+            return
+        reason = (
+            f"{', '.join(follow)} cannot change by itself" if follow
+            else f"{', '.join(rigid)} can move while {', '.join(self.task)} and all deflections stay"
+        )  # fmt: skip
+        raise InputError(
+            f"the end-effector's coordinates do not describe the motion here: {reason}",
+            field="coordinates", value="task", remedy='choose "motors", or another pose',
+        )  # fmt: skip
 
     @cached_property
     def scale(self) -> Array:
@@ -206,9 +306,7 @@ class Coordinates:
 
     def names(self, chosen: Chosen) -> tuple[Variable, ...]:
         """The states that are coordinates; their rates follow in the same order."""
-        mechanism, quantities = self.system.mechanism, []
-        for joint in (self.joints[k] for k in chosen.joints.tolist()):
-            quantities.append(Variable(joint, "m" if mechanism.joint(joint).slides else "rad"))
+        quantities = [self.measured[k] for k in chosen.joints.tolist()]
         offsets = np.array([body.offset for body in self.system.bodies])
         for k, which in zip(chosen.bodies, np.searchsorted(offsets, chosen.bodies, side="right") - 1, strict=True):
             body = self.system.bodies[which]
@@ -218,13 +316,22 @@ class Coordinates:
         return tuple(quantities)
 
 
-def coordinates_of(system: System, driven: tuple[str, ...] = ()) -> Coordinates:
-    """Coordinates with the joints of all motors, and those that are driven.
+class FirstCoordinates(Enum):
+    """Which coordinates are the first states: those of the motors' joints, or those of the end-effector."""
+
+    MOTORS = "motors"
+    TASK = "task"
+
+
+def coordinates_of(
+    system: System, driven: tuple[str, ...] = (), first: FirstCoordinates = FirstCoordinates.MOTORS
+) -> Coordinates:
+    """Coordinates with the joints of all motors, or of the end-effector, and those that are driven.
 
     Raises
     ------
     InputError
-        A driven motion that the mechanism does not have.
+        A driven motion or an end-effector that the mechanism does not have.
     """
     mechanism: Mechanism = system.mechanism
     known = {one.name: one.joint for one in mechanism.prescribed}
@@ -234,8 +341,14 @@ def coordinates_of(system: System, driven: tuple[str, ...] = ()) -> Coordinates:
                 "is no prescribed motion", field="prescribed", value=name,
                 remedy="choose from " + ", ".join(known) if known else "the mechanism has none",
             )  # fmt: skip
+    task: tuple[str, ...] = ()
+    if first is FirstCoordinates.TASK:
+        if mechanism.end_effector is None:
+            raise InputError("needs an end-effector, which the mechanism does not have", field="coordinates",
+                             value="task", remedy='choose "motors", or name an end-effector')  # fmt: skip
+        task = mechanism.end_effector.coordinates
     joints = dict.fromkeys(motor.joint for motor in mechanism.motors if motor.joint not in set(known.values()))
-    return Coordinates(system, (*joints, *(known[name] for name in driven)), driven)
+    return Coordinates(system, (*joints, *(known[name] for name in driven)), driven, task)
 
 
 def _row(joint: str) -> str:

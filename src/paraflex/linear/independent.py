@@ -21,11 +21,11 @@ from paraflex.arrays import Array
 
 Numbers = NDArray[np.int64]
 # A row of size one of which no more than this is independent of others follows from them.
-_DEPENDENT = 1e-8
+DEPENDENT = 1e-8
 # A pivot is at least this part of the largest entry of its row.
 _PIVOT = 0.1
 # Rows of which less than this is left wait until no others are left: their elimination makes others grow.
-_WAITING = (1e-2, 1e-4, 1e-6, _DEPENDENT)
+_WAITING = (1e-2, 1e-4, 1e-6, DEPENDENT)
 # What is left of an entry that cancels, as a part of it.
 _CANCELLED = 1e-14
 
@@ -60,7 +60,7 @@ def independent_dense(groups: Sequence[csr_matrix], weights: Array) -> Independe
     if first.size:
         basis, upper, order = (np.asarray(part) for part in scipy.linalg.qr(first.T, mode="economic", pivoting=True))
         size = np.abs(np.diag(upper))
-        rank = int(np.sum(size > _DEPENDENT * size.max(initial=1.0)))
+        rank = int(np.sum(size > DEPENDENT * size.max(initial=1.0)))
         kept, basis = np.sort(order[:rank]), basis[:, :rank]
     found, taken = [kept], [first[kept]]
     for group in others:
@@ -68,7 +68,7 @@ def independent_dense(groups: Sequence[csr_matrix], weights: Array) -> Independe
         for k, row in enumerate(group):
             left = row - basis @ (basis.T @ row)
             size = np.linalg.norm(left)
-            if size > _DEPENDENT:
+            if size > DEPENDENT:
                 left -= basis @ (basis.T @ left)
                 basis = np.column_stack([basis, left / np.linalg.norm(left)])
                 rows.append(k)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -23,10 +25,10 @@ from paraflex.dynamics import (
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.sensors import sensor_rows
 from paraflex.dynamics.tangents import MotionPoint
-from paraflex.errors import InputError
+from paraflex.errors import InputError, as_enum
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import Coordinates, Variable, coordinates_of
+from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, coordinates_of
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import planned_point, resting_point, run_point
@@ -72,6 +74,7 @@ def linearise(
     balanced: bool = False,
     forces: Sequence[str] = (),
     prescribed: Sequence[str] = (),
+    coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
 ) -> LinearModel:
     """A linear model of small changes of a motion, with motors of a mode as inputs and sensors as outputs.
 
@@ -97,24 +100,28 @@ def linearise(
     prescribed : sequence of str
         Prescribed motions whose accelerations are inputs as well; all by default where there is neither a motor nor a
         force. Others keep to their laws.
+    coordinates : str
+        First states: "motors", the coordinates of the motors' joints, or "task", those of the end-effector.
 
     Raises
     ------
     InputError
-        An unknown mode, point or motion, nothing that could be an input, a time that the motion does not have, or a
-        mechanism without any freedom.
+        An unknown mode, point or motion, nothing that could be an input, a time that the motion does not have, a
+        mechanism without any freedom, or coordinates of the end-effector that do not describe its motion.
     AssemblyError
         The loops do not close, or there is no equilibrium.
     SingularPositionError
         A singular position, at which no coordinates describe the motion.
     """
-    mechanism = source if isinstance(source, Mechanism) else _mechanism_of(source)
-    chosen = _mode(mechanism, mode if mode is not None else (source.mode if isinstance(source, TrackingRun) else None))
-    ports = _ports(mechanism, chosen, forces, prescribed)
+    mechanism = source if isinstance(source, Mechanism) else mechanism_of(source)
+    chosen = mode_of(source, mechanism, mode)
+    ports = ports_of(mechanism, chosen, forces, prescribed)
+    first = as_enum(FirstCoordinates, coordinates, "coordinates")
     unbalanced = 0.0
     if isinstance(source, TrackingTask | TrackingRun | MotionRun):
-        system, point, about = _moving(source, chosen, at)
-        coordinates = coordinates_of(system, ports.prescribed)
+        about, system, times, point_at = moving(source, chosen)
+        point = point_at(0 if at is None else nearest_sample(times, at))
+        chart = coordinates_of(system, ports.prescribed, first)
     else:
         given = start if start is not None or isinstance(source, Mechanism) else source.start
         system = build_system(mechanism)
@@ -122,10 +129,10 @@ def linearise(
         if balanced:
             joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
             state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
-        coordinates = coordinates_of(system, ports.prescribed)
-        point, unbalanced = resting_point(coordinates, state, chosen)
+        chart = coordinates_of(system, ports.prescribed, first)
+        point, unbalanced = resting_point(chart, state, chosen)
         about = "static equilibrium" if balanced else "a pose at rest"
-    return linear_model(coordinates, point, ports, about, unbalanced=unbalanced)
+    return linear_model(chart, point, ports, about, unbalanced=unbalanced)
 
 
 def linear_model(
@@ -135,11 +142,12 @@ def linear_model(
     about: str,
     *,
     unbalanced: float = 0.0,
+    chosen: Chosen | None = None,
 ) -> LinearModel:
-    """The model about a point of a motion, in coordinates chosen there."""
+    """The model about a point of a motion, in coordinates chosen there or before."""
     system = coordinates.system
     mechanism, tangents = system.mechanism, coordinates.at(point)
-    chosen = coordinates.choose(tangents)
+    chosen = coordinates.choose(tangents) if chosen is None else chosen
     if not chosen.freedoms:
         raise InputError("has no freedom to move", field="mechanism", value=mechanism.name, remedy="free a joint")
     motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in ports.mode.motors]
@@ -167,19 +175,24 @@ def linear_model(
     )
 
 
-def _mechanism_of(source: ModelWithPaths | TrackingTask | TrackingRun | MotionRun) -> Mechanism:
+def mechanism_of(source: ModelWithPaths | TrackingTask | TrackingRun | MotionRun) -> Mechanism:
+    """The mechanism that is linearised."""
     if isinstance(source, TrackingRun):
         return source.task.mechanism
     return source.system.mechanism if isinstance(source, MotionRun) else source.mechanism
 
 
-def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
+def mode_of(source: object, mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
+    """A mode, by default that of a run, else all motors."""
+    if mode is None and isinstance(source, TrackingRun):
+        mode = source.mode
     if mode is None:
         return ActuationMode("all motors", tuple(motor.name for motor in mechanism.motors))
     return mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
 
 
-def _ports(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], prescribed: Sequence[str]) -> Ports:
+def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], prescribed: Sequence[str]) -> Ports:
+    """Inputs and outputs from the names of points and of prescribed motions."""
     if not (mode.motors or forces or prescribed):
         prescribed = [one.name for one in mechanism.prescribed]
         if not prescribed:
@@ -214,15 +227,22 @@ def _pose(system: System, start: Start | State | None, assembly: str | None) -> 
     return start_state(system, start, mechanism.assembly(assembly) if mechanism.assemblies else None)
 
 
-def _moving(
-    source: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode, at: float | None
-) -> tuple[System, MotionPoint, str]:
-    times = source.motion.t if isinstance(source, TrackingTask) else source.solution.t
-    sample = 0 if at is None else nearest_sample(times, at)
+class Moving(NamedTuple):
+    """A planned motion or a run: what it is, its system, the times (k,) of its samples, and their points by number."""
+
+    about: str
+    system: System
+    times: Array
+    point: Callable[[int], MotionPoint]
+
+
+def moving(source: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode) -> Moving:
+    """What linear models along a planned motion or a run are made from."""
     if isinstance(source, TrackingTask):
-        return source.system, planned_point(source, mode, sample), "a planned motion"
+        return Moving("a planned motion", source.system, source.motion.t, partial(planned_point, source, mode))
     system = source.system if isinstance(source, MotionRun) else source.task.system
-    return system, run_point(source, sample), "a run"
+    # The state at an event is a sample more than a run along a path has torques for.
+    return Moving("a run", system, source.solution.t[: len(source.applied)], partial(run_point, source))
 
 
 def nearest_sample(times: Array, at: float) -> int:

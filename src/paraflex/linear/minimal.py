@@ -94,20 +94,45 @@ class Minimal:
         return self.tangents.joints.taken(self.chosen.joints)
 
     @cached_property
+    def _matrix(self) -> csr_matrix:
+        """The rows [Phi_q; T] at the coordinates that are no states."""
+        whole = csr_matrix(scipy.sparse.vstack([self.constraints.jacobian, self.joints.jacobian]))
+        return csr_matrix(whole[:, self._dependent])
+
+    @cached_property
     def _factor(self) -> Factor:
-        """Factor of the rows [Phi_q; T] at the coordinates that are no states."""
-        matrix = csr_matrix(scipy.sparse.vstack([self.constraints.jacobian, self.joints.jacobian]))
+        """Factor of `_matrix`."""
         cause = "the coordinates chosen for the linear model do not describe its motion"
         singular = SingularPositionError(
             cause, Moment(self.point.time, 0), remedy="linearise away from this singular position"
         )
         try:
-            factor = Factor(csr_matrix(matrix[:, self._dependent]), self.scale[self._dependent])
+            factor = Factor(self._matrix, self.scale[self._dependent])
         except np.linalg.LinAlgError as error:
             raise singular from error
         if not factor.condition < _SINGULAR:
             raise singular
         return factor
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the coordinates, infinite where they do not describe the motion."""
+        try:
+            return self._factor.condition
+        except SingularPositionError:
+            return np.inf
+
+    @property
+    def orientation(self) -> float:
+        """Sign of the determinant of `_matrix`: another one lies beyond a pose where the coordinates are singular."""
+        return self._factor.sign
+
+    def most_dependent(self) -> int | None:
+        """Which of `chosen.joints` has the largest part in rows that nearly depend on one another; None without any."""
+        rows = self._matrix.toarray() * self.scale[self._dependent]
+        part = np.abs(scipy.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))[0][:, -1])
+        part = part[self.constraints.number.size :]
+        return int(np.argmax(part)) if part.size else None
 
     @cached_property
     def _dependent(self) -> NDArray[np.int64]:

@@ -20,8 +20,9 @@ from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
-from paraflex.linear.coordinates import Variable
+from paraflex.linear.coordinates import Variable, named_axes
 from paraflex.linear.descriptor import poles_near, response_at
+from paraflex.linear.independent import DEPENDENT
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.motions import Motions, SecondOrder, modal_damping, motions
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 Complex = NDArray[np.complex128]
 # Stiffness is symmetric at rest but for this part of it.
 _SYMMETRIC = 1e-7
-# A coordinate of a joint that changes less than this part of its size with others held is held with them.
-_HELD = 1e-8
 # With more degrees of freedom sparse matrices are faster than dense ones.
 _DENSE_FREEDOMS = 200
 
@@ -132,11 +131,11 @@ class LinearModel:
     @cached_property
     def _modes(self) -> tuple[Array, Array]:
         """Squares of the undamped frequencies (f,), ascending, and shapes (f, f) of unit mass, in the coordinates y."""
-        return self._undamped(np.arange(len(self.states) // 2))
+        return self._undamped(np.eye(len(self.states) // 2))
 
-    def _undamped(self, free: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Squares and shapes of the undamped modes in some of the coordinates y, the others held."""
-        mass, _, stiffness = (part[np.ix_(free, free)] for part in self._reduced)
+    def _undamped(self, basis: Array) -> tuple[Array, Array]:
+        """Squares and shapes of the undamped modes in the motions y of a basis (f, free)."""
+        mass, _, stiffness = (basis.T @ part @ basis for part in self._reduced)
         return undamped_modes(mass, 0.5 * (stiffness + stiffness.T), self._typical)
 
     @cached_property
@@ -152,18 +151,33 @@ class LinearModel:
         return modal_damping(self._reduced[1], self._modes[1])
 
     @cached_property
+    def modal_states(self) -> tuple[Array, Array]:
+        """States in undamped modes of unit mass from states, and the reverse, (2f, 2f) each.
+
+        Displacements are multiplied by their frequencies. The sum of squares is twice the energy;
+        what is free has a low frequency in place of zero.
+        """
+        shapes, omega = self._modes[1], self._modal_sizes
+        inverse = shapes.T @ self._reduced[0]
+        there = scipy.linalg.block_diag(omega[:, None] * inverse, inverse)
+        return there, scipy.linalg.block_diag(shapes / omega, shapes)
+
+    @property
+    def _modal_sizes(self) -> Array:
+        """By what displacements of undamped modes (f,) are multiplied in `modal_states` [rad/s]."""
+        return np.sqrt(np.maximum(self._modes[0], 0.0) + self._typical)
+
+    @cached_property
     def _scaled(self) -> StateSpace:
         """The model in modes of its mass and stiffness, whose displacements are multiplied by their frequencies."""
-        squares, shapes = self._modes
-        inverse, f = shapes.T @ self._reduced[0], shapes.shape[0]
-        omega = np.sqrt(np.maximum(squares, 0.0) + self._typical)
+        there, back = self.modal_states
         if self._is_vibrating:
-            A = np.block([[np.zeros((f, f)), np.diag(omega)], [-np.diag(squares / omega), -self._modal_damping]])
+            omega, f = self._modal_sizes, self._modes[0].size
+            place = -np.diag(self._modes[0] / omega)
+            A = np.block([[np.zeros((f, f)), np.diag(omega)], [place, -self._modal_damping]])
         else:
-            place, rate = inverse @ self.A[f:, :f] @ shapes / omega, inverse @ self.A[f:, f:] @ shapes
-            A = np.block([[np.zeros((f, f)), np.diag(omega)], [place, rate]])
-        C = np.hstack([self.C[:, :f] @ shapes / omega, self.C[:, f:] @ shapes])
-        return StateSpace(A, np.vstack([self.B[:f], inverse @ self.B[f:]]), C, self.D)
+            A = there @ self.A @ back
+        return StateSpace(A, there @ self.B, self.C @ back, self.D)
 
     @cached_property
     def frequencies(self) -> Array:
@@ -187,9 +201,9 @@ class LinearModel:
         Raises
         ------
         InputError
-            A motor that the mechanism does not have, or whose joint is no state, as it follows from others.
+            A motor that the mechanism does not have.
         """
-        return np.sqrt(np.maximum(self._undamped(self._free(motors))[0], 0.0))
+        return np.sqrt(np.maximum(self._undamped(self._held(motors))[0], 0.0))
 
     @checked_arguments()
     def held_compliance(self, point: str, motors: Sequence[str] | None = None) -> Array:
@@ -203,32 +217,20 @@ class LinearModel:
             That are held: by default all that are inputs.
         """
         forces = self.select([f"{point}.{axis}" for axis in ("x", "y")])._force_rows
-        free = self._free(motors)
-        stiffness = self._reduced[2][np.ix_(free, free)]
-        return np.asarray(forces[free].T @ scipy.linalg.solve(stiffness, forces[free]))
+        basis = self._held(motors)
+        moved = basis.T @ forces
+        return np.asarray(moved.T @ scipy.linalg.solve(basis.T @ self._reduced[2] @ basis, moved))
 
-    def _free(self, motors: Sequence[str] | None) -> NDArray[np.intp]:
-        """Coordinates y that move where motors are held, by default all that are inputs."""
-        own = [motor.name for motor in self.minimal.system.mechanism.motors]
-        names = [one.name for one in self.inputs if one.name in own] if motors is None else motors
-        return np.setdiff1d(np.arange(len(self.states) // 2), [self._joint_state(name) for name in names])
-
-    def _joint(self, motor: str) -> str:
-        joints = {one.name: one.joint for one in self.minimal.system.mechanism.motors}
-        if motor not in joints:
-            raise InputError("is no motor", field="motors", value=motor, remedy="choose from " + ", ".join(joints))
-        return joints[motor]
-
-    def _joint_state(self, motor: str) -> int:
-        joint, names = self._joint(motor), [one.name for one in self.states]
-        if joint not in names:
-            raise InputError(
-                "moves only as other motors do",
-                field="motors",
-                value=motor,
-                remedy="leave it out: it is held with them",
-            )
-        return names.index(joint)
+    def _held(self, motors: Sequence[str] | None) -> Array:
+        """Basis (f, free) of the motions with motors held, by default all that are inputs."""
+        joints = {motor.name: motor.joint for motor in self.minimal.system.mechanism.motors}
+        names = [one.name for one in self.inputs if one.name in joints] if motors is None else motors
+        for name in names:
+            if name not in joints:
+                raise InputError("is no motor", field="motors", value=name, remedy="choose from " + ", ".join(joints))
+        q, Z = self.minimal.point.q[None], self.minimal.directions
+        rows = [joint_coordinate(self.minimal.system, joints[name], q).rows[0] @ Z for name in names]
+        return _kernel(np.array(rows).reshape(-1, Z.shape[1]), 1.0 / np.sqrt(np.diag(self._reduced[0])))
 
     @checked_arguments()
     def poles(self, count: int | None = None) -> Complex:
@@ -255,7 +257,7 @@ class LinearModel:
         InputError
             A motor that the mechanism does not have.
         """
-        basis = self._held_basis(held)
+        basis = self._held(held)
         return motions(self._second_order.within(basis), self.minimal.directions @ basis)
 
     @cached_property
@@ -266,17 +268,6 @@ class LinearModel:
             f = mass.shape[0]
             stiffness, damping = -mass @ self.A[f:, :f], -mass @ self.A[f:, f:]
         return SecondOrder(mass, damping, stiffness, self._typical, self._is_vibrating)
-
-    def _held_basis(self, motors: Sequence[str]) -> Array:
-        """Directions (f, k) of the coordinates y that are free where motors are held."""
-        names, joints = [one.name for one in self.states], [self._joint(name) for name in motors]
-        basis = np.delete(np.eye(len(names) // 2), [names.index(one) for one in joints if one in names], axis=1)
-        system, q = self.minimal.system, self.minimal.point.q
-        for joint in (one for one in joints if one not in names):
-            row = joint_coordinate(system, joint, q[None]).rows @ self.minimal.directions
-            if np.linalg.norm(row @ basis) > _HELD * np.linalg.norm(row):
-                basis = basis @ scipy.linalg.null_space(row @ basis)
-        return basis
 
     def _slow_poles(self, count: int) -> Complex:
         """The slowest poles by sparse matrices."""
@@ -398,20 +389,37 @@ class LinearModel:
         """A, B, C and D by names of states, inputs and outputs, with units."""
         import xarray as xr
 
-        named = {"state": self.states, "state_of": self.states, "input": self.inputs, "output": self.outputs}
-        names = {key: [one.name for one in values] for key, values in named.items()}
-        units = {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
         data = {
             "A": (("state", "state_of"), self.A), "B": (("state", "input"), self.B),
             "C": (("output", "state_of"), self.C), "D": (("output", "input"), self.D),
         }  # fmt: skip
         attrs: dict[str, Any] = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}
-        return xr.Dataset(data, coords=names | units, attrs=attrs)
+        return xr.Dataset(data, coords=named_axes(self.states, self.inputs, self.outputs), attrs=attrs)
 
 
 def plain_name(name: str) -> str:
     """A name without dots and spaces, for programs that take none."""
     return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
+
+
+def _kernel(rows: Array, scale: Array) -> Array:
+    """Basis (f, free) of what rows (h, f) do not see, in coordinates of given sizes (f,): the others follow from some.
+
+    Rows that are coordinates themselves take out these, and leave the others as they are.
+    """
+    f = rows.shape[1]
+    if not rows.size:
+        return np.eye(f)
+    scaled = rows * scale
+    scaled /= np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), np.finfo(float).tiny)
+    factor, order = scipy.linalg.qr(scaled, mode="r", pivoting=True)
+    size = np.abs(np.diag(factor))
+    rank = int(np.sum(size > DEPENDENT * size.max(initial=0.0)))
+    taken, free = np.asarray(order)[:rank], np.sort(np.asarray(order)[rank:])
+    basis = np.zeros((f, free.size))
+    basis[free, np.arange(free.size)] = 1.0
+    basis[taken] = -np.linalg.lstsq((rows * scale)[:, taken], rows[:, free], rcond=None)[0] * scale[taken, None]
+    return basis
 
 
 def _by_size(values: Complex) -> Complex:

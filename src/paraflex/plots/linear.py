@@ -60,8 +60,8 @@ def singular_values(data: xr.Dataset) -> Figure:
             panel.plot(data["frequency"].values, gains[:, 0], label=f"mode {plain(mode)}", **look)
             if gains.shape[1] > 1:
                 panel.plot(data["frequency"].values, gains[:, -1], linewidth=0.45, **look)
-        panel.set_title(MAP_WORDS[name] + (", largest (bold) and least" if len(modes) else ""))
-        panel.set_ylabel(f"gain [{gain_unit(data, name)}]")
+        panel.set_title(MAP_WORDS[name])
+        panel.set_ylabel(f"largest (bold) and least gain [{gain_unit(data, name)}]")
         _over_frequency(panel, data)
         _gain_axis(panel)
     return lay_out(figure, axes, panel_height=62.0)

@@ -125,7 +125,7 @@ def _command(run: dict[str, Any]) -> str:
     words = ["paraflex", "linearise", *([run["results"]] if "results" in run else model_words(run))]
     for name, flag in (("modes", "--mode"), ("forces", "--force-at"), ("prescribed", "--prescribed")):
         words += [word for one in run.get(name, []) for word in (flag, one)]
-    for name in ("pose", "at", "along", "path", "assembly"):
+    for name in ("pose", "at", "along", "path", "assembly", "coordinates"):
         if name in run:
             # A place may begin with a minus.
             words += [f"--{name}={run[name]}"] if str(run[name]).startswith("-") else [f"--{name}", str(run[name])]

@@ -112,6 +112,10 @@ class LineariseRequest:
         list[str],
         Option("--force-at", metavar="BODY.POINT", help="Point with forces along x and y as inputs too; repeatable."),
     ] = field(default_factory=list)
+    coordinates: Annotated[
+        str,
+        Option(metavar="motors|task", help="First states: angles of the motors' joints, or the end-effector's place."),
+    ] = "motors"
     prescribed: Annotated[
         list[str],
         Option("--prescribed", metavar="NAME", help="Prescribed motion whose acceleration is an input; repeatable."),

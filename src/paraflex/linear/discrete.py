@@ -1,0 +1,236 @@
+"""Sampled models of motions: transition matrices over each period of A(t) and B(t), by exponentials.
+
+Each step is the fourth-order method without commutators of Blanes and Moan (2006), Fourth- and sixth-order
+commutator-free Magnus integrators for linear and non-linear dynamical systems, of (x, u, u'): two exponentials, of
+averages of the matrices in the step, so that it is exact where these are constant, however fast vibrations are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.errors import InputError
+from paraflex.linear.coordinates import Variable, named_axes
+from paraflex.mechanism.quantities import known
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Gauss points of a step, and the weights of the matrices there in the later exponential; reversed in the earlier one.
+_PLACES = (0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0)
+_WEIGHTS = (0.25 - math.sqrt(3.0) / 6.0, 0.25 + math.sqrt(3.0) / 6.0)
+# Steps of twice the length, with splines of every second sample, have 16 times the error, as both are of fourth order.
+_RICHARDSON = 15.0
+# A period longer than the spacing of samples by less than this part is not divided.
+_SAME = 1e-6
+
+
+class InputHold(Enum):
+    """Inputs between samples: constant, or straight lines."""
+
+    ZERO = "zero"
+    FIRST = "first"
+
+
+class Predicted(NamedTuple):
+    """A perturbation as a linear model predicts it: times (k,), states (k, 2f) and outputs (k, outputs)."""
+
+    times: Array
+    states: Array
+    outputs: Array
+
+
+class Transitions(NamedTuple):
+    """Of each period: changes of x with x and with u at its start and at its end, and an estimate of their error."""
+
+    Phi: Array
+    Gamma: Array
+    Gamma_next: Array
+    error: Array
+
+
+@dataclass(frozen=True)
+class SampledModel:
+    """Small changes along a motion at samples: x_k+1 = Phi_k x_k + Gamma_k u_k + Gamma_next_k u_k+1, z = C x + D u.
+
+    Attributes
+    ----------
+    states, inputs, outputs : tuple of Variable
+        Names and units.
+    times : (k,) array
+        [s]
+    hold : InputHold
+        Inputs between samples.
+    Phi : (k - 1, 2f, 2f) array
+    Gamma, Gamma_next : (k - 1, 2f, inputs) arrays
+        The latter is zero where inputs are held constant.
+    C, D : (k, outputs, 2f) and (k, outputs, inputs) arrays
+    error : (k - 1,) array
+        Estimated error of each period's matrices, of exponentials and of splines between the samples of A and B: the
+        change of a perturbation, as a fraction of it (root of its energy).
+    """
+
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    times: Array
+    hold: InputHold
+    Phi: Array
+    Gamma: Array
+    Gamma_next: Array
+    C: Array
+    D: Array
+    error: Array
+
+    @checked_arguments()
+    def predict(
+        self, x0: Mapping[str, float] | Array | None = None, du: Mapping[str, float | Array] | Array | None = None
+    ) -> Predicted:
+        """What a small change of the start and of the inputs leads to.
+
+        Parameters
+        ----------
+        x0 : (2f,) array or mapping of str to float, optional
+            Change of the states at the first sample; of some by name.
+        du : (k, inputs) array or mapping of str to float or (k,) array, optional
+            Changes of the inputs at the samples; of some by name.
+
+        Raises
+        ------
+        InputError
+            An unknown name, or other numbers of values than states, inputs or samples.
+        """
+        x = _by_name(x0, self.states, "x0", ())
+        u = _by_name(du, self.inputs, "du", self.times.shape)
+        states = np.empty((self.times.size, x.size))
+        states[0] = x
+        for k in range(self.times.size - 1):
+            states[k + 1] = self.Phi[k] @ states[k] + self.Gamma[k] @ u[k] + self.Gamma_next[k] @ u[k + 1]
+        outputs = np.einsum("kij,kj->ki", self.C, states) + np.einsum("kij,kj->ki", self.D, u)
+        return Predicted(self.times, states, outputs)
+
+    def to_xarray(self) -> xr.Dataset:
+        """All matrices by time and by names of states, inputs and outputs, with units."""
+        import xarray as xr
+
+        data = {
+            "Phi": (("period", "state", "state_of"), self.Phi), "Gamma": (("period", "state", "input"), self.Gamma),
+            "Gamma_next": (("period", "state", "input"), self.Gamma_next), "error": ("period", self.error),
+            "C": (("time", "output", "state_of"), self.C), "D": (("time", "output", "input"), self.D),
+        }  # fmt: skip
+        axes = {**named_axes(self.states, self.inputs, self.outputs), "time": self.times, "period": self.times[:-1]}
+        return xr.Dataset(data, coords=axes, attrs={"hold": self.hold.value})
+
+
+def _by_name(given: Any, variables: Sequence[Variable], field: str, shape: tuple[int, ...]) -> Array:
+    """Values (*shape, variables), given so or some of them by name; zero by default."""
+    out = np.zeros((*shape, len(variables)))
+    names = [one.name for one in variables]
+    if isinstance(given, Mapping):
+        for name, value in given.items():
+            known(name, names, field, "name")
+            out[..., names.index(name)] = _fitting(value, f"{field}.{name}", shape)
+    elif given is not None:
+        out[:] = _fitting(given, field, out.shape)
+    return out
+
+
+def _fitting(value: Any, field: str, shape: tuple[int, ...]) -> Array:
+    array = np.asarray(value, dtype=float)
+    if array.shape not in (shape, ()) or not np.all(np.isfinite(array)):
+        raise InputError("has not the numbers it should have", field=field, value=array.shape,
+                         remedy=f"give {' x '.join(map(str, shape)) or 'one'} finite numbers")  # fmt: skip
+    return array
+
+
+# --- Exponentials -----------------------------------------------------------------------------------------------------
+
+
+def transitions(times: Array, A: Array, B: Array, ends: Array, hold: InputHold) -> Transitions:
+    """Transition matrices between given times of x' = A x + B u.
+
+    Parameters
+    ----------
+    times : (k,) array
+        Of the matrices, at least four [s].
+    A, B : (k, n, n) and (k, n, m) arrays
+        In states of one size, as the error is a part of their root sum of squares.
+    ends : (p + 1,) array
+        Ends of the periods [s].
+    hold : InputHold
+    """
+    unit = float(np.mean(np.diff(ends)))
+    parts = max(1, math.ceil(unit * (times.size - 1) / (times[-1] - times[0]) - _SAME))
+    if parts > 1 or ends.size == 2:
+        parts = 2 * math.ceil(0.5 * parts)
+    grid = np.interp(np.arange((ends.size - 1) * parts + 1) / parts, np.arange(ends.size), ends)
+    every, second = (_Held(times[k], A[k], B[k], unit) for k in (slice(None), _every_second(times.size)))
+    steps = np.array([every.step(*step) for step in pairwise(grid)])
+    n, m = B.shape[1:]
+    whole = _composed(steps, parts)
+    rising = whole[:, :n, n + m :] * (unit / np.diff(ends))[:, None, None] * (hold is InputHold.FIRST)
+    error = _errors(second, grid, steps, parts, n)
+    return Transitions(whole[:, :n, :n], whole[:, :n, n : n + m] - rising, rising, error)
+
+
+class _Held:
+    """(x, u, unit u')' = M(t) (x, u, unit u'), M of splines."""
+
+    def __init__(self, times: Array, A: Array, B: Array, unit: float) -> None:
+        self._A, self._B = (make_interp_spline(times, each, k=min(3, times.size - 1)) for each in (A, B))
+        n, m = B.shape[1:]
+        self._inputs = np.hstack([np.zeros((m, n + m)), np.eye(m) / unit])
+        self._last = np.zeros((m, n + 2 * m))
+
+    def _at(self, t: float) -> Array:
+        B = self._B(t)
+        return np.vstack([np.hstack([self._A(t), B, np.zeros_like(B)]), self._inputs, self._last])
+
+    def step(self, start: float, end: float) -> Array:
+        """Its transition matrix over a step."""
+        h = end - start
+        first, last = (self._at(start + place * h) for place in _PLACES)
+        earlier, later = (h * (_WEIGHTS[k] * first + _WEIGHTS[1 - k] * last) for k in (1, 0))
+        return scipy.linalg.expm(later) @ scipy.linalg.expm(earlier)
+
+
+def _every_second(samples: int) -> NDArray[np.int64]:
+    return np.unique([*range(0, samples, 2), samples - 1])
+
+
+def _composed(steps: Array, parts: int) -> Array:
+    """Transition matrices over so many steps each."""
+    whole = steps[::parts]
+    for part in range(1, parts):
+        whole = steps[part::parts] @ whole
+    return whole
+
+
+def _errors(coarse: _Held, grid: Array, steps: Array, parts: int, n: int) -> Array:
+    """Estimated errors of periods of so many steps, from steps of twice the length with every second sample.
+
+    Two periods of one step each are compared at once; for the last of an odd number with the one before it.
+    """
+    span, count = max(parts, 2), len(steps)
+    error = np.zeros(count // parts)
+    for start in [*range(0, count - span + 1, span), *([count - span] if count % span else [])]:
+        fine = _composed(steps[start : start + span], span)[0, :n]
+        twice = np.array([coarse.step(*ends) for ends in pairwise(grid[start : start + span + 1 : 2])])
+        apart = fine - _composed(twice, span // 2)[0, :n]
+        inputs = max(float(np.linalg.norm(fine[:, n:], 2)), np.finfo(float).tiny)
+        size = max(np.linalg.norm(apart[:, :n], 2), np.linalg.norm(apart[:, n:], 2) / inputs) / _RICHARDSON
+        first = start // parts
+        error[first : first + span // parts] = size * parts / span
+    return error
