@@ -280,7 +280,7 @@ def test_more_motors_than_coordinates_have_few_zeros(raparm_at_q):
     mechanism, start = raparm_at_q
     for mode, known in (("++++", []), ("+++-", [-1409.123, 1409.123, -6097.341j, 6097.341j])):
         model = linearise(mechanism, mode=mode, start=start).select(outputs=["x", "y"])
-        for found in (model.zeros(), zeros(model._scaled, 100.0)):
+        for found in (model.zeros(), zeros(model.scaled, 100.0)):
             low = found[np.abs(found) < 8000.0]
             assert np.sort_complex(low) == pytest.approx(np.sort_complex(np.array(known, dtype=complex)), rel=1e-6)
 

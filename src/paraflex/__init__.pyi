@@ -83,6 +83,8 @@ from .linear import (
     LinearModel as LinearModel,
     VaryingModel as VaryingModel,
     SampledModel as SampledModel,
+    reduce as reduce,
+    ReducedModel as ReducedModel,
 )
 
 # Studies

@@ -3,4 +3,5 @@
 from paraflex.linear.discrete import SampledModel as SampledModel
 from paraflex.linear.linearise import linearise as linearise
 from paraflex.linear.model import LinearModel as LinearModel
+from paraflex.linear.reduced import ReducedModel as ReducedModel, reduce as reduce
 from paraflex.linear.varying import VaryingModel as VaryingModel, linearise_along as linearise_along

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,11 +19,12 @@ from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
-from paraflex.linear.coordinates import Variable, named_axes
+from paraflex.linear.bases import kernel
+from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
-from paraflex.linear.independent import DEPENDENT
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.motions import Motions, SecondOrder, modal_damping, motions
+from paraflex.linear.named import Names, control_model, labelled_model, numbers_of
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
 if TYPE_CHECKING:
@@ -105,6 +105,11 @@ class LinearModel:
         """Feed-through (outputs, inputs): of accelerations, strains and forces."""
         return self._outputs[1]
 
+    @property
+    def state_space(self) -> StateSpace:
+        """A, B, C and D."""
+        return StateSpace(self.A, self.B, self.C, self.D)
+
     @cached_property
     def _outputs(self) -> tuple[Array, Array]:
         changes, n = self.minimal.changes, len(self.states)
@@ -113,6 +118,19 @@ class LinearModel:
         motors = self.minimal.motors
         whole[:, n : n + motors.size] += rows.torques.toarray()[:, motors]
         return whole[:, :n] + rows.q @ changes.q + rows.v @ changes.v, whole[:, n:][:, self.wanted[0]]
+
+    def acceleration_outputs(self, flexibility: Array) -> Array:
+        """What outputs (outputs, f) change with accelerations y'' that are not those of the equations.
+
+        Parameters
+        ----------
+        flexibility : (f, f) array
+            Of fast motions. Constraint forces, which follow from elastic forces, are those with these in balance.
+        """
+        rows, held = SensorRows(*(part[self.wanted[1]] for part in self.rows)), self.minimal.held_rows.number
+        f = len(self.states) // 2
+        reactions = rows.multipliers[:, held] @ self.minimal.changes.multipliers[held, :f]
+        return rows.a @ self.minimal.directions - reactions @ flexibility @ self._reduced[0]
 
     # --- Properties ---------------------------------------------------------------------------------------------------
 
@@ -127,6 +145,11 @@ class LinearModel:
         """Square of a low frequency [rad^2/s^2], by which frequencies are measured."""
         whole = self.minimal.tangents.whole
         return typical_square(stiffness_diagonal(self.minimal.system), whole.stiffness, whole.mass)
+
+    @property
+    def low_frequency(self) -> float:
+        """A low frequency, by which others are measured [rad/s]."""
+        return float(np.sqrt(self._typical))
 
     @cached_property
     def _modes(self) -> tuple[Array, Array]:
@@ -168,7 +191,7 @@ class LinearModel:
         return np.sqrt(np.maximum(self._modes[0], 0.0) + self._typical)
 
     @cached_property
-    def _scaled(self) -> StateSpace:
+    def scaled(self) -> StateSpace:
         """The model in modes of its mass and stiffness, whose displacements are multiplied by their frequencies."""
         there, back = self.modal_states
         if self._is_vibrating:
@@ -223,14 +246,28 @@ class LinearModel:
 
     def _held(self, motors: Sequence[str] | None) -> Array:
         """Basis (f, free) of the motions with motors held, by default all that are inputs."""
+        return kernel(self.joint_rows(self.motor_joints(motors)), 1.0 / np.sqrt(np.diag(self._reduced[0])))
+
+    def motor_joints(self, motors: Sequence[str] | None = None) -> list[str]:
+        """Joints of motors, by default of all that are inputs.
+
+        Raises
+        ------
+        InputError
+            A motor that the mechanism does not have.
+        """
         joints = {motor.name: motor.joint for motor in self.minimal.system.mechanism.motors}
         names = [one.name for one in self.inputs if one.name in joints] if motors is None else motors
         for name in names:
             if name not in joints:
                 raise InputError("is no motor", field="motors", value=name, remedy="choose from " + ", ".join(joints))
+        return [joints[name] for name in names]
+
+    def joint_rows(self, joints: Sequence[str]) -> Array:
+        """Changes of joints' coordinates (h, f) with the coordinates y."""
         q, Z = self.minimal.point.q[None], self.minimal.directions
-        rows = [joint_coordinate(self.minimal.system, joints[name], q).rows[0] @ Z for name in names]
-        return _kernel(np.array(rows).reshape(-1, Z.shape[1]), 1.0 / np.sqrt(np.diag(self._reduced[0])))
+        rows = [joint_coordinate(self.minimal.system, joint, q).rows[0] @ Z for joint in joints]
+        return np.array(rows).reshape(-1, Z.shape[1])
 
     @checked_arguments()
     def poles(self, count: int | None = None) -> Complex:
@@ -258,10 +295,10 @@ class LinearModel:
             A motor that the mechanism does not have.
         """
         basis = self._held(held)
-        return motions(self._second_order.within(basis), self.minimal.directions @ basis)
+        return motions(self.second_order.within(basis), self.minimal.directions @ basis)
 
     @cached_property
-    def _second_order(self) -> SecondOrder:
+    def second_order(self) -> SecondOrder:
         """The equations with inputs zero; of a motion with the terms of its rates."""
         mass, damping, stiffness = self._reduced
         if not self._is_vibrating:
@@ -294,10 +331,10 @@ class LinearModel:
         the state space, and up to a tenth of the fastest pole.
         """
         chosen = self.select(inputs, outputs)
-        shift = 0.7 * float(np.sqrt(self._typical))
+        shift = 0.7 * self.low_frequency
         displacements = chosen._displacements if self._is_vibrating else None
         if displacements is None:
-            return zeros(chosen._scaled, shift)
+            return zeros(chosen.scaled, shift)
         squares, shapes = chosen._modes
         return vibrating_zeros(
             Vibrating(squares, chosen._modal_damping, shapes.T @ chosen._force_rows, displacements @ shapes), shift
@@ -337,7 +374,7 @@ class LinearModel:
             for k, s in enumerate(points):
                 out[k] = response_at(self.minimal, rows, self.wanted[0], s)
             return out
-        A, B, C, D = self._scaled
+        A, B, C, D = self.scaled
         upper, basis = scipy.linalg.schur(A, output="complex")
         inputs, outputs, eye = basis.conj().T @ B, C @ basis, np.eye(len(A))
         for k, s in enumerate(points):
@@ -354,7 +391,7 @@ class LinearModel:
     @checked_arguments()
     def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
         """The model with some inputs and outputs, in the order given; all by default."""
-        chosen = [_chosen(named, have, what) for named, have, what in
+        chosen = [numbers_of(named, have, what) for named, have, what in
                   ((inputs, self.inputs, "input"), (outputs, self.outputs, "output"))]  # fmt: skip
         return replace(
             self,
@@ -365,7 +402,7 @@ class LinearModel:
 
     def to_scipy(self) -> scipy.signal.StateSpace:
         """The model as SciPy's."""
-        return scipy.signal.StateSpace(self.A, self.B, self.C, self.D)
+        return scipy.signal.StateSpace(*self.state_space)
 
     def to_control(self) -> Any:
         """The model as python-control's; dots and spaces in names become underscores, as it takes none.
@@ -375,62 +412,17 @@ class LinearModel:
         InputError
             python-control is not installed.
         """
-        try:
-            control = importlib.import_module("control")
-        except ImportError:
-            raise InputError(
-                "python-control is not installed", field="to_control",
-                remedy='install it: pip install "paraflex[control]"',
-            ) from None  # fmt: skip
-        names = {key: [plain_name(one.name) for one in getattr(self, key)] for key in ("inputs", "outputs", "states")}
-        return control.ss(self.A, self.B, self.C, self.D, name=plain_name(self.mechanism), **names)
+        return control_model(self.mechanism, self.state_space, self._names)
 
     def to_xarray(self) -> xr.Dataset:
         """A, B, C and D by names of states, inputs and outputs, with units."""
-        import xarray as xr
+        attrs = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}
+        return labelled_model(self.state_space, self._names, attrs)
 
-        data = {
-            "A": (("state", "state_of"), self.A), "B": (("state", "input"), self.B),
-            "C": (("output", "state_of"), self.C), "D": (("output", "input"), self.D),
-        }  # fmt: skip
-        attrs: dict[str, Any] = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}
-        return xr.Dataset(data, coords=named_axes(self.states, self.inputs, self.outputs), attrs=attrs)
-
-
-def plain_name(name: str) -> str:
-    """A name without dots and spaces, for programs that take none."""
-    return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
-
-
-def _kernel(rows: Array, scale: Array) -> Array:
-    """Basis (f, free) of what rows (h, f) do not see, in coordinates of given sizes (f,): the others follow from some.
-
-    Rows that are coordinates themselves take out these, and leave the others as they are.
-    """
-    f = rows.shape[1]
-    if not rows.size:
-        return np.eye(f)
-    scaled = rows * scale
-    scaled /= np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), np.finfo(float).tiny)
-    factor, order = scipy.linalg.qr(scaled, mode="r", pivoting=True)
-    size = np.abs(np.diag(factor))
-    rank = int(np.sum(size > DEPENDENT * size.max(initial=0.0)))
-    taken, free = np.asarray(order)[:rank], np.sort(np.asarray(order)[rank:])
-    basis = np.zeros((f, free.size))
-    basis[free, np.arange(free.size)] = 1.0
-    basis[taken] = -np.linalg.lstsq((rows * scale)[:, taken], rows[:, free], rcond=None)[0] * scale[taken, None]
-    return basis
+    @property
+    def _names(self) -> Names:
+        return Names(self.states, self.inputs, self.outputs)
 
 
 def _by_size(values: Complex) -> Complex:
     return values[np.argsort(np.abs(values), kind="stable")]
-
-
-def _chosen(names: Sequence[str] | None, have: tuple[Variable, ...], what: str) -> NDArray[np.int64]:
-    known = [one.name for one in have]
-    if names is None:
-        return np.arange(len(known))
-    for name in names:
-        if name not in known:
-            raise InputError(f"is no {what}", field=f"{what}s", value=name, remedy="choose from " + ", ".join(known))
-    return np.array([known.index(name) for name in names], dtype=int)

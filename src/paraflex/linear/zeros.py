@@ -31,7 +31,7 @@ _FURTHEST = 0.1
 
 
 class StateSpace(NamedTuple):
-    """x' = A x + B u, y = C x + D u, states scaled such that entries of A are of the size of angular frequencies."""
+    """x' = A x + B u, y = C x + D u."""
 
     A: Array
     B: Array
@@ -99,6 +99,7 @@ def zeros(system: StateSpace, shift: float) -> Complex:
     Parameters
     ----------
     system : StateSpace
+        With states such that entries of A are of the size of angular frequencies.
     shift : float
         No zero, positive, of the size of low frequencies [rad/s].
     """

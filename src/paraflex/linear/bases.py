@@ -1,0 +1,105 @@
+"""Bases of few coordinates for symmetric second-order equations, mass y'' + stiffness y = f.
+
+Static shapes of an interface and vibrations with the interface held (Craig and Bampton 1968), or the lowest modes and
+what all others do statically.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from paraflex.arrays import Array
+from paraflex.dynamics.linearise import undamped_modes
+from paraflex.linear.independent import DEPENDENT
+
+
+class Basis(NamedTuple):
+    """Coordinates y = shapes z + residual, and the flexibility of the motions that the residual is taken from.
+
+    Attributes
+    ----------
+    shapes : (f, k) array
+    flexibility : (f, f) array
+        Static response to forces within the motions of which vibrations are kept, and left out.
+    """
+
+    shapes: Array
+    flexibility: Array
+
+
+def kernel(rows: Array, scale: Array) -> Array:
+    """Basis (f, free) of what rows (h, f) do not see, in coordinates of given sizes (f,): the others follow from some.
+
+    Rows that are coordinates themselves take out these, and leave the others as they are.
+    """
+    f = rows.shape[1]
+    if not rows.size:
+        return np.eye(f)
+    factor, order = scipy.linalg.qr(_unit_rows(rows * scale), mode="r", pivoting=True)
+    size = np.abs(np.diag(factor))
+    rank = int(np.sum(size > DEPENDENT * size.max(initial=0.0)))
+    taken, free = np.asarray(order)[:rank], np.sort(np.asarray(order)[rank:])
+    basis = np.zeros((f, free.size))
+    basis[free, np.arange(free.size)] = 1.0
+    basis[taken] = -np.linalg.lstsq((rows * scale)[:, taken], rows[:, free], rcond=None)[0] * scale[taken, None]
+    return basis
+
+
+def independent_rows(rows: Array, scale: Array) -> list[int]:
+    """Numbers of rows (h, f) none of which follows from those before it."""
+    scaled, kept, basis = _unit_rows(rows * scale), list[int](), np.zeros((rows.shape[1], 0))
+    for k, row in enumerate(scaled):
+        left = row - basis @ (basis.T @ row)
+        if np.linalg.norm(left) > DEPENDENT:
+            left -= basis @ (basis.T @ left)
+            basis = np.column_stack([basis, left / np.linalg.norm(left)])
+            kept.append(k)
+    return kept
+
+
+def craig_bampton(mass: Array, stiffness: Array, rows: Array, count: int, typical: float) -> Basis:
+    """Static shapes of an interface, then the lowest vibrations with it held.
+
+    Parameters
+    ----------
+    mass, stiffness : (f, f) arrays
+        Symmetric.
+    rows : (h, f) array
+        Independent; the coordinates of the interface are rows y.
+    count : int
+        Of vibrations.
+    typical : float
+        Square of a low frequency [rad^2/s^2].
+
+    Returns
+    -------
+    Basis
+        The first h coordinates are those of the interface.
+    """
+    scale = 1.0 / np.sqrt(np.diag(mass))
+    free = kernel(rows, scale)
+    squares, shapes = undamped_modes(free.T @ mass @ free, free.T @ stiffness @ free, typical)
+    held = free @ shapes
+    flexibility = _flexibility(squares, held)
+    turned = scale[:, None] * np.linalg.pinv(rows * scale)
+    static = turned - flexibility @ (stiffness @ turned)
+    return Basis(np.hstack([static, held[:, :count]]), flexibility)
+
+
+def lowest_modes(mass: Array, stiffness: Array, count: int, typical: float) -> Basis:
+    """The lowest modes, and the flexibility of all others."""
+    squares, shapes = undamped_modes(mass, stiffness, typical)
+    return Basis(shapes[:, :count], _flexibility(squares[count:], shapes[:, count:]))
+
+
+def _flexibility(squares: Array, shapes: Array) -> Array:
+    """Static response of modes (f, k) of unit mass to forces, without motions that are free."""
+    elastic = squares != 0.0
+    return (shapes[:, elastic] / squares[elastic]) @ shapes[:, elastic].T
+
+
+def _unit_rows(rows: Array) -> Array:
+    return rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), np.finfo(float).tiny)

@@ -1,0 +1,77 @@
+"""What linear models with named variables share: choosing by name, and the forms of SciPy, python-control, xarray."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.linear.coordinates import Variable, named_axes
+from paraflex.linear.zeros import StateSpace
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Names(NamedTuple):
+    """States, inputs and outputs of a linear model."""
+
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+
+
+def control_model(title: str, matrices: StateSpace, names: Names) -> Any:
+    """The model as python-control's; dots and spaces in names become underscores, as it takes none.
+
+    Raises
+    ------
+    InputError
+        python-control is not installed.
+    """
+    try:
+        control = importlib.import_module("control")
+    except ImportError:
+        raise InputError(
+            "python-control is not installed", field="to_control",
+            remedy='install it: pip install "paraflex[control]"',
+        ) from None  # fmt: skip
+    plain = {key: [plain_name(one.name) for one in values] for key, values in names._asdict().items()}
+    return control.ss(*matrices, name=plain_name(title), **plain)
+
+
+def labelled_model(matrices: StateSpace, names: Names, attributes: Mapping[str, Any]) -> xr.Dataset:
+    """A, B, C and D by names of states, inputs and outputs, with units."""
+    import xarray as xr
+
+    dimensions = {
+        "A": ("state", "state_of"), "B": ("state", "input"), "C": ("output", "state_of"), "D": ("output", "input"),
+    }  # fmt: skip
+    data = {key: (dimensions[key], values) for key, values in matrices._asdict().items()}
+    return xr.Dataset(data, coords=named_axes(*names), attrs=attributes)
+
+
+def plain_name(name: str) -> str:
+    """A name without dots and spaces, for programs that take none."""
+    return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
+
+
+def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str) -> NDArray[np.int64]:
+    """Numbers of variables by name, all by default.
+
+    Raises
+    ------
+    InputError
+        A name that is not among them.
+    """
+    known = [one.name for one in have]
+    if names is None:
+        return np.arange(len(known))
+    for name in names:
+        if name not in known:
+            raise InputError(f"is no {what}", field=f"{what}s", value=name, remedy="choose from " + ", ".join(known))
+    return np.array([known.index(name) for name in names], dtype=int)

@@ -1,0 +1,157 @@
+"""Reduced linear models: published and independent numbers, what must not change, and where reduction is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import paraflex as pf
+from paraflex.kinematics import Line
+from paraflex.linear import linearise, reduce
+from paraflex.linear.bases import craig_bampton
+from paraflex.mechanism import AccelerationSensor, JointForceSensor, ModalDamping, StrainGauge
+from test_linear import HELD, hub_beam, joints_of
+
+# A hundredth to the right of the imaginary axis: as if all vibrations were damped by one per cent.
+DAMPED = 1j + 0.01
+
+
+@pytest.fixture(scope="module")
+def raparm_at_q():
+    """RAParM-I in all modes, the end-effector at (0, 0.264)."""
+    mechanism = pf.library.raparm_i()
+    start = pf.plan(mechanism, Line((0.0, 0.264), (0.0, 0.26), max_acceleration=1.0), samples=2).start
+    return {mode.name: linearise(mechanism, mode=mode, start=start) for mode in mechanism.modes}
+
+
+def test_craig_bampton_as_published():
+    """The example of JuliaFEM's ModelReduction: four masses, the last one kept, one vibration."""
+    stiffness = 2.0 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1)
+    stiffness[3, 3] = 1.0
+    mass, rows = np.diag([2.0, 2.0, 2.0, 1.0]), np.eye(4)[3:]
+    shapes = craig_bampton(mass, stiffness, rows, 1, 1.0).shapes
+    shapes = shapes * np.sign([shapes[3, 0], -shapes[0, 1]])
+    assert shapes.T @ mass @ shapes == pytest.approx(np.array([[2.75, -1.20711], [-1.20711, 1.0]]), abs=5e-6)
+    assert shapes.T @ stiffness @ shapes == pytest.approx(np.diag([0.25, 0.292893]), abs=5e-7)
+
+
+@pytest.mark.parametrize("mode", HELD)
+def test_sixteen_states_of_raparm(raparm_at_q, mode):
+    """Frequencies with motors free and held, in every mode, and the zeros to the encoders, which are those held."""
+    full = raparm_at_q[mode]
+    few = reduce(full)
+    assert few.A.shape == (16, 16)
+    assert [one.name for one in few.states[:4]] == ["A1", "D1", "A2", "D2"]
+    assert few.held_frequencies()[:2] == pytest.approx(full.held_frequencies()[:2], rel=1e-5)
+    assert few.frequencies[2:4] == pytest.approx(full.frequencies[2:4], rel=1e-4)
+    assert few.frequencies[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
+    lowest = np.sort(np.abs(few.zeros(outputs=joints_of(full))))[:4:2]
+    assert lowest == pytest.approx(full.held_frequencies()[:2], rel=1e-5)
+
+
+def test_responses_of_sixteen_states(raparm_at_q):
+    """As an independent finite-element model has them, motors to C and to encoders until 40 Hz: 4.5e-4, 5.4e-4."""
+    full, s = raparm_at_q["++++"], 2.0 * np.pi * np.linspace(0.5, 40.0, 60) * DAMPED
+    encoders = joints_of(full)
+    errors = [[reduce(full, states).error(s, names).max() for names in (["x", "y"], encoders)]
+              for states in (12, 16, 24)]  # fmt: skip
+    assert errors[0] == pytest.approx([0.13, 0.18], rel=0.05)
+    assert errors[1] == pytest.approx([4.5e-4, 5.4e-4], rel=0.15)
+    assert np.max(errors[2]) < 2.1e-5
+    worst = {mode: reduce(model).error(s, ["x", "y"]).max() for mode, model in raparm_at_q.items()}
+    assert max(value for mode, value in worst.items() if mode != "+-+-") < 1e-3
+    # Its zeros to C are at 51 Hz, so that its own gain at 40 Hz is small.
+    assert worst["+-+-"] < 2e-3
+
+
+def test_truncated_modes_mislead_those_who_hold_motors(raparm_at_q):
+    """What the literature plans: modes with motors free. Four of them make 47.7 Hz of 4.10 Hz with motors held."""
+    full, counts = raparm_at_q["+-+-"], (8, 16, 40)
+    held = [reduce(full, states, method="modal").held_frequencies()[0] / (2.0 * np.pi) for states in counts]
+    assert held[0] == pytest.approx(47.7, rel=1e-3)
+    assert 5.1 < held[1] < 5.2
+    assert 4.2 < held[2] < held[1]
+    assert reduce(full, 12).held_frequencies()[0] / (2.0 * np.pi) == pytest.approx(4.1046, rel=1e-4)
+
+
+@pytest.mark.parametrize("method", ["craig-bampton", "modal"])
+def test_outputs_with_feed_through(method):
+    """Accelerations, strains and joint forces: what is left out bends statically."""
+    bar = pf.load("five_bar").mechanism
+    sensors = (
+        AccelerationSensor("acceleration", bar.end_effector.point, "x"),
+        StrainGauge("gauge", "proximal1", 0.02, distance=1e-3), JointForceSensor("force", bar.joints[0].name, "y"),
+    )  # fmt: skip
+    full = linearise(replace(bar, sensors=sensors), mode="++")
+    s = np.array([1.0, 20.0, 60.0]) * DAMPED
+    assert len(full.outputs) == 7
+    few = reduce(full, len(full.states), method=method)
+    assert few.frequency_response(s) == pytest.approx(full.frequency_response(s), rel=1e-6, abs=1e-12)
+    few = reduce(full, 32, method=method)
+    for one in full.outputs:
+        assert few.error(s, [one.name]).max() < 1e-3, one.name
+
+
+# --- Balanced truncation ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def damped_hub():
+    """A beam on a hub with a tip mass, one per cent of damping: torque to the tip's place."""
+    return linearise(hub_beam(0.1, 0.5, 0.0, ModalDamping((0.01,)))).select(outputs=["y"])
+
+
+def test_hankel_singular_values(damped_hub):
+    """From eight modes in closed form; the model has more, which tell in the small ones."""
+    found = reduce(damped_hub, 4, method="balanced").hankel
+    assert found[:4] == pytest.approx([1.19974029, 1.17598529, 0.0436528880, 0.0427891469], rel=2e-7)
+    assert found[4:6] == pytest.approx([1.22232486e-3, 1.19816120e-3], rel=1e-5)
+
+
+@pytest.mark.parametrize(("kept", "actual"), [(2, 0.0864138), (4, 2.41933e-3), (6, 2.07126e-4)])
+def test_the_bound_of_balanced_truncation_is_above_the_error(damped_hub, kept, actual):
+    """Rigid motions are kept beside them."""
+    few = reduce(damped_hub, 2 + kept, method="balanced")
+    near = [omega * (1.0 + np.linspace(-0.03, 0.03, 401)) for omega in damped_hub.frequencies[1:8]]
+    omega = np.sort(np.concatenate([np.geomspace(0.5, 2e3, 500), *near]))
+    error = np.max(np.abs(few.frequency_response(omega) - damped_hub.frequency_response(omega)))
+    assert len(few.A) == 2 + kept
+    assert error == pytest.approx(actual, rel=1e-4)
+    assert error <= few.bound < 3.0 * error
+    assert np.abs(few.poles()[:2]).max() < 1e-6
+
+
+# --- Bad input --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("states", "method", "says"),
+    [
+        (6, "craig-bampton", "states: are fewer than the 8 of the coordinates of 4 motors"),
+        (15, "craig-bampton", "states: is odd"),
+        (0, "modal", "states: no such number of states"),
+        (9999, "modal", "states: no such number of states"),
+        (16, "balance", "method: unknown reduction method"),
+        (16, "balanced", "states: 164 of 164 states are not damped"),
+    ],
+)
+def test_bad_input(raparm_at_q, states, method, says):
+    with pytest.raises(pf.InputError, match=says):
+        reduce(raparm_at_q["++++"], states, method=method)
+
+
+def test_rigid_mechanisms_are_not_reduced():
+    with pytest.raises(pf.InputError, match="has rigid links only"):
+        reduce(linearise(pf.library.raparm_i().rigid(), mode="++++"))
+
+
+def test_the_same_in_other_forms(damped_hub):
+    few = reduce(damped_hub, 6)
+    data = few.to_xarray()
+    assert data.attrs["method"] == "craig-bampton"
+    assert data["A"].sel(state="O_rate", state_of="held_mode1") == few.A[3, 1]
+    assert few.to_scipy().A.shape == few.A.shape
+    with pytest.raises(pf.InputError, match="no coordinates whose rates are states"):
+        reduce(damped_hub, 6, method="balanced").held_frequencies()
