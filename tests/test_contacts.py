@@ -10,6 +10,7 @@ import pytest
 import paraflex as pf
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.dynamics.sections import sections_of
+from paraflex.dynamics.sensors import sensor_readings, sensor_rows
 from paraflex.mechanism import (
     Assembly,
     FlexibleBeam,
@@ -24,6 +25,7 @@ from paraflex.mechanism import (
     Section,
     SlidingJoint,
     SlotJoint,
+    StrainGauge,
     WeldJoint,
 )
 
@@ -99,6 +101,8 @@ def test_moments_are_those_of_statics_wherever_the_force_stands(places, supports
     expected = by_hand(loads.x[0], places)
     np.testing.assert_allclose(loads.x[0, len(sections.bodies) :], places, rtol=1e-9)
     np.testing.assert_allclose(loads.moment[0], expected, rtol=0, atol=2e-8 * np.abs(expected).max())
+    stress = np.abs(expected) / (0.02 * 0.005**2 / 6)
+    np.testing.assert_allclose(loads.stress[0], stress, rtol=0, atol=1e-6 * stress.max())
     # The largest is there under the force or at the clamp, and no station is between.
     most = {cantilever: SMALL * sum(places), two_supports: np.abs(by_hand(np.array(places), places)).max()}[by_hand]
     assert np.abs(loads.moment).max() == pytest.approx(most, rel=1e-7)
@@ -120,6 +124,54 @@ def test_a_run_has_the_moment_under_the_force_with_the_sign_and_size_of_its_mult
     assert place == pytest.approx(0.0 if by_hand is cantilever else x, rel=1e-6)
     moment = max(abs(by_hand(np.array([0.0, x]), (x,))))
     assert data["stress_max"].sel(body="beam").item() == pytest.approx(moment / (0.02 * 0.005**2 / 6), rel=1e-4)
+
+
+GAUGED = [
+    ((CLAMP,), {"elements": (1, 2)}),
+    ((CLAMP,), {"reference": "cantilever", "modes": 5}),
+    ((PIN, RAIL), {"reference": "free", "lumps": LUMPS, "elements": 2}),
+]
+
+
+@pytest.mark.parametrize(("supports", "changes"), GAUGED)
+def test_a_gauge_sees_the_kink_as_the_section_there_does(supports, changes):
+    """In any motion, at all stations: at a node as on the side of the last end."""
+    mechanism = pressed((0.37 * L, 0.62 * L), *supports, **changes)
+    system, rng = build_system(mechanism), np.random.default_rng(3)
+    q = consistent_state(system, None).q + 1e-5 * rng.normal(size=(4, system.n))
+    v, a = rng.normal(size=(2, 4, system.n))
+    multipliers = rng.normal(size=(4, system.m))
+    sections = sections_of(system)
+    loads = sections.loads(system, q, v, a, multipliers)
+    stations = {round(float(x), 9): k for k, x in enumerate(sections.x)}
+    gauges = [StrainGauge(f"gauge{k}", "beam", float(sections.x[k]), 0.002) for k in stations.values()]
+    read = sensor_readings(system, q, v, a, multipliers, np.zeros((4, 0)), gauges)
+    E, area, second = STEEL.youngs_modulus, 0.02 * 0.005, 0.02 * 0.005**3 / 12
+    at = list(stations.values())
+    strain = np.nan_to_num(loads.force[:, at]) / (E * area) - 0.002 * loads.moment[:, at] / (E * second)
+    np.testing.assert_allclose(read, strain, rtol=0, atol=1e-10 * np.abs(strain).max())
+
+
+@pytest.mark.parametrize(("supports", "changes"), GAUGED)
+def test_the_linear_model_of_a_gauge_has_its_differences(supports, changes):
+    """By places, rates, accelerations and forces in contacts, at a loaded pose."""
+    mechanism = pressed((0.37 * L, 0.62 * L), *supports, **changes)
+    gauge = StrainGauge("gauge", "beam", 0.45 * L, 0.002)
+    system, rng = build_system(mechanism), np.random.default_rng(4)
+    q = consistent_state(system, None).q + 1e-5 * rng.normal(size=system.n)
+    state = [q, *rng.normal(size=(2, system.n)), rng.normal(size=system.m), np.zeros(0)]
+    rows = sensor_rows(system, *state, sensors=[gauge])
+    for kind, row, step in zip(range(4), rows, (1e-8, 1e-4, 1e-2, 1e-2), strict=False):
+        for k in range(state[kind].size):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = [part.copy() for part in state]
+                moved[kind][k] += sign * step
+                ends.append(sensor_readings(system, *(part[None] for part in moved), sensors=[gauge]).item())
+            found = (ends[0] - ends[1]) / (2.0 * step)
+            assert row.toarray()[0, k] == pytest.approx(found, rel=1e-5, abs=1e-7 * np.abs(row.toarray()).max())
+    # Forces in both contacts bend it; the multipliers of nothing else do.
+    assert rows.multipliers.nnz == 2
 
 
 def test_a_beam_that_something_slides_along_has_elements_of_at_most_a_third_of_it():

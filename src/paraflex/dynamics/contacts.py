@@ -26,12 +26,30 @@ from paraflex.dynamics.inertia_moments import inertia_moments
 from paraflex.dynamics.joint_coordinates import place_along_beam
 from paraflex.dynamics.system import System
 from paraflex.fem import ReferenceCondition
-from paraflex.mechanism import FlexibleBeam
+from paraflex.mechanism import FlexibleBeam, Joint, Mechanism
 
 # Integrates the cubic of an arm times an acceleration exactly.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(2)
 # Part of the way to the middle of its element by which a station at a node with a lump is on one side of it.
 _INSIDE = 1e-12
+
+
+class ContactLoad(NamedTuple):
+    """Forces that slide along a beam.
+
+    Attributes
+    ----------
+    place : (k, contacts) array
+        Distance from the beam's first end [m].
+    force : (k, contacts) array
+        Across the beam [N].
+    deflected : (k, nf) array
+        Flexible coordinates that the forces deflect quasi-statically.
+    """
+
+    place: Array
+    force: Array
+    deflected: Array
 
 
 class Contacts(NamedTuple):
@@ -81,10 +99,20 @@ class Contacts(NamedTuple):
         """Index of the element at places of any shape."""
         return element_at(self.beam.mesh.nodes, place)
 
-    def inside(self, x: Array) -> Array:
-        """Stations (s,), as many in each element, a little within their elements, on their side of its nodes."""
-        each = x.reshape(len(self.stiffness), -1)
-        return (each + _INSIDE * (each.mean(axis=1, keepdims=True) - each)).ravel()
+    def inside(self, x: Array, element: NDArray[np.int64]) -> Array:
+        """Places (s,) a little within their elements, on their side of its nodes."""
+        nodes = self.beam.mesh.nodes
+        return x + _INSIDE * (0.5 * (nodes[element] + nodes[element + 1]) - x)
+
+    def load(self, system: System, q: Array, multipliers: Array) -> ContactLoad:
+        """What the contacts do, of coordinates (k, n) and multipliers (k, m)."""
+        place, force = self.at(system, q, multipliers)
+        deflected = np.einsum("kcj,kc->kj", self._rows(place, 0), force) / self.body.modes.omega**2
+        return ContactLoad(place, force, deflected)
+
+    def moments(self, x: Array, load: ContactLoad) -> Array:
+        """Moments (k, s) of the contacts at places x (k, s)."""
+        return np.einsum("ksc,kc->ks", self.exact(x[:, :, None], load.place[:, None, :]), load.force)
 
     def between(self, x: Array, place: Array) -> tuple[NDArray[np.int64], Array]:
         """Of stations (s,) the index of that before each place, in its element, and how far it is to the next one."""
@@ -92,10 +120,6 @@ class Contacts(NamedTuple):
         z = (place - nodes[element]) / (nodes[element + 1] - nodes[element])
         left = element * count + np.clip((np.real(z) * (count - 1)).astype(int), 0, count - 2)
         return left, (place - x[left]) / (x[left + 1] - x[left])
-
-    def deflected(self, place: Array, force: Array) -> Array:
-        """Flexible coordinates (k, nf) that forces (k, contacts) at their places deflect quasi-statically."""
-        return np.einsum("kcj,kc->kj", self._rows(place, 0), force) / self.body.modes.omega**2
 
     def moment(self, place: Array, u: Array, across: Array) -> Array:
         """Moment (k, contacts) of coordinates (k, nf) and their accelerations across the beam, at places."""
@@ -137,9 +161,14 @@ class Contacts(NamedTuple):
         return moment
 
 
+def sliding_joints(mechanism: Mechanism, beam: str) -> list[Joint]:
+    """Joints that slide along a beam."""
+    return [one for one in mechanism.joints if one.follows_beam and one.a.body == beam]
+
+
 def contacts_of(system: System, beam: FlexibleBeam) -> Contacts | None:
     """What slides along a beam of a system; None for nothing."""
-    joints = tuple(one.name for one in system.mechanism.joints if one.follows_beam and one.a.body == beam.name)
+    joints = tuple(one.name for one in sliding_joints(system.mechanism, beam.name))
     if not joints:
         return None
     body, spans = system.body(beam.name), beam.spans

@@ -184,19 +184,24 @@ def sections_of(system: System) -> Sections | None:
 
 
 class SectionAt(NamedTuple):
-    """One section of a flexible beam."""
+    """One section of a flexible beam, at a place (1,) a little within its element."""
 
     section: Section
     material: Material
     part: _Beam
+    place: Array
 
-    def loads(self, system: System, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """Bending moment and axial force (k,) for coordinates (k, n) and their derivatives, by the shape functions.
+    def loads(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array]:
+        """Bending moment and axial force (k,) for coordinates (k, n), their derivatives, and multipliers.
 
-        Without what a force that slides along the beam adds within its element.
+        The latter of what slides along the beam alone, one for each of `sliding_joints`.
         """
         body, part = system.body(self.part.body), self.part
-        moment = q[:, body.flexible] @ part.moment.T
+        u, added = q[:, body.flexible], 0.0
+        if part.contacts is not None:
+            load = part.contacts.load(system, q, multipliers)
+            u, added = u - load.deflected, part.contacts.moments(np.broadcast_to(self.place, (len(q), 1)), load)
+        moment = u @ part.moment.T + added
         if part.resisted is not None:
             moment = moment + _across(body, q, v, a) @ part.resisted.T
         return moment[:, 0], _axial(system, part, q, v, a)[:, 0]
@@ -204,18 +209,22 @@ class SectionAt(NamedTuple):
 
 def section_at(system: System, name: str, x: float) -> SectionAt | None:
     """The section of a beam at a distance from its first end, at a node that of the next element; None if rigid."""
-    described, body = system.mechanism.body(name), system.body(name)
+    described, body, place = system.mechanism.body(name), system.body(name), np.array([x])
     assert isinstance(described, FlexibleBeam | AssumedModesBeam)
     if not body.nf:
         return None
     if isinstance(described, AssumedModesBeam):
-        return SectionAt(described.section, described.material, _assumed(described, body, np.array([x])))
+        return SectionAt(described.section, described.material, _assumed(described, body, place), place)
     nodes = described.mesh.nodes
     # A place at a node but for rounding is at the node.
     e = int(np.clip(np.searchsorted(nodes, x + 1e-12 * nodes[-1], side="right") - 1, 0, nodes.size - 2))
     z = min(max((x - nodes[e]) / (nodes[e + 1] - nodes[e]), 0.0), 1.0)
     part, _, (section,), (material,) = _meshed(described, body, [(e, np.array([z]))])
-    return SectionAt(section, material, part)
+    contacts = contacts_of(system, described)
+    if contacts is not None:
+        place = contacts.inside(place, np.array([e]))
+        part = part._replace(contacts=contacts._replace(rows=tuple(range(len(contacts.rows)))))
+    return SectionAt(section, material, part, place)
 
 
 def _stations(
@@ -317,12 +326,14 @@ def _loads(
     resisted = 0.0 if part.resisted is None else across @ part.resisted.T
     if contacts is None:
         return SectionLoads(u @ part.moment.T + resisted, force, x, *kinds)
-    place, pushed = contacts.at(system, q, multipliers)
+    load = contacts.load(system, q, multipliers)
+    place = load.place
     # Without what the forces deflect quasi-statically, then with the moments of these as they are.
-    u = u - contacts.deflected(place, pushed)
+    u = u - load.deflected
     moment = np.hstack([u @ part.moment.T + resisted, contacts.moment(place, u, across)])
-    everywhere = np.hstack([np.broadcast_to(contacts.inside(sections[0]), x.shape), place])
-    moment += np.einsum("ksc,kc->ks", contacts.exact(everywhere[:, :, None], place[:, None, :]), pushed)
+    elements = np.repeat(np.arange(len(contacts.stiffness)), len(sections[0]) // len(contacts.stiffness))
+    inside = contacts.inside(sections[0], elements)
+    moment += contacts.moments(np.hstack([np.broadcast_to(inside, x.shape), place]), load)
     left, weight = contacts.between(sections[0], place)
     before, after = (np.take_along_axis(force, at, 1) for at in (left, left + 1))
     kinds = [np.hstack([each, np.take_along_axis(each, left, 1)]) for each in kinds]

@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Numbers
+from paraflex.dynamics.contacts import sliding_joints
 from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate
 from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
 from paraflex.dynamics.points import marker_motion
@@ -25,6 +26,7 @@ from paraflex.mechanism import (
     DeflectionSensor,
     Encoder,
     FlexibleBeam,
+    Joint,
     JointForceSensor,
     PointSensor,
     PositionSensor,
@@ -182,13 +184,19 @@ def _local(system: System, sensor: Sensor) -> _Local:
         offset += columns[-1].size
     read = _reader(replace(system, bodies=tuple(bodies)), sensor, parts.alone())
     of_bodies = np.concatenate(columns)
-    rows, motors = (np.array(each, int) for each in (parts.rows, list(parts.motors)))
+    normal = [system.rows.index(f"{joint.name} normal") for joint in _contacts(system, sensor)]
+    rows, motors = (np.array(each, int) for each in (parts.rows + normal, list(parts.motors)))
     return _Local(read, MotionSamples(of_bodies, of_bodies, of_bodies, rows, motors))
+
+
+def _contacts(system: System, sensor: Sensor) -> list[Joint]:
+    """Joints that slide along the beam of a strain gauge: their forces bend it where they are."""
+    return sliding_joints(system.mechanism, sensor.body) if isinstance(sensor, StrainGauge) else []
 
 
 def _bodies(system: System, sensor: Sensor) -> list[str]:
     """Names of the bodies that a reading depends on, each once."""
-    joints = [system.mechanism.joint(name) for _, name, _ in joints_named(sensor)]
+    joints = [system.mechanism.joint(name) for _, name, _ in joints_named(sensor)] + _contacts(system, sensor)
     points = [*points_named(sensor).values(), *(point for joint in joints for point in (joint.a, joint.b))]
     names = [*(point.body for point in points), getattr(sensor, "body", GROUND)]
     return [name for name in dict.fromkeys(names) if name != GROUND]
@@ -243,7 +251,7 @@ def _of_strain(system: System, sensor: StrainGauge) -> Callable[[MotionSamples],
     bending, axial = distance / (stiffness * section.second_moment), 1.0 / (stiffness * section.area)
 
     def read(at: MotionSamples) -> Numbers:
-        moment, force = at_place.loads(system, at.q, at.v, at.a)
+        moment, force = at_place.loads(system, at.q, at.v, at.a, at.multipliers)
         return (axial * force if at_place.part.force is not None else 0.0) - bending * moment
 
     return read
