@@ -11,6 +11,7 @@ import paraflex as pf
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
 from paraflex.dynamics.sections import sections_of
 from paraflex.dynamics.sensors import sensor_readings, sensor_rows
+from paraflex.files import library_text
 from paraflex.mechanism import (
     Assembly,
     FlexibleBeam,
@@ -243,3 +244,55 @@ def test_a_balanced_start_bends_the_beam_as_statics_do_and_an_undeformed_one_doe
     start = consistent_state(build_system(mechanism), None)
     with pytest.raises(pf.InputError, match=r"balanced: a state is as it is"):
         pf.simulate_motion(mechanism, 1e-4, start=start, balanced=True)
+
+
+# --- Derivatives ------------------------------------------------------------------------------------------------------
+
+LEVER = """
+[section.thin]
+width = 0.030
+thickness = 0.004
+
+[body.lever]
+type = "beam"
+length = 0.6
+section = "thin"
+material = "aluminium"
+points = { G = 0.0, T = 0.6 }
+elements = 3
+lumps = { T = "tool" }
+
+[joint.block]
+type = "sliding"
+points = ["lever.G", "distal1.C"]
+"""
+
+STUDY = """
+mechanism = "slotted.toml"
+paths = ["line"]
+duration = 0.05
+samples = 26
+metrics = ["stress_max", "section_moment_max"]
+
+[integration]
+step = 1e-3
+tolerance = 1e-9
+
+[vary.thickness]
+fields = ["section.thin.thickness"]
+"""
+
+
+def test_the_stress_under_what_slides_has_exact_derivatives(tmp_path):
+    """A five-bar whose end-effector drags a lever with a mass along; the largest stress is in the lever."""
+    text = library_text("five_bar").replace('A2 = ["base", 0.0]', 'A2 = ["base", 0.0]\nG = [0.1, 0.75]', 1)
+    text = text.replace('"distal2.C"]', '"distal2.C"]\nG = ["ground.G", "lever.G"]', 1)
+    text = text.replace("distal2 = 2.89", "distal2 = 2.89\nlever = -1.8", 1)
+    (tmp_path / "slotted.toml").write_text(text + LEVER, encoding="utf-8")
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    found = pf.sensitivities(tmp_path / "study.toml")
+    (tmp_path / "near.toml").write_text(STUDY + "values = [0.003999, 0.004001]\n", encoding="utf-8")
+    table = pf.sweep(tmp_path / "near.toml", tmp_path / "out", workers=1).data
+    for metric, derivative in zip(found.metrics, np.asarray(found.derivatives).ravel(), strict=True):
+        low, high = table[metric].values.ravel()
+        assert derivative == pytest.approx((high - low) / 2e-6, rel=1e-6)
