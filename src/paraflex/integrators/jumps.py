@@ -10,8 +10,8 @@ from paraflex.arrays import Array
 from paraflex.dynamics import Inputs
 from paraflex.kernel.packed import Signals
 
-# A jump smaller than this fraction of the largest value of the signal is rounding.
-_SMOOTH = 1e-9
+# A jump smaller than this fraction of the largest value or derivative of the signal is none, or a part of its values.
+_SMOOTH, _ROUNDING = 1e-9, 1e-13
 
 
 def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:
@@ -42,10 +42,14 @@ def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
         return False
     before, after = signals.coefficients[first + piece - 1], signals.coefficients[first + piece]
     x = time - breaks[piece - 1]
+    largest = np.max(np.abs(signals.coefficients[first:last]), axis=0)
+    # Rounding of the values makes more of their derivatives, the shorter the pieces are.
+    short = float(np.min(np.diff(signals.breaks[first : last + 1])))
+    rounding = _ROUNDING * float(np.sum(largest * short ** np.arange(largest.size)))
     for order in range(derivatives):
         left, right = _derivative(before, order, x), _derivative(after, order, 0.0)
-        largest = factorial(order) * float(np.max(np.abs(signals.coefficients[first:last, order])))
-        if abs(right - left) > _SMOOTH * max(abs(left), largest):
+        size = max(abs(left), factorial(order) * largest[order])
+        if abs(right - left) > max(_SMOOTH * size, rounding / short**order):
             return True
     return False
 
