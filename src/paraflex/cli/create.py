@@ -27,7 +27,7 @@ def new_command(request: NewRequest) -> None:
     write_text(path, text, parents=False)
     console = plain_console()
     console.print(f"{path}: a copy of {template} to edit. Then", soft_wrap=True)
-    console.print(f"  paraflex info {path}\n  paraflex run --mechanism {path}", soft_wrap=True)
+    console.print(f"  paraflex info {path}\n  paraflex run {path}", soft_wrap=True)
 
 
 def schema_command(_: SchemaRequest) -> None:

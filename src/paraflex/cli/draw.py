@@ -110,7 +110,7 @@ def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, ou
         console.print(f"drawn as given, with open joints: {listed}", soft_wrap=True)
     console.print(f"drawn in {output}", soft_wrap=True)
     name = request.model.name
-    console.print(f"next: paraflex info {name}, paraflex run --mechanism {name}", soft_wrap=True)
+    console.print(f"next: paraflex info {name}, paraflex run {name}", soft_wrap=True)
 
 
 def _few(names: Sequence[str]) -> str:

@@ -124,8 +124,8 @@ def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence
 
 
 def model_words(run: dict[str, Any]) -> list[str]:
-    """The options of a model, with what was set of it."""
-    words = ["--mechanism", mechanism_argument(run["mechanism"])]
+    """A model as an argument, with what was set of it."""
+    words = [mechanism_argument(run["mechanism"])]
     for name, value in (run.get("set") or {}).items():
         words += ["--set", f"{name}={value if isinstance(value, str) else json.dumps(value)}"]
     return words
