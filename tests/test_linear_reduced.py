@@ -9,7 +9,7 @@ import pytest
 
 import paraflex as pf
 from paraflex.kinematics import Line
-from paraflex.linear import linearise, reduce
+from paraflex.linear import linearise, reduce, states_needed
 from paraflex.linear.bases import craig_bampton
 from paraflex.mechanism import AccelerationSensor, JointForceSensor, ModalDamping, StrainGauge
 from test_linear import HELD, hub_beam, joints_of
@@ -121,6 +121,33 @@ def test_the_bound_of_balanced_truncation_is_above_the_error(damped_hub, kept, a
     assert error == pytest.approx(actual, rel=1e-4)
     assert error <= few.bound < 3.0 * error
     assert np.abs(few.poles()[:2]).max() < 1e-6
+
+
+# --- How many states --------------------------------------------------------------------------------------------------
+
+
+def test_states_needed_are_the_fewest_that_reach_the_error(raparm_at_q):
+    models = [raparm_at_q[mode].select(outputs=["D1", "y"]) for mode in ("-+-+", "++++")]
+    table = states_needed(models, 2.0 * np.pi * 40.0, error=0.02)["states"]
+    s = 2.0 * np.pi * np.geomspace(0.4, 40.0, 200) * DAMPED
+    for model in models:
+        for method in ("craig-bampton", "modal"):
+            for output in ("D1", "y"):
+                count = int(table.sel(mode=model.mode, reduction=method, output=output).item())
+                errors = [
+                    reduce(model, states, method=method).error(s, [output]).max() for states in (count - 2, count)
+                ]
+                assert errors[0] > 0.02 >= errors[1]
+    few = states_needed(models[:1], 2.0 * np.pi * 40.0, most=10)["states"]
+    assert np.all(np.isnan(few.sel(reduction="craig-bampton")))
+
+
+@pytest.mark.parametrize(
+    ("given", "says"), [({"until": 0.0}, "until: is not positive"), ({"error": -1.0}, "error: is not positive")]
+)
+def test_bad_input_of_the_table(raparm_at_q, given, says):
+    with pytest.raises(pf.InputError, match=says):
+        states_needed([raparm_at_q["++++"]], **{"until": 1.0} | given)
 
 
 # --- Bad input --------------------------------------------------------------------------------------------------------

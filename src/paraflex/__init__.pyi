@@ -85,6 +85,7 @@ from .linear import (
     SampledModel as SampledModel,
     reduce as reduce,
     ReducedModel as ReducedModel,
+    states_needed as states_needed,
 )
 
 # Studies

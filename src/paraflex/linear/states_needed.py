@@ -1,0 +1,93 @@
+"""How many states a reduced model needs: by actuation mode, method and output, up to a frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array, Numbers
+from paraflex.errors import InputError, as_enum
+from paraflex.linear.model import LinearModel
+from paraflex.linear.reduced import ReductionMethod, reduce
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Responses are looked at as if all vibrations had this damping ratio more: of undamped ones no error would be small.
+DAMPING = 0.01
+# So many frequencies, from this part of the highest on.
+_FREQUENCIES, _LOWEST = 200, 1e-2
+
+
+@checked_arguments()
+def states_needed(
+    models: Sequence[LinearModel],
+    until: float,
+    *,
+    error: float = 0.01,
+    methods: Sequence[ReductionMethod | str] = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.MODAL),
+    most: int = 80,
+) -> xr.Dataset:
+    """The fewest states with which all gains to an output keep within an error of the full model's largest there.
+
+    Parameters
+    ----------
+    models : sequence of LinearModel
+        Of one mechanism, each of another mode.
+    until : float
+        Highest frequency [rad/s].
+    error : float
+        Over the full model's gain to that output, at each frequency.
+    methods : sequence of str
+        Of `reduce`.
+    most : int
+        Where more are needed, the number is NaN.
+
+    Returns
+    -------
+    xarray.Dataset
+        `states` over mode, reduction and output.
+
+    Raises
+    ------
+    InputError
+        No model, a frequency or an error that is not positive.
+    """
+    import xarray as xr
+
+    for name, value in (("until", until), ("error", error)):
+        if not value > 0.0:
+            raise InputError("is not positive", field=name, value=value, remedy="give a positive one")
+    if not models:
+        raise InputError("names none", field="models", remedy="give linear models, as linearise makes them")
+    chosen = [as_enum(ReductionMethod, method, "methods") for method in methods]
+    s = np.geomspace(_LOWEST * until, until, _FREQUENCIES) * (1j + DAMPING)
+    found = np.array([[_needed(model, method, s, error, most) for method in chosen] for model in models])
+    names = {
+        "mode": [model.mode for model in models], "reduction": [method.value for method in chosen],
+        "output": [one.name for one in models[0].outputs],
+    }  # fmt: skip
+    attrs = {"mechanism": models[0].mechanism, "until": until, "error": error, "damping_ratio": DAMPING}
+    return xr.Dataset({"states": (tuple(names), found)}, coords=names, attrs=attrs)
+
+
+def _needed(model: LinearModel, method: ReductionMethod, s: Numbers, error: float, most: int) -> Array:
+    """Numbers of states (outputs,)."""
+    full = model.frequency_response(s)
+    size = np.linalg.norm(full, axis=2)
+    needed = np.full(len(model.outputs), np.nan)
+    for states in range(2, min(most, len(model.states)) + 1, 2):
+        try:
+            few = reduce(model, states, method=method).frequency_response(s)
+        except InputError as refused:
+            # Fewer than the coordinates that a method keeps in any case.
+            if refused.field != "states":
+                raise
+            continue
+        within = np.all(np.linalg.norm(few - full, axis=2) <= error * size, axis=0)
+        # An error that is small by chance and grows with more states does not count.
+        needed = np.where(within, np.where(np.isnan(needed), states, needed), np.nan)
+    return needed
