@@ -13,7 +13,7 @@ import scipy
 
 from paraflex.arrays import Array
 from paraflex.dynamics.linearise import undamped_modes
-from paraflex.linear.independent import DEPENDENT
+from paraflex.linear.independent import DEPENDENT, successive, unit_rows
 
 
 class Basis(NamedTuple):
@@ -38,7 +38,7 @@ def kernel(rows: Array, scale: Array) -> Array:
     f = rows.shape[1]
     if not rows.size:
         return np.eye(f)
-    factor, order = scipy.linalg.qr(_unit_rows(rows * scale), mode="r", pivoting=True)
+    factor, order = scipy.linalg.qr(unit_rows(rows * scale), mode="r", pivoting=True)
     size = np.abs(np.diag(factor))
     rank = int(np.sum(size > DEPENDENT * size.max(initial=0.0)))
     taken, free = np.asarray(order)[:rank], np.sort(np.asarray(order)[rank:])
@@ -50,14 +50,7 @@ def kernel(rows: Array, scale: Array) -> Array:
 
 def independent_rows(rows: Array, scale: Array) -> list[int]:
     """Numbers of rows (h, f) none of which follows from those before it."""
-    scaled, kept, basis = _unit_rows(rows * scale), list[int](), np.zeros((rows.shape[1], 0))
-    for k, row in enumerate(scaled):
-        left = row - basis @ (basis.T @ row)
-        if np.linalg.norm(left) > DEPENDENT:
-            left -= basis @ (basis.T @ left)
-            basis = np.column_stack([basis, left / np.linalg.norm(left)])
-            kept.append(k)
-    return kept
+    return successive(unit_rows(rows * scale), np.zeros((rows.shape[1], 0)))[0]
 
 
 def craig_bampton(mass: Array, stiffness: Array, rows: Array, count: int, typical: float) -> Basis:
@@ -99,7 +92,3 @@ def _flexibility(squares: Array, shapes: Array) -> Array:
     """Static response of modes (f, k) of unit mass to forces, without motions that are free."""
     elastic = squares != 0.0
     return (shapes[:, elastic] / squares[elastic]) @ shapes[:, elastic].T
-
-
-def _unit_rows(rows: Array) -> Array:
-    return rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), np.finfo(float).tiny)

@@ -64,19 +64,30 @@ def independent_dense(groups: Sequence[csr_matrix], weights: Array) -> Independe
         kept, basis = np.sort(order[:rank]), basis[:, :rank]
     found, taken = [kept], [first[kept]]
     for group in others:
-        rows: list[int] = []
-        for k, row in enumerate(group):
-            left = row - basis @ (basis.T @ row)
-            size = np.linalg.norm(left)
-            if size > DEPENDENT:
-                left -= basis @ (basis.T @ left)
-                basis = np.column_stack([basis, left / np.linalg.norm(left)])
-                rows.append(k)
+        rows, basis = successive(group, basis)
         found.append(np.array(rows, dtype=int))
         taken.append(group[found[-1]])
     whole = np.vstack(taken) / weights
     order = np.asarray(scipy.linalg.qr(whole, mode="r", pivoting=True)[-1]) if whole.size else np.zeros(0, dtype=int)
     return Independent(tuple(found), np.sort(order[: len(whole)]))
+
+
+def successive(rows: Array, basis: Array) -> tuple[list[int], Array]:
+    """Rows (h, n) of size one that follow neither from a basis (n, k) nor from those before; the basis with them."""
+    kept: list[int] = []
+    for k, row in enumerate(rows):
+        left = row - basis @ (basis.T @ row)
+        if np.linalg.norm(left) > DEPENDENT:
+            left -= basis @ (basis.T @ left)
+            basis = np.column_stack([basis, left / np.linalg.norm(left)])
+            kept.append(k)
+    return kept, basis
+
+
+def unit_rows(rows: Array) -> Array:
+    """Rows of size one, those of zeros as they are."""
+    size = np.linalg.norm(rows, axis=1, keepdims=True)
+    return rows / np.where(size > 0.0, size, 1.0)
 
 
 def independent_sparse(groups: Sequence[csr_matrix], weights: Array) -> Independent:

@@ -24,7 +24,7 @@ from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.motions import Motions, SecondOrder, modal_damping, motions
-from paraflex.linear.named import Names, control_model, labelled_model, numbers_of
+from paraflex.linear.named import Names, control_model, labelled_model, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
 if TYPE_CHECKING:
@@ -366,8 +366,7 @@ class LinearModel:
         frequencies : (k,) array
             Angular frequencies omega, for s = i omega [rad/s]; complex numbers are taken as s.
         """
-        given = np.atleast_1d(np.asarray(frequencies))
-        points = given if np.iscomplexobj(given) else 1j * given
+        points = places_in_s(frequencies)
         out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
         if self._is_large:
             rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))

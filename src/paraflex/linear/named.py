@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable, named_axes
@@ -53,6 +53,12 @@ def labelled_model(matrices: StateSpace, names: Names, attributes: Mapping[str, 
     }  # fmt: skip
     data = {key: (dimensions[key], values) for key, values in matrices._asdict().items()}
     return xr.Dataset(data, coords=named_axes(*names), attrs=attributes)
+
+
+def places_in_s(frequencies: ArrayLike) -> NDArray[np.complex128]:
+    """Points s = i omega of angular frequencies [rad/s]; complex numbers are points s themselves."""
+    given = np.atleast_1d(np.asarray(frequencies))
+    return np.asarray(given if np.iscomplexobj(given) else 1j * given, dtype=complex)
 
 
 def plain_name(name: str) -> str:

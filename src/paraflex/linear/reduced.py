@@ -21,7 +21,7 @@ from paraflex.linear.bases import Basis, craig_bampton, independent_rows, kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import SecondOrder, motions
-from paraflex.linear.named import Names, control_model, labelled_model, numbers_of
+from paraflex.linear.named import Names, control_model, labelled_model, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, zeros
 
 if TYPE_CHECKING:
@@ -150,8 +150,7 @@ class ReducedModel:
     @checked_arguments()
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
         """Response C (s - A)^-1 B + D (k, outputs, inputs): see `LinearModel.frequency_response`."""
-        given = np.atleast_1d(np.asarray(frequencies))
-        points = given if np.iscomplexobj(given) else 1j * given
+        points = places_in_s(frequencies)
         eye = np.eye(len(self.A))
         return np.array([self.C @ np.linalg.solve(s * eye - self.A, self.B) + self.D for s in points])
 

@@ -18,6 +18,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array, Numbers
+from paraflex.linear.independent import unit_rows
 
 Complex = NDArray[np.complex128]
 # Zeros of two squared systems that agree this well are one.
@@ -158,11 +159,6 @@ def _shifted(theta: Complex, shift: float) -> Complex:
     """What lies 1 / theta from a shift, but not at infinity."""
     kept = theta[np.abs(theta) > _INFINITE * np.max(np.abs(theta), initial=0.0)]
     return shift + 1.0 / kept
-
-
-def unit_rows(rows: Array) -> Array:
-    """Rows of size one, those of zeros as they are."""
-    return rows / _sizes(rows, 1)
 
 
 def _sizes(matrix: Numbers, axis: int) -> Array:
