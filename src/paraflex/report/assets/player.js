@@ -55,13 +55,15 @@ const player = (() => {
     const tall = (film.view[3] - film.view[1]) / (film.view[2] - film.view[0]);
     // No taller than what is left of the window below it, so that all of it is seen at once.
     const room = Math.min(Math.max(innerHeight - canvas.getBoundingClientRect().top - scrollY - 24, 320), 620);
-    canvas.style.height = `${Math.round(Math.min(Math.max(tall * canvas.clientWidth + 60, 240), room))}px`;
+    // Lines of writing above the mechanism, and below it where arrows of loads are explained there.
+    const above = 26, below = film.keys.some((keys) => keys && keys.length) ? 22 : 0;
+    canvas.style.height = `${Math.round(Math.min(Math.max(tall * canvas.clientWidth + 60 + below, 240), room))}px`;
     width = canvas.clientWidth; height = canvas.clientHeight;
     canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     const [x0, y0, x1, y1] = film.view;
-    const scale = Math.min(width / (x1 - x0), (height - 26) / (y1 - y0));
-    place = { scale, x: width / 2 - scale * (x0 + x1) / 2, y: (height - 26) / 2 + 18 + scale * (y0 + y1) / 2 };
+    const left = height - above - below, scale = Math.min(width / (x1 - x0), left / (y1 - y0));
+    place = { scale, x: width / 2 - scale * (x0 + x1) / 2, y: left / 2 + 18 + scale * (y0 + y1) / 2 };
   }
   const px = (x) => place.x + place.scale * x;
   const py = (y) => place.y - place.scale * y;
