@@ -113,7 +113,7 @@ def test_commands_set_values_and_results_tell_them(tmp_path, monkeypatch):
     assert told["run"]["set"] == {"bar.thickness": "6 mm", "study.samples": 11}
     assert data.sizes["time"] == 11
     words = shlex.split(run_command_line(asked(data)))
-    assert words[:8] == ["paraflex", "run", "--mechanism", "five_bar", *given]
+    assert words[:7] == ["paraflex", "run", "five_bar", *given]
     again = paraflex(*words[1:], "--out", "again")
     assert again.returncode == 0, again.stderr
     assert pf.load_results("again")["deflection"].equals(data["deflection"])

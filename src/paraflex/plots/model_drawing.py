@@ -308,8 +308,10 @@ def _entries(
     kinds = {joint.kind for joint in shown.joints}
     entries += [(words, joint_sign(kind, limits, look, _WIDTH)) for kind, words in _KINDS.items() if kind in kinds]
     driven = dict.fromkeys(joint.kind for joint in shown.joints if joint.driven)
+    motors, prescribed = bool(posed.mechanism.motors), bool(posed.mechanism.prescribed)
+    drive = "motor or drive" if motors and prescribed else "motor" if motors else "drive"
     for kind in driven:
-        said = "motor" if len(driven) == 1 or kind == "pin" else f"motor, {_KINDS.get(kind, kind)}"
+        said = drive if len(driven) == 1 or kind == "pin" else f"{drive}, {_KINDS.get(kind, kind)}"
         entries.append((said, joint_sign(kind, limits, look, _WIDTH, driven=True)))
     if acting.moves:
         said = "first movement" if posed.mechanism.motors else "prescribed motion"

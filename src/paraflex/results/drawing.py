@@ -180,7 +180,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         for point in body.points
     }
     joints, springs = mechanism.joints, mechanism.linear_springs
-    driven = {motor.joint for motor in mechanism.motors}
+    driven = {one.joint for one in (*mechanism.motors, *mechanism.prescribed)}
     of_springs: dict[str, Any] = {}
     if springs:
         ends = [[stations.get(ref, -1) for ref in (spring.a, spring.b)] for spring in springs]

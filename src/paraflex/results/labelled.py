@@ -84,7 +84,7 @@ UNITS = (
         "point_station": ("drawn point that a named point is", "1"),
         "joint_kind": ("kind of joint", "1"),
         "joint_grounded": ("whether the joint is on the ground", "1"),
-        "joint_driven": ("whether a motor is at the joint", "1"),
+        "joint_driven": ("whether a motor or a prescribed motion is at the joint", "1"),
         "joint_rail": ("drawn point that a sliding joint's axis goes through; -1 on the ground and along a beam", "1"),
         "spring_station": ("drawn points that a spring is at; -1 on the ground", "1"),
         "load_station": ("drawn point that a load acts at", "1"),
