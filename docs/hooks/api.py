@@ -26,6 +26,7 @@ PACKAGES = (
     "validity",
     "elastodynamics",
     "linear",
+    "equilibria",
     "integrators.methods",
     "integrators",
     "dynamics",

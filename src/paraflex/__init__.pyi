@@ -88,6 +88,9 @@ from .linear import (
     states_needed as states_needed,
 )
 
+# Statics
+from .equilibria import statics as statics, Statics as Statics
+
 # Studies
 from .campaign import Workers as Workers
 from .studies import (
@@ -113,6 +116,7 @@ from .results import (
     tracking_dataset as tracking_dataset,
     motion_dataset as motion_dataset,
     linear_dataset as linear_dataset,
+    statics_dataset as statics_dataset,
     summary as summary,
     save_results as save_results,
     load_results as load_results,

@@ -239,6 +239,14 @@ class InconsistentConstraintsError(NumericalError):
     """Constraints that contradict one another in velocity or acceleration, though the loops are closed."""
 
 
+class EquilibriumError(NumericalError):
+    """No static equilibrium is found: something is loose, or joints allow no more of what is given."""
+
+
+class LimitPointError(EquilibriumError):
+    """Loads or travel beyond the last limit point of a branch of equilibria."""
+
+
 class ActuationError(NumericalError):
     """A set of motors that cannot drive the mechanism."""
 

@@ -99,6 +99,7 @@ _DOUBTFUL = {
     "path-fast": "A path asks for a speed or an acceleration that no such machine reaches.",
     "path-ill-conditioned": "A mode passes near a singular position of its motors.",
     "modes-too-stiff": "The modes kept of a beam cannot carry a moment that comes in.",
+    "equilibrium-unstable": "A static equilibrium is unstable: the mechanism would move away from it.",
     "motions-grow": "Some motions about the pose grow instead of vibrating.",
     "axis-along-beam": "A slot or prismatic joint has its straight axis along a flexible beam.",
     "elements-few": "A joint slides along a beam whose elements are too long for it.",

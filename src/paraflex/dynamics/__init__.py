@@ -52,7 +52,7 @@ from paraflex.dynamics.soundness import (
     mobility as mobility,
     undeformed as undeformed,
 )
-from paraflex.dynamics.start import start_state as start_state
+from paraflex.dynamics.start import pose_at_rest as pose_at_rest, start_state as start_state
 from paraflex.dynamics.state import (
     State as State,
     consistent_state as consistent_state,

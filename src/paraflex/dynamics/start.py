@@ -17,8 +17,9 @@ from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.state import State, reference_pose
-from paraflex.dynamics.system import System
+from paraflex.dynamics.soundness import undeformed
+from paraflex.dynamics.state import State, consistent_state, reference_pose
+from paraflex.dynamics.system import System, build_system
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
@@ -69,6 +70,25 @@ def start_state(
     if q is None:
         q = _coordinates(system, signals, start, assembly, time)
     return State(time, q, _velocities(system, signals, start, time, q))
+
+
+def pose_at_rest(system: System, start: Start | State | None, assembly: str | None = None) -> State:
+    """The pose of a start, or of an assembly with undeformed links, the first by default.
+
+    Raises
+    ------
+    InputError
+        See `start_state`.
+    AssemblyError
+        The loops do not close.
+    """
+    if isinstance(start, State):
+        return start
+    mechanism = system.mechanism
+    if start is None:
+        rigid = build_system(mechanism.rigid())
+        return undeformed(system, rigid, consistent_state(rigid, assembly))
+    return start_state(system, start, mechanism.assembly(assembly) if mechanism.assemblies else None)
 
 
 def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> Array:

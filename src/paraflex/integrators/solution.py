@@ -51,6 +51,8 @@ class Solution:
         Kinetic energy that brakes took as they engaged [J]: `work` is less by it from then on.
     findings : tuple of Finding
         What makes it doubtful: points that slid off their beams.
+    resting : bool
+        Whether the samples are equilibria, numbered in place of times.
     """
 
     t: Array
@@ -77,6 +79,11 @@ class Solution:
     event: str = ""
     brake_energy: float = 0.0
     findings: tuple[Finding, ...] = ()
+    resting: bool = False
+
+    def instant(self, sample: int, digits: int = 3) -> str:
+        """In a text, which sample it is: "t = 0.125 s", or "step 3"."""
+        return f"step {self.t[sample]:.0f}" if self.resting else f"t = {self.t[sample]:.{digits}g} s"
 
     @property
     def event_time(self) -> float:

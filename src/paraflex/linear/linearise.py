@@ -13,15 +13,7 @@ from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import (
-    State,
-    System,
-    build_system,
-    consistent_state,
-    start_state,
-    static_equilibrium,
-    undeformed,
-)
+from paraflex.dynamics import State, System, build_system, pose_at_rest, static_equilibrium
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.sensors import sensor_rows
 from paraflex.dynamics.tangents import MotionPoint
@@ -125,7 +117,7 @@ def linearise(
     else:
         given = start if start is not None or isinstance(source, Mechanism) else source.start
         system = build_system(mechanism)
-        state = _pose(system, given, assembly)
+        state = pose_at_rest(system, given, assembly)
         if balanced:
             joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
             state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
@@ -215,16 +207,6 @@ def _sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:
         found += [PositionSensor(axis, effector.point, axis) for axis in ("x", "y") if axis in effector.coordinates]
     taken = {sensor.name for sensor in mechanism.sensors}
     return (*(sensor for sensor in found if sensor.name not in taken), *mechanism.sensors)
-
-
-def _pose(system: System, start: Start | State | None, assembly: str | None) -> State:
-    if isinstance(start, State):
-        return start
-    mechanism = system.mechanism
-    if start is None:
-        rigid = build_system(mechanism.rigid())
-        return undeformed(system, rigid, consistent_state(rigid, assembly))
-    return start_state(system, start, mechanism.assembly(assembly) if mechanism.assemblies else None)
 
 
 class Moving(NamedTuple):

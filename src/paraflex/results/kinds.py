@@ -19,15 +19,16 @@ _MADE_BY = {
     "motion": "motion_dataset",
     "verification": "Verification.dataset",
     "linear": "linear_dataset",
+    "statics": "statics_dataset",
 }
 
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """Kind of a dataset: "verification", "motion" (without a path), "linear" (models), or "tracking"."""
+    """Kind of a dataset: "verification", "motion" (without a path), "linear" (models), "statics", or "tracking"."""
     if "model" in data.dims:
         return "verification"
-    return data.attrs["kind"] if data.attrs.get("kind") in ("motion", "linear") else "tracking"
+    return data.attrs["kind"] if data.attrs.get("kind") in ("motion", "linear", "statics") else "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:

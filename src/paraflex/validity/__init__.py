@@ -27,7 +27,11 @@ from paraflex.validity.indicators import (
     of_second_order,
 )
 from paraflex.validity.numbers import doubtful_numbers as doubtful_numbers, mechanism_size as mechanism_size
-from paraflex.validity.plausibility import Driven as Driven, doubtful_results as doubtful_results
+from paraflex.validity.plausibility import (
+    Driven as Driven,
+    doubtful_results as doubtful_results,
+    doubtful_stresses as doubtful_stresses,
+)
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ def assess(system: System, solution: Solution, following: Following | None = Non
         return None
     bodies = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
     linear, second = [one for one in bodies if one.linear], [one for one in bodies if not one.linear]
-    indicators = [*of_linear(linear, solution.t, following), *of_second_order(second, solution.t)]
+    indicators = [*of_linear(linear, solution, following), *of_second_order(second, solution)]
     return Validity(tuple(indicators)) if indicators else None
 
 

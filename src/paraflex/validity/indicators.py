@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from paraflex.arrays import Array
+from paraflex.integrators import Solution
 from paraflex.mechanism import Geometry
 from paraflex.validity.bending import Bending
 
@@ -96,48 +97,56 @@ class Following(NamedTuple):
     condition: float
 
 
-def of_linear(bodies: Sequence[Bending], t: Array, following: Following | None) -> list[Indicator]:
+def of_linear(bodies: Sequence[Bending], run: Solution, following: Following | None) -> list[Indicator]:
     """Of the bodies of linear geometry."""
     if not bodies:
         return []
-    out = [_slope(bodies, t)]
+    out = [_slope(bodies, run)]
     # Of modal bodies there is no more to say.
     beams = [body for body in bodies if not np.isnan(body.axial).any()]
     if beams:
-        out.append(_axial_force(beams, t, AXIAL_LIMIT if following is None else DRIVEN_AXIAL_LIMIT))
+        out.append(_axial_force(beams, run, AXIAL_LIMIT if following is None else DRIVEN_AXIAL_LIMIT))
     if beams and following is not None and following.deviation > 0.0:
-        out.append(_shortening(beams, t, following))
+        out.append(_shortening(beams, run, following))
     return out
 
 
-def _axial_force(bodies: Sequence[Bending], t: Array, limit: float) -> Indicator:
+def _axial_force(bodies: Sequence[Bending], run: Solution, limit: float) -> Indicator:
     body, k = _largest(bodies, [np.abs(body.axial) for body in bodies])
     value = float(abs(body.axial[k]))
-    text = f"{body.name}'s axial force reaches {value:.2g} of its buckling load at t = {t[k]:.3g} s"
-    return Indicator("axial force", value, limit, body.name, float(t[k]), f"{text}{_upto(limit)}", _remedy(body))
+    text = f"{body.name}'s axial force reaches {value:.2g} of its buckling load at {run.instant(k)}"
+    return Indicator("axial force", value, limit, body.name, float(run.t[k]), f"{text}{_upto(limit)}", _remedy(body))
 
 
-def _slope(bodies: Sequence[Bending], t: Array) -> Indicator:
+def _slope(bodies: Sequence[Bending], run: Solution) -> Indicator:
     body, k = _largest(bodies, [body.slope for body in bodies])
     value = float(body.slope[k])
-    text = f"{body.name} bends to a slope of {value:.2g} rad at t = {t[k]:.3g} s"
-    return Indicator("slope", value, SLOPE_LIMIT, body.name, float(t[k]), f"{text}{_upto(SLOPE_LIMIT)}", _remedy(body))
+    text = f"{body.name} bends to a slope of {value:.2g} rad at {run.instant(k)}"
+    return Indicator(
+        "slope", value, SLOPE_LIMIT, body.name, float(run.t[k]), f"{text}{_upto(SLOPE_LIMIT)}", _remedy(body)
+    )
 
 
-def _shortening(bodies: Sequence[Bending], t: Array, following: Following) -> Indicator:
+def _shortening(bodies: Sequence[Bending], run: Solution, following: Following) -> Indicator:
     body, k = _largest(bodies, [body.shortening for body in bodies])
     shortening = float(body.shortening[k])
     value = shortening * following.condition / following.deviation
     text = (
-        f"bending shortens {body.name} by {1e3 * shortening:.2g} mm at t = {t[k]:.3g} s, which is left out; with the "
+        f"bending shortens {body.name} by {1e3 * shortening:.2g} mm at {run.instant(k)}, which is left out; with the "
         f"actuation's condition number of {following.condition:.2g} that is {value:.2g} of the tracking error"
     )
     return Indicator(
-        "shortening", value, SHORTENING_LIMIT, body.name, float(t[k]), f"{text}{_upto(SHORTENING_LIMIT)}", _remedy(body)
+        "shortening",
+        value,
+        SHORTENING_LIMIT,
+        body.name,
+        float(run.t[k]),
+        f"{text}{_upto(SHORTENING_LIMIT)}",
+        _remedy(body),
     )
 
 
-def of_second_order(bodies: Sequence[Bending], t: Array) -> list[Indicator]:
+def of_second_order(bodies: Sequence[Bending], run: Solution) -> list[Indicator]:
     """Of the beams of second-order geometry."""
     if not bodies:
         return []
@@ -145,10 +154,10 @@ def of_second_order(bodies: Sequence[Bending], t: Array) -> list[Indicator]:
     body, k = _largest(bodies, terms)
     value = float(fourth_order(body.slope[k], _steady(body), tangent=body.tangent))
     text = (
-        f"{body.name} bends to a slope of {body.slope[k]:.2g} rad at t = {t[k]:.3g} s; terms of fourth order, which "
+        f"{body.name} bends to a slope of {body.slope[k]:.2g} rad at {run.instant(k)}; terms of fourth order, which "
         f"are left out, are about {100.0 * value:.2g} % of its deflection (limit {100.0 * FOURTH_ORDER_LIMIT:g} %)"
     )
-    return [Indicator(_SECOND_ORDER, value, FOURTH_ORDER_LIMIT, body.name, float(t[k]), text, _remedy(body))]
+    return [Indicator(_SECOND_ORDER, value, FOURTH_ORDER_LIMIT, body.name, float(run.t[k]), text, _remedy(body))]
 
 
 def fourth_order(slope: Number, compression: float, *, tangent: bool) -> Number:

@@ -119,6 +119,11 @@ def doubtful_results(
     return found
 
 
+def doubtful_stresses(system: System, solution: Solution) -> list[Finding]:
+    """Findings about the stresses of equilibria or a run."""
+    return list(_overstressed(_Where("", system.mechanism), system, solution))
+
+
 def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
     """Findings about the torques and forces of a plan at times t (k,), before anything runs."""
     return list(_large_torques(_Where(f"mode {driven.mode}", system.mechanism), system, driven, t))
@@ -137,7 +142,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
         )
         yield Finding(
             "deflection-large", where.place,
-            f"{worst} bends by {slopes[worst][k]:.2g} rad at t = {solution.t[k]:.4g} s: more a spring than a link",
+            f"{worst} bends by {slopes[worst][k]:.2g} rad at {solution.instant(int(k), 4)}: more a spring than a link",
             blame,
         )  # fmt: skip
 
@@ -156,7 +161,7 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
         yield Finding(
             "stress-over-strength", where.place,
             f"a stress of {stress:.3g} {STRESS.name} in {name} at {loads.x[k, station]:.3g} m, "
-            f"t = {solution.t[k]:.4g} s: its material bears {strength:.3g} {STRESS.name}, the safety factor is "
+            f"{solution.instant(int(k), 4)}: its material bears {strength:.3g} {STRESS.name}, the safety factor is "
             f"{1.0 / used[k, station]:.2g}",
             where.blame(name) or (
                 f"give {name} a stronger section or material, or move and load it less"
@@ -171,7 +176,7 @@ def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding
     if speeds[k, b] > FAST:
         yield Finding(
             "speed-large", where.place,
-            f"{system.bodies[b].name} moves at {speeds[k, b]:.3g} m/s at t = {solution.t[k]:.4g} s",
+            f"{system.bodies[b].name} moves at {speeds[k, b]:.3g} m/s at {solution.instant(int(k), 4)}",
             where.blame() or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
         )  # fmt: skip
 

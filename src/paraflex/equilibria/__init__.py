@@ -1,0 +1,4 @@
+"""Static equilibria under loads and travel: their branches past limit points, stability, buckling, stiffness."""
+
+from paraflex.equilibria.result import Statics as Statics
+from paraflex.equilibria.statics import statics as statics

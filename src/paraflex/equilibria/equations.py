@@ -1,0 +1,337 @@
+"""Equations of equilibrium with given coordinates held, moved or loaded.
+
+A named coordinate is the angle or travel of a joint, or a place or the angle of a point: a row Phi_c of a system
+with more rows than the mechanism's own. With a fraction s of all that is given
+
+    F(q) + Phi_q^T mu - s Phi_l,q^T p = 0        forces: beams, springs, weight, loads; p is given at loaded rows l
+    Phi(q) = Phi_0 + s d                         the mechanism's constraints and rows that are held (d = 0) or moved
+
+so that the force of a held or moved coordinate on the mechanism is -mu.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from paraflex.arrays import Array
+from paraflex.dynamics import State, System
+from paraflex.dynamics.constraints import coordinate_kind
+from paraflex.dynamics.signals import acting_loads, moment_signals
+from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
+from paraflex.dynamics.stiffness import RestingForces
+from paraflex.dynamics.system import with_constraints_of
+from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
+from paraflex.errors import InputError, suggestion
+from paraflex.kernel.packed import CONSTRAINT, Signals
+from paraflex.linear.coordinates import Coordinates
+from paraflex.linear.independent import independent_dense, independent_sparse
+from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
+
+# A matrix of fewer entries has its independent rows found by a QR factorisation, others by elimination.
+_DENSE_ENTRIES = 400_000
+_ORIGIN = "origin of named coordinates"
+_AXES = ("x", "y", "angle")
+
+
+class Coordinate(NamedTuple):
+    """The angle or travel of a joint, or a place or the angle of a point, by its name.
+
+    Attributes
+    ----------
+    name : str
+        Of the joint, or "body.point.x", "body.point.y", "body.point.angle".
+    unit, effort_unit : str
+        "m" and "N", or "rad" and "N m".
+    point : PointRef, optional
+        None of a joint.
+    """
+
+    name: str
+    unit: str
+    effort_unit: str
+    point: PointRef | None = None
+
+    @property
+    def axis(self) -> str:
+        """The axis of a point's coordinate."""
+        return self.name.rpartition(".")[2]
+
+
+def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
+    """A coordinate by its name.
+
+    Raises
+    ------
+    InputError
+        There is no such joint or point, or the joint has no coordinate that could change.
+    """
+    joints = {joint.name: joint for joint in mechanism.joints}
+    if name in joints:
+        joint = joints[name]
+        if not joint.slides and "angle" in joint.holds:
+            raise InputError("holds its angle, so that it has no coordinate", field=field, value=name,
+                             remedy="name a joint that turns or slides, or a point")  # fmt: skip
+        return Coordinate(name, *(("m", "N") if joint.slides else ("rad", "N m")))
+    place, _, axis = name.rpartition(".")
+    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+    if axis not in _AXES or place not in points:
+        known = [*joints, *(f"{point}.{each}" for point in points for each in _AXES)]
+        raise InputError("is neither a joint nor a coordinate of a point", field=field, value=name,
+                         remedy=f'{suggestion(name, known)}; of points it is "body.point.x", ".y" or ".angle"'
+                         )  # fmt: skip
+    return Coordinate(name, *(("rad", "N m") if axis == "angle" else ("m", "N")), PointRef.parse(place, field))
+
+
+class Conditions(NamedTuple):
+    """What is given: changes of coordinates, forces and torques at others, and coordinates that are only looked at.
+
+    Attributes
+    ----------
+    held : tuple of Coordinate
+    moved, loads : mapping of Coordinate to float
+        The change from the start [m, rad], and the force or torque [N, N m].
+    measured : tuple of Coordinate
+    """
+
+    held: tuple[Coordinate, ...]
+    moved: Mapping[Coordinate, float]
+    loads: Mapping[Coordinate, float]
+    measured: tuple[Coordinate, ...]
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """All, each once."""
+        return tuple(dict.fromkeys((*self.moved, *self.loads, *self.measured, *self.held)))
+
+
+class Unknowns(NamedTuple):
+    """Coordinates (n,), multipliers (rows,) of constraints and of what is held or moved, and the fraction s."""
+
+    q: Array
+    mu: Array
+    s: float
+
+    def plus(self, change: Unknowns, part: float = 1.0) -> Unknowns:
+        """These and a part of a change."""
+        return Unknowns(self.q + part * change.q, self.mu + part * change.mu, self.s + part * change.s)
+
+    @property
+    def packed(self) -> Array:
+        """All as one array."""
+        return np.concatenate([self.q, self.mu, [self.s]])
+
+
+class Matrices(NamedTuple):
+    """Derivatives at a point: of forces by coordinates (n, n), of rows by coordinates (rows, n), of forces by s (n,).
+
+    `mass` is the mass matrix (n, n).
+    """
+
+    stiffness: csr_matrix
+    rows: csr_matrix
+    load: Array
+    mass: csr_matrix
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The equations of equilibrium of a system from a start on.
+
+    Attributes
+    ----------
+    system : System
+        Of the mechanism.
+    start : State
+        Its pose is where coordinates count from; loads in time are those of its time.
+    given : Conditions
+    """
+
+    system: System
+    start: State
+    given: Conditions
+
+    @cached_property
+    def extended(self) -> System:
+        """The system with a row for every named coordinate."""
+        mechanism = self.system.mechanism
+        prescribed = {one.joint for one in mechanism.prescribed}
+        origin, pins, more = PointRef(GROUND, _ORIGIN), {}, []
+        for one in self.given.coordinates:
+            if one.point is not None:
+                pins[_pin(one.point)] = RevoluteJoint(_pin(one.point), origin, one.point)
+            if one.point is None and one.name not in prescribed:
+                more.append(one.name)
+            elif one.point is not None and one.axis == "angle":
+                more.append(_pin(one.point))
+        laws = (PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0)) for joint in more)
+        extended = replace(
+            mechanism, ground={**mechanism.ground, _ORIGIN: (0.0, 0.0)}, joints=(*mechanism.joints, *pins.values()),
+            prescribed=(*mechanism.prescribed, *laws),
+        )  # fmt: skip
+        return with_constraints_of(self.system, extended)
+
+    @cached_property
+    def own(self) -> NDArray[np.int64]:
+        """Rows of the extended system that are the mechanism's own, in its order."""
+        number = {name: k for k, name in enumerate(self.extended.rows)}
+        return np.array([number[name] for name in self.system.rows], dtype=int)
+
+    @cached_property
+    def _row_numbers(self) -> dict[Coordinate, int]:
+        """The row of every named coordinate in the extended system."""
+        mechanism, names = self.extended.mechanism, {name: k for k, name in enumerate(self.extended.rows)}
+        law = {one.joint: one.name for one in mechanism.prescribed}
+        numbers = {}
+        for one in self.given.coordinates:
+            joint = one.name if one.point is None else _pin(one.point)
+            if one.point is not None and one.axis != "angle":
+                numbers[one] = names[f"{joint} {one.axis}"]
+            else:
+                numbers[one] = names[f"{law[joint]} {coordinate_kind(mechanism.joint(joint))}"]
+        return numbers
+
+    def number(self, coordinate: Coordinate) -> int:
+        """The row of a coordinate in the extended system."""
+        return self._row_numbers[coordinate]
+
+    @cached_property
+    def holding(self) -> NDArray[np.int64]:
+        """Rows that must keep their value or follow a change: constraints, and coordinates held or moved."""
+        own = [k for k in self.own.tolist() if self.extended.packed.rows["kind"][k] == CONSTRAINT]
+        extra = [self.number(one) for one in (*self.given.held, *self.given.moved)]
+        return np.array(list(dict.fromkeys([*own, *extra])), dtype=int)
+
+    @cached_property
+    def change(self) -> Array:
+        """Change of the rows `holding` with all that is given (rows,)."""
+        change, place = np.zeros(self.holding.size), {row: k for k, row in enumerate(self.holding.tolist())}
+        for one, value in self.given.moved.items():
+            change[place[self.number(one)]] = value
+        return change
+
+    @cached_property
+    def _loaded(self) -> tuple[NDArray[np.int64], Array]:
+        """Rows at which forces act, and the forces."""
+        rows = np.array([self.number(one) for one in self.given.loads], dtype=int)
+        return rows, np.array(list(self.given.loads.values()), dtype=float)
+
+    @cached_property
+    def _signals(self) -> Signals:
+        return moment_signals(self.extended.mechanism, self.start.time)
+
+    @cached_property
+    def _acting(self) -> Array:
+        return acting_loads(self.extended.mechanism, np.array([self.start.time]))[0]
+
+    @cached_property
+    def _forces(self) -> RestingForces:
+        forces = RestingForces(self.extended, self.start.time)
+        forces.torques = self._acting
+        return forces
+
+    @cached_property
+    def _tangency(self) -> Tangency:
+        return Tangency(replace(self.extended, packed=without_stiffness(self.extended.packed)))
+
+    @cached_property
+    def elastic(self) -> Array:
+        """Stiffness (n,) of beams, diagonal."""
+        return stiffness_diagonal(self.system)
+
+    @cached_property
+    def scale(self) -> Array:
+        """What one of each coordinate (n,) is measured in: sizes of the mechanism, rad; less of stiff coordinates."""
+        return Coordinates(self.system, ()).scale
+
+    @cached_property
+    def units(self) -> Array:
+        """What one of each unknown is measured in (n + rows + 1,)."""
+        energy = (
+            float(np.max(self.elastic * self.scale**2, initial=0.0)) or self.system.total_mass * self.system.size**2
+        )
+        return np.concatenate([self.scale, energy / self.extended.row_units[self.holding], [1.0]])
+
+    def values(self, q: Array) -> Array:
+        """Values (rows,) of all rows of the extended system at coordinates (n,): of named coordinates their own."""
+        return self.extended.constraints(self._signals, self.start.time, q)[0]
+
+    @cached_property
+    def at_start(self) -> Array:
+        """Values of all rows at the start, of the mechanism's constraints zero."""
+        values = self.values(self.start.q)
+        values[self.own] = 0.0
+        return values
+
+    def multipliers(self, at: Unknowns) -> Array:
+        """Multipliers of all rows of the extended system (m,): springs follow the pose."""
+        lam = self._forces.compliant(at.q)
+        rows, efforts = self._loaded
+        lam[rows] = -at.s * efforts
+        lam[self.holding] = at.mu
+        return lam
+
+    def residual(self, at: Unknowns) -> tuple[Array, Array]:
+        """Residuals of forces (n,) and of rows (rows,)."""
+        f = self._forces(at.q, self.multipliers(at))[0] + self.elastic * at.q
+        return f, (self.values(at.q) - self.at_start)[self.holding] - at.s * self.change
+
+    def matrices(self, at: Unknowns) -> Matrices:
+        """Derivatives at a point."""
+        still = np.zeros(self.system.n)
+        point = MotionPoint(self.start.time, at.q, still, still, self.multipliers(at), self._acting)
+        found = self._tangency.at(point)
+        rows, efforts = self._loaded
+        held, loaded = (rows_of(np.searchsorted(found.rows, wanted), found.jacobian)[0]
+                        for wanted in (self.holding, rows))  # fmt: skip
+        stiffness = csr_matrix(found.stiffness + scipy.sparse.diags(self.elastic))
+        return Matrices(stiffness, held, -(loaded.T @ efforts), found.mass)
+
+    def rows_named(self, coordinates: Sequence[Coordinate], q: Array) -> csr_matrix:
+        """Derivatives (coordinates, n) of named coordinates."""
+        jacobian = self._tangency.inertia(self.start.time, q)[1]
+        return rows_of(np.array([self.number(one) for one in coordinates], dtype=int), jacobian)[0]
+
+    def guess(self) -> Unknowns:
+        """The start, with the multipliers that would hold it best."""
+        none = Unknowns(self.start.q, np.zeros(self.holding.size), 0.0)
+        found = self.matrices(none)
+        mu = Saddle(found.mass, found.rows).solve(-self.residual(none)[0])[1]
+        return none._replace(mu=mu)
+
+    def independent(self, rows: csr_matrix, more: csr_matrix | None = None) -> tuple[NDArray[np.int64], ...]:
+        """Which rows (rows, n) do not follow from one another, and which of more rows do not from these."""
+        groups = [self._unit(part) for part in (rows, more) if part is not None]
+        entries = sum(int(np.prod(group.shape or ())) for group in groups)
+        choose = independent_dense if entries <= _DENSE_ENTRIES else independent_sparse
+        return choose(groups, np.ones(self.system.n)).groups
+
+    def _unit(self, rows: csr_matrix) -> csr_matrix:
+        scaled = csr_matrix(rows @ scipy.sparse.diags(self.scale))
+        size = np.sqrt(np.asarray(scaled.multiply(scaled).sum(axis=1)).ravel())
+        return csr_matrix(scipy.sparse.diags(1.0 / np.where(size > 0.0, size, 1.0)) @ scaled)
+
+    def gap(self, at: Unknowns) -> float:
+        """The largest residual of rows [sizes of the mechanism, rad]."""
+        phi = self.residual(at)[1]
+        return float(np.max(np.abs(phi) / self.extended.row_units[self.holding], initial=0.0))
+
+    def least_multipliers(self, at: Unknowns) -> Unknowns:
+        """The same equilibrium with those multipliers of dependent rows whose sum of squares is least."""
+        rows = self.matrices(at).rows
+        if self.independent(rows)[0].size == self.holding.size:
+            return at
+        transposed = rows.T.toarray() * self.scale[:, None]
+        mu = np.linalg.lstsq(transposed, transposed @ at.mu, rcond=1e-10)[0]
+        return at._replace(mu=mu)
+
+
+def _pin(point: PointRef) -> str:
+    return f"coordinates of {point.body} {point.point}"

@@ -1,0 +1,221 @@
+"""The labelled dataset of static equilibria: steps with coordinates, forces, stiffness, buckling, deformed shapes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from paraflex.arguments import checked_arguments
+from paraflex.dynamics.joint_loads import JointLoads, frame_load
+from paraflex.equilibria import Statics
+from paraflex.findings import Finding
+from paraflex.results.doubts import keep_findings, verdict_of
+from paraflex.results.drawing import system_drawing
+from paraflex.results.kinds import check_kind
+from paraflex.results.labelled import label, link_coordinates, link_variables, with_totals
+from paraflex.results.links import Links, system_links
+from paraflex.results.numbers import finite_or_none
+from paraflex.results.storage import SCHEMA
+from paraflex.results.validity import validity_summary, validity_variables
+from paraflex.validity import doubtful_numbers
+
+# Frequencies kept of each step.
+_FREQUENCIES = 8
+# Of what only moves, nothing is kept.
+_OF_MOTION = (
+    "angular_velocity", "angular_acceleration", "chord_velocity", "point_velocity", "point_acceleration", "motor_speed",
+    "joint_speed", "drive_speed", "kinetic_energy", "work", "drive_power", "drive_energy", "input_power",
+)  # fmt: skip
+UNITS = {
+    "step": ("number of an equilibrium along its branch, from the start", "1"),
+    "fraction": ("fraction of all loads and travels that are given", "1"),
+    "limit_point": ("whether the branch turns back here", "1"),
+    "stable": ("whether no small motion grows, what is held and moved kept", "1"),
+    "place": ("value of a named coordinate", "m, rad"),
+    "travel": ("change of a named coordinate since the start", "m, rad"),
+    "effort": ("force or torque at a named coordinate: given, or what holds or moves it", "N, N m"),
+    "role": ("what is given of a named coordinate", "1"),
+    "stiffness": ("force for a unit displacement of a named coordinate", "N/m, N m/rad"),
+    "compliance": ("displacement by a unit force at a named coordinate", "m/N, rad/(N m)"),
+    "natural_frequency": ("undamped natural frequency about the equilibrium", "Hz"),
+    "buckling_factor": ("fraction of all that is given at which the mechanism buckles", "1"),
+    "buckling_shape": ("displacement of drawn points as it buckles, the largest is 1", "1"),
+    "stress_step": ("step at which a beam's stress is largest", "1"),
+}
+_COMMENTS = {
+    "effort": "on the mechanism along the coordinate: of a joint on its second body",
+    "stiffness": "others are held and moved as they are, the coordinate itself set free; infinite where it cannot move",
+    "natural_frequency": "zero of a motion that grows; what is held and moved stays",
+    "buckling_factor": "from the stiffness about the equilibrium and its change along the branch; NaN where none is",
+}
+
+
+@checked_arguments()
+def statics_dataset(
+    found: Statics, *, parameters: dict[str, Any] | None = None, findings: Iterable[Finding] = ()
+) -> xr.Dataset:
+    """Static equilibria, labelled.
+
+    Parameters
+    ----------
+    found : Statics
+    parameters : dict, optional
+        Kept as provenance: the model as read, and what was asked for.
+    findings : iterable of Finding
+        Reasons to doubt the model; kept with those of its numbers and of the equilibria.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions step, named (coordinates by name), frequency_number, buckling_number, and those of a run: body,
+        point, joint, row, axis, station, section and others. Units and signs in the attributes of every variable; those
+        of each named coordinate in `unit` and `effort_unit`.
+    """
+    system, mechanism = found.system, found.system.mechanism
+    links = _own_links(found)
+    values = link_variables(links, mechanism)
+    data: dict[str, Any] = {name: (("time", *dims), each) for name, (dims, each) in values.items()}
+    data |= {name: each.item() for name, each in validity_variables([found.validity]).items()}
+    data |= {"status": found.status, "message": found.message}
+    steps = np.arange(len(found.equilibria))
+    out = with_totals(xr.Dataset(data, coords={"time": steps, **link_coordinates(system, links)}))
+    label(out, mechanism)
+    out = out.drop_vars([name for name in _OF_MOTION if name in out]).rename(time="step")
+    out = out.rename(stress_time="stress_step") if "stress_time" in out else out
+    out = out.assign(_of_steps(found)).assign_coords(_names(found))
+    for name in map(str, out.variables):
+        if name in UNITS:
+            meaning, unit = UNITS[name]
+            out[name].attrs = {"long_name": meaning, "units": unit}
+        if name in _COMMENTS:
+            out[name].attrs["comment"] = _COMMENTS[name]
+    out.attrs = {
+        "kind": "statics",
+        "mechanism": mechanism.name,
+        "parameters": json.dumps(parameters or {}, sort_keys=True),
+        "paraflex_version": version("paraflex"),
+        "schema": SCHEMA,
+    }
+    beyond = [] if found.validity is None or found.validity.holds else [found.validity.finding()]
+    keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *found.doubts])
+    return out
+
+
+def _own_links(found: Statics) -> Links:
+    """What a run has of its links, joints with all that holds, moves or loads them; of the mechanism's own members."""
+    extended, own, mechanism = found.equations.extended, found.system, found.system.mechanism
+    torques = np.zeros((len(found.equilibria), len(mechanism.motors)))
+    links = system_links(extended, found.solution, torques, len(torques))
+    joints, drives = len(mechanism.joints), len(mechanism.prescribed)
+    drawn, still = system_drawing(own, found.q), np.zeros_like(found.q)
+    loads = JointLoads(links.joint_force[:, :joints], links.joint_moment[:, :joints])
+    return replace(
+        links,
+        joint_force=loads.force,
+        joint_moment=loads.moment,
+        multiplier=links.multiplier[:, found.equations.own],
+        joint_coordinate=None if links.joint_coordinate is None else links.joint_coordinate[:, :joints],
+        joint_speed=None if links.joint_speed is None else links.joint_speed[:, :joints],
+        drive_torque=None if links.drive_torque is None else links.drive_torque[:, :drives],
+        drive_speed=None if links.drive_speed is None else links.drive_speed[:, :drives],
+        drawing=drawn,
+        frame_load=frame_load(own, drawn.joints, loads, found.q, still),
+    )
+
+
+def _of_steps(found: Statics) -> dict[str, Any]:
+    """Variables of the equilibria that no run has."""
+    names = [one.name for one in found.coordinates]
+    stiffness = np.full((len(found.equilibria), len(names)), np.nan)
+    for one in found.directions:
+        stiffness[:, names.index(one.name)] = found.stiffness(one.name)
+    with np.errstate(divide="ignore"):
+        compliance = 1.0 / stiffness
+    along = (("step", "named"),)
+    return {
+        "fraction": ("step", found.fraction),
+        "limit_point": ("step", found.limit),
+        "stable": ("step", found.stable),
+        "place": (*along, _columns(found, found.place)),
+        "travel": (*along, _columns(found, found.travel)),
+        "effort": (*along, _columns(found, found.effort)),
+        "stiffness": (*along, stiffness),
+        "compliance": (*along, compliance),
+        "natural_frequency": (("step", "frequency_number"), found.frequencies[:, :_FREQUENCIES] / (2.0 * np.pi)),
+        "buckling_factor": (("step", "buckling_number"), found.buckling),
+        **_motors(found),
+    }
+
+
+def _columns(found: Statics, quantity: Any) -> np.ndarray:
+    columns = [quantity(one.name) for one in found.coordinates]
+    return np.stack(columns, axis=1) if columns else np.zeros((len(found.equilibria), 0))
+
+
+def _motors(found: Statics) -> dict[str, Any]:
+    """Torques of motors at held, moved and loaded joints, those that share a joint alike."""
+    mechanism, names = found.system.mechanism, {one.name for one in found.coordinates}
+    if not mechanism.motors:
+        return {}
+    at = [motor.joint for motor in mechanism.motors]
+    torque = np.zeros((len(found.equilibria), len(at)))
+    for k, joint in enumerate(at):
+        if joint in names:
+            torque[:, k] = found.effort(joint) / at.count(joint)
+    units = list(dict.fromkeys(mechanism.motor_units()))
+    return {"torque": (("step", "motor"), torque, {"long_name": "motor torque or force", "units": ", ".join(units)})}
+
+
+def _names(found: Statics) -> dict[str, Any]:
+    given, coordinates = found.equations.given, found.coordinates
+    roles = {one: role for role, ones in (("held", given.held), ("loaded", given.loads), ("moved", given.moved))
+             for one in ones}  # fmt: skip
+    return {
+        "named": [one.name for one in coordinates],
+        "role": ("named", [roles.get(one, "free") for one in coordinates]),
+        "unit": ("named", [one.unit for one in coordinates]),
+        "effort_unit": ("named", [one.effort_unit for one in coordinates]),
+        "frequency_number": np.arange(1, min(found.frequencies.shape[1], _FREQUENCIES) + 1),
+        "buckling_number": np.arange(1, found.buckling.shape[1] + 1),
+    }
+
+
+@checked_arguments()
+def statics_summary(data: xr.Dataset) -> dict[str, Any]:
+    """The equilibria as plain numbers: of every named coordinate at the last step, stability, buckling, stresses."""
+    check_kind(data, "statics")
+    last = data.isel(step=-1)
+    factors = data["buckling_factor"].values.ravel()
+    return {
+        "mechanism": data.attrs["mechanism"],
+        "status": str(data["status"].item()),
+        "message": str(data["message"].item()),
+        "steps": int(data.sizes["step"]) - 1,
+        "stable": bool(data["stable"].values[~data["limit_point"].values].all()),
+        "limit_points": [float(x) for x in data["fraction"].values[data["limit_point"].values]],
+        "buckling_factor": finite_or_none(float(factors[0])) if factors.size else None,
+        "last": {
+            str(name): {
+                "unit": str(last["unit"].sel(named=name).item()),
+                **{key: finite_or_none(float(last[key].sel(named=name))) for key in
+                   ("place", "travel", "effort", "stiffness")},
+            }
+            for name in data["named"].values
+        },
+        "natural_frequency": [finite_or_none(float(x)) for x in last["natural_frequency"].values],
+        **({"stress_max": _of_bodies(data["stress_max"])} if "stress_max" in data else {}),
+        "verdict": verdict_of(data).to_dict(),
+        "validity": validity_summary(data),
+        "parameters": json.loads(data.attrs["parameters"]),
+        "version": data.attrs["paraflex_version"],
+    }  # fmt: skip
+
+
+def _of_bodies(values: xr.DataArray) -> dict[str, float | None]:
+    return {str(name): finite_or_none(values.sel(body=name).item()) for name in values["body"].values}

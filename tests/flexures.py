@@ -1,0 +1,124 @@
+"""Flexures of spring steel for tests: leaves 0.5 x 20 x 100 mm, E 2.1e11, EI = 0.04375 N m^2."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import paraflex as pf
+
+E, WIDTH, THICKNESS, LENGTH = 2.1e11, 0.02, 0.0005, 0.1
+EI = E * WIDTH * THICKNESS**3 / 12.0
+STEEL = pf.Material(E, 7850.0)
+LEAF = pf.Section.rectangle(WIDTH, THICKNESS)
+
+
+def leaf(name: str, length: float = LENGTH, elements: int = 2, **more) -> pf.FlexibleBeam:
+    return pf.FlexibleBeam(name, length, LEAF, STEEL, {"A": 0.0, "B": length}, elements, **more)
+
+
+def chain(name: str, beams: int, elements: int = 1) -> tuple[list[pf.FlexibleBeam], list[pf.WeldJoint]]:
+    """A leaf of so many beams welded end to end: NAME1.A is its root, NAMEk.B its tip."""
+    parts = [leaf(f"{name}{k + 1}", LENGTH / beams, elements) for k in range(beams)]
+    welds = [
+        pf.WeldJoint(f"{name}_{k}", pf.PointRef(a.name, "B"), pf.PointRef(b.name, "A"))
+        for k, (a, b) in enumerate(itertools.pairwise(parts), 1)
+    ]
+    return parts, welds
+
+
+def column(lower: str, upper: str, elements: int = 4) -> pf.Mechanism:
+    """A leaf upright between "clamped", "pinned", "guided" or "free" ends; a heavy load comes to its top B."""
+    beam = leaf("column", elements=elements)
+    foot, top = pf.PointRef("ground", "foot"), pf.PointRef("ground", "top")
+    joints = {
+        "clamped": lambda: pf.WeldJoint("lower", foot, pf.PointRef("column", "A"), angle=math.pi / 2),
+        "pinned": lambda: pf.RevoluteJoint("lower", foot, pf.PointRef("column", "A")),
+    }[lower]()
+    above = {
+        "free": lambda: (),
+        # Pinned or clamped to a slide that goes up and down on the ground.
+        "pinned": lambda: (pf.SlotJoint("upper", top, pf.PointRef("column", "B"), direction=math.pi / 2),),
+        "clamped": lambda: (
+            pf.PrismaticJoint("upper", top, pf.PointRef("column", "B"), direction=math.pi / 2, angle=math.pi / 2),
+        ),
+    }[upper]()
+    return pf.Mechanism(
+        name="column",
+        ground={"foot": (0.0, 0.0), "top": (0.0, LENGTH)},
+        bodies=(beam,),
+        joints=(joints, *above),
+        assemblies=(pf.Assembly("upright", {"column": math.pi / 2}),),
+        gravity=(0.0, 0.0),
+    )
+
+
+def guide(beams: int, apart: float = 0.05, elements: int = 1) -> pf.Mechanism:
+    """Two upright leaves of so many beams each, clamped to ground and to a stage of 0.2 kg above, with T at mid-top."""
+    left, welds_left = chain("left", beams, elements)
+    right, welds_right = chain("right", beams, elements)
+    stage = pf.RigidBody(
+        "stage", 0.2, 1e-4, (0.5 * apart, 0.0), {"L": (0.0, 0.0), "R": (apart, 0.0), "T": (0.5 * apart, 0.0)}
+    )
+    up = math.pi / 2
+    joints = [
+        pf.WeldJoint("root_left", pf.PointRef("ground", "L"), pf.PointRef("left1", "A"), angle=up),
+        pf.WeldJoint("root_right", pf.PointRef("ground", "R"), pf.PointRef("right1", "A"), angle=up),
+        *welds_left,
+        *welds_right,
+        pf.WeldJoint("tip_left", pf.PointRef(f"left{beams}", "B"), pf.PointRef("stage", "L"), angle=-up),
+        pf.WeldJoint("tip_right", pf.PointRef(f"right{beams}", "B"), pf.PointRef("stage", "R"), angle=-up),
+    ]
+    pose = {beam.name: up for beam in (*left, *right)} | {"stage": 0.0}
+    return pf.Mechanism(
+        name="guide",
+        ground={"L": (0.0, 0.0), "R": (apart, 0.0)},
+        bodies=(*left, *right, stage),
+        joints=tuple(joints),
+        assemblies=(pf.Assembly("straight", pose),),
+        gravity=(0.0, 0.0),
+    )
+
+
+def pivot(beams: int, elements: int = 1) -> pf.Mechanism:
+    """Two leaves at +-45 degrees that cross at mid-length, on a stage whose point C is at the crossing."""
+    left, welds_left = chain("left", beams, elements)
+    right, welds_right = chain("right", beams, elements)
+    half = 0.5 * LENGTH / math.sqrt(2.0)
+    stage = pf.RigidBody("stage", 0.2, 1e-4, (0.0, 0.0), {"C": (0.0, 0.0), "L": (half, half), "R": (-half, half)})
+    angles = {"left": math.pi / 4, "right": 3 * math.pi / 4}
+    joints = [
+        pf.WeldJoint("root_left", pf.PointRef("ground", "L"), pf.PointRef("left1", "A"), angle=angles["left"]),
+        pf.WeldJoint("root_right", pf.PointRef("ground", "R"), pf.PointRef("right1", "A"), angle=angles["right"]),
+        *welds_left,
+        *welds_right,
+        pf.WeldJoint("tip_left", pf.PointRef(f"left{beams}", "B"), pf.PointRef("stage", "L"), angle=-angles["left"]),
+        pf.WeldJoint("tip_right", pf.PointRef(f"right{beams}", "B"), pf.PointRef("stage", "R"), angle=-angles["right"]),
+    ]
+    pose = {beam.name: angles[beam.name[:-1].rstrip("0123456789")] for beam in (*left, *right)} | {"stage": 0.0}
+    return pf.Mechanism(
+        name="pivot",
+        ground={"L": (-half, -half), "R": (half, -half)},
+        bodies=(*left, *right, stage),
+        joints=tuple(joints),
+        assemblies=(pf.Assembly("straight", pose),),
+        gravity=(0.0, 0.0),
+    )
+
+
+def truss(stiffness: float = 1000.0, half: float = 1.0, rise: float = 0.3) -> pf.Mechanism:
+    """Two springs from the ground to the point T of a small mass: von Mises' truss. Hold "apex.T.angle"."""
+    length = math.hypot(half, rise)
+    springs = tuple(
+        pf.LinearSpring(name, pf.PointRef("ground", name), pf.PointRef("apex", "T"), stiffness, length)
+        for name in ("left", "right")
+    )
+    return pf.Mechanism(
+        name="truss",
+        ground={"left": (-half, 0.0), "right": (half, 0.0)},
+        bodies=(pf.RigidBody("apex", 0.1, 1e-5, (0.0, 0.0), {"T": (0.0, 0.0)}),),
+        joints=(),
+        linear_springs=springs,
+        assemblies=(pf.Assembly("up", {"apex": 0.0}, {"apex.T": (0.0, rise)}),),
+        gravity=(0.0, 0.0),
+    )
