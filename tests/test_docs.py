@@ -34,6 +34,7 @@ import documented  # noqa: E402
         ("quick-return.md", 4),
         ("linear-models.md", 3),
         ("reduction.md", 3),
+        ("statics.md", 3),
     ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):

@@ -193,7 +193,7 @@ def test_the_rigid_mechanism_stands_still_when_its_motors_are_held():
 def test_finite_segments_are_held_too():
     """By the joints of the first segments; told as links."""
     task = plan_tracking(PAPER, SIDE, duration=1.5 * SIDE.duration, samples=61, after="hold").in_segments(4)
-    run = task.simulate("++++", options=IntegrationOptions(method="esdirk5", tolerance=1e-7))
+    run = task.simulate("++++", options=IntegrationOptions(method="esdirk5", tolerance=1e-8))
     data, solution = tracking_dataset([run]), run.solution
     after = solution.t > SIDE.duration
     for motor in task.mechanism.motors:

@@ -27,6 +27,8 @@ _REGULAR = 1e-10
 _REFINEMENTS = 8
 # More right-hand sides at once have BLAS start threads, which on a busy machine take a thousand times as long.
 _COLUMNS = 16
+# Unknowns up to which a dense matrix takes milliseconds.
+_MOST_DENSE = 1000
 # Refinement goes on while it shrinks the residual at least this much.
 _WORTH_WHILE = 0.5
 
@@ -252,6 +254,26 @@ class Factor:
         """Sign of the determinant; not to be compared with those of matrices whose entries are elsewhere."""
         odd = sum(_is_odd(order) for order in (self._factor.perm_r, self._factor.perm_c))
         return float(np.prod(np.sign(self._factor.U.diagonal()))) * (-1.0) ** odd
+
+
+def solved(matrix: scipy.sparse.csr_matrix, units: Array, right: Array) -> Array:
+    """Solution (n,) of one right-hand side (n,) with a matrix that may be singular: dense where that is fast enough.
+
+    SuperLU, behind `Factor`, writes beyond its memory now and then where a matrix is exactly singular.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The matrix is singular, or not finite.
+    """
+    if not np.all(np.isfinite(matrix.data)):
+        raise np.linalg.LinAlgError("not finite")
+    if units.size > _MOST_DENSE:
+        return Factor(matrix, units).solve(right[:, None])[:, 0]
+    scaled = matrix.toarray() * units
+    size = np.max(np.abs(scaled), axis=1)
+    rows = 1.0 / np.where(size > 0.0, size, 1.0)
+    return units * np.linalg.solve(rows[:, None] * scaled, rows * right)
 
 
 def _is_odd(order: NDArray[np.int64]) -> bool:

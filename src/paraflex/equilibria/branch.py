@@ -17,7 +17,7 @@ import scipy
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
-from paraflex.dynamics.sparse import Factor
+from paraflex.dynamics.sparse import solved
 from paraflex.equilibria.equations import Equations, Unknowns
 from paraflex.errors import EquilibriumError, LimitPointError, Moment
 
@@ -270,13 +270,12 @@ class Branch:
         matrix = scipy.sparse.vstack([inner, csr_matrix(border[None])])
         n, units = equations.system.n, equations.units
         units = np.concatenate([units[:n], units[n:-1][kept], units[-1:]])
-        try:
-            factor = Factor(csr_matrix(matrix), units)
-        except np.linalg.LinAlgError:
-            raise _Failed from None
 
         def solve(f: Array, phi: Array, product: float) -> Unknowns:
-            found = factor.solve(np.concatenate([f, phi[kept], [product]])[:, None])[:, 0]
+            try:
+                found = solved(csr_matrix(matrix), units, np.concatenate([f, phi[kept], [product]]))
+            except np.linalg.LinAlgError:
+                raise _Failed from None
             if not np.all(np.isfinite(found)):
                 raise _Failed
             mu = np.zeros(phi.size)

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
 from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, slowest, typical_square, undamped_modes
-from paraflex.dynamics.sparse import Factor
+from paraflex.dynamics.sparse import solved
 from paraflex.equilibria.branch import Point
 from paraflex.equilibria.equations import Coordinate, Equations, Unknowns
 
@@ -159,11 +159,10 @@ def stiffness(equations: Equations, at: Unknowns, directions: Sequence[Coordinat
         C = csr_matrix(scipy.sparse.vstack([rows[kept], row]))
         units = np.concatenate([equations.units[:n], equations.units[n:-1][others[kept]], [0.0]])
         units[-1] = np.max(equations.elastic * equations.scale**2, initial=0.0) or 1.0
-        right = np.zeros((n + kept.size + 1, 1))
+        right = np.zeros(n + kept.size + 1)
         right[-1] = 1.0
         try:
-            solved = Factor(csr_matrix(scipy.sparse.bmat([[found.stiffness, C.T], [C, None]])), units).solve(right)
-            out[k] = -solved[-1, 0]
+            out[k] = -solved(csr_matrix(scipy.sparse.bmat([[found.stiffness, C.T], [C, None]])), units, right)[-1]
         except np.linalg.LinAlgError:
             out[k] = np.nan
     return out

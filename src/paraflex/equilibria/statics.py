@@ -22,6 +22,8 @@ from paraflex.validity import warn
 
 # More steps are a finer figure than anyone looks at.
 _MOST_STEPS = 10_000
+# Higher buckling modes than these say nothing.
+_MOST_FACTORS = 20
 
 
 @checked_arguments()
@@ -94,6 +96,9 @@ def statics(
     if not 1 <= steps <= _MOST_STEPS:
         raise InputError("no such number of steps", field="steps", value=steps,
                          remedy=f"choose one up to {_MOST_STEPS}")  # fmt: skip
+    if not 0 <= buckling <= _MOST_FACTORS:
+        raise InputError("no such number of factors", field="buckling", value=buckling,
+                         remedy=f"choose one up to {_MOST_FACTORS}")  # fmt: skip
     given = _given(mechanism, loads or {}, torques or {}, moved or {}, held, stiffness)
     begin = start if start is not None or isinstance(source, Mechanism) else source.start
     result = _followed(mechanism, given, begin, assembly, steps, buckling)

@@ -13,6 +13,7 @@ from paraflex.folders.lock import (
 )
 from paraflex.folders.manifest import (
     COMPARISON as COMPARISON,
+    EQUILIBRIA as EQUILIBRIA,
     KINDS as KINDS,
     LINEAR_MODELS as LINEAR_MODELS,
     RUN as RUN,

@@ -25,6 +25,7 @@ SENSITIVITY = "sensitivity"
 RUN_COMPARISON = "comparison of runs"
 STUDY_OF_RUNS = "study of many runs"
 LINEAR_MODELS = "study of linear models"
+EQUILIBRIA = "study of equilibria"
 KINDS: Mapping[str, tuple[str, ...]] = {
     STUDY_OF_RUNS: ("study.json", "journal.sqlite", "results.parquet"),
     VERIFICATION: ("verify.json", "verify.nc"),
@@ -32,6 +33,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     RUN_COMPARISON: ("compare.json",),
     SENSITIVITY: ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
     LINEAR_MODELS: ("linear.json", "linear.nc"),
+    EQUILIBRIA: ("statics.json", "statics.nc"),
     RUN: ("summary.json", "results.nc"),
 }
 # What else a study of many runs keeps, listed or not: they come and go while it runs.

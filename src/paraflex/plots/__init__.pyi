@@ -14,6 +14,12 @@ from .driving import (
     tracking_distance as tracking_distance,
 )
 from .energy import energies as energies
+from .equilibria import (
+    buckling_shapes as buckling_shapes,
+    deformed_shapes as deformed_shapes,
+    force_travel as force_travel,
+    stiffness_travel as stiffness_travel,
+)
 from .free_motion import (
     coordinates as coordinates,
     motion_overview as motion_overview,

@@ -181,6 +181,16 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
         CatalogueFigure("poles_along_path", "linear", "frequencies and real parts of poles along the motion",
                         "mode", "poles_along_path", variables=("branch_real",)),
     ),
+    "statics": (
+        CatalogueFigure("force_travel", "equilibria", "force against travel of what is loaded and moved",
+                        written_as="force_travel", variables=("given_travel",)),
+        CatalogueFigure("stiffness_travel", "equilibria", "stiffness and lowest frequencies against travel",
+                        written_as="stiffness_travel", variables=("given_travel",)),
+        CatalogueFigure("deformed_shapes", "equilibria", "the mechanism in all steps", written_as="deformed_shapes",
+                        variables=("given_travel",)),
+        CatalogueFigure("buckling_shapes", "equilibria", "how the mechanism buckles, as seen from the last step",
+                        written_as="buckling_shapes", variables=("buckling_shape",)),
+    ),
     "methods": (
         CatalogueFigure("work_precision", "methods", "wall time and steps over error",
                         written_as="work_precision"),

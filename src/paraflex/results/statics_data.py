@@ -27,6 +27,8 @@ from paraflex.validity import doubtful_numbers
 
 # Frequencies kept of each step.
 _FREQUENCIES = 8
+# Coordinates are displaced by this part of a buckling shape to find how drawn points move.
+_SMALL = 1e-4
 # Of what only moves, nothing is kept.
 _OF_MOTION = (
     "angular_velocity", "angular_acceleration", "chord_velocity", "point_velocity", "point_acceleration", "motor_speed",
@@ -149,8 +151,35 @@ def _of_steps(found: Statics) -> dict[str, Any]:
         "compliance": (*along, compliance),
         "natural_frequency": (("step", "frequency_number"), found.frequencies[:, :_FREQUENCIES] / (2.0 * np.pi)),
         "buckling_factor": (("step", "buckling_number"), found.buckling),
+        **_buckling_shapes(found),
+        **_given_travel(found),
         **_motors(found),
     }
+
+
+def _given_travel(found: Statics) -> dict[str, Any]:
+    """Travel of the first coordinate that is moved or loaded, over which others are drawn."""
+    given = found.equations.given
+    for one in (*given.moved, *given.loads):
+        attrs = {"long_name": f"travel of {one.name}", "units": one.unit, "coordinate": one.name}
+        return {"given_travel": ("step", found.travel(one.name), attrs)}
+    return {}
+
+
+def _buckling_shapes(found: Statics) -> dict[str, Any]:
+    """Displacements of drawn points as the mechanism buckles, the largest is one; none where it does not."""
+    shapes = np.array([one.buckling.shapes.T for one in found.equilibria])
+    steps, count, n = shapes.shape
+    moved = np.repeat(found.q, count, axis=0) + _SMALL * shapes.reshape(-1, n)
+    known = np.isfinite(moved).all(axis=1)
+    if not known.any() or not found.equations.given.loads:
+        return {}
+    drawn = system_drawing(found.system, found.q).shape
+    out = np.full((steps * count, *drawn.shape[1:]), np.nan)
+    out[known] = system_drawing(found.system, moved[known]).shape - np.repeat(drawn, count, axis=0)[known]
+    out[known] /= np.linalg.norm(out[known], axis=2).max(axis=1)[:, None, None]
+    values = out.reshape(steps, count, *drawn.shape[1:]).astype(np.float32)
+    return {"buckling_shape": (("step", "buckling_number", "station", "axis"), values)}
 
 
 def _columns(found: Statics, quantity: Any) -> np.ndarray:
@@ -184,6 +213,12 @@ def _names(found: Statics) -> dict[str, Any]:
         "frequency_number": np.arange(1, min(found.frequencies.shape[1], _FREQUENCIES) + 1),
         "buckling_number": np.arange(1, found.buckling.shape[1] + 1),
     }
+
+
+def step_kinds(data: xr.Dataset) -> list[str]:
+    """In words, whether each step is "stable", "unstable" or a "limit point"."""
+    limit, stable = data["limit_point"].values, data["stable"].values
+    return ["limit point" if at else "stable" if holds else "unstable" for at, holds in zip(limit, stable, strict=True)]
 
 
 @checked_arguments()

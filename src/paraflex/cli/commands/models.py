@@ -129,6 +129,57 @@ class LineariseRequest:
     json: Json = False
 
 
+@dataclass(frozen=True, kw_only=True)
+class StaticsRequest:
+    """What `paraflex statics` is asked for."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    loads: Annotated[
+        list[str],
+        Option(
+            "--load",
+            metavar="NAME=VALUE",
+            help='Force or torque at a joint or at a point\'s coordinate: "stage.T.x=10.5 N"; repeatable.',
+        ),
+    ] = field(default_factory=list)
+    torques: Annotated[
+        list[str], Option("--torque", metavar="MOTOR=VALUE", help="Torque or force of a motor; repeatable.")
+    ] = field(default_factory=list)
+    moved: Annotated[
+        list[str],
+        Option(
+            "--move",
+            metavar="NAME=VALUE",
+            help='Travel of a joint or of a point\'s coordinate from the start: "stage.T.x=10 mm"; repeatable.',
+        ),
+    ] = field(default_factory=list)
+    held: Annotated[
+        list[str] | None,
+        Option(
+            "--hold",
+            metavar="NAME|none",
+            help="Joint or point's coordinate that stays; repeatable. Default: joints of motors without --torque.",
+        ),
+    ] = None
+    steps: Annotated[int, Option(metavar="N", help="Equal steps of all loads and travels.")] = 10
+    stiffness: Annotated[
+        list[str] | None,
+        Option(
+            "--stiffness",
+            metavar="NAME",
+            help="Coordinate with a stiffness; repeatable. Default: those loaded or moved, else the end-effector's.",
+        ),
+    ] = None
+    buckling: Annotated[int, Option(metavar="N", help="Factors of buckling about every equilibrium.")] = 1
+    assembly: AssemblyOption = None
+    out: Annotated[
+        str | None,
+        Option("--out", "--output", metavar="DIR", help="Folder for statics.nc, statics.json and figures."),
+    ] = None
+    force: ReplaceOption = False
+    json: Json = False
+
+
 @dataclass(frozen=True)
 class MethodsRequest:
     """What `paraflex methods` is asked for."""

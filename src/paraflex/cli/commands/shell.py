@@ -18,6 +18,7 @@ from paraflex.cli.commands.models import (
     ModesRequest,
     NewRequest,
     SchemaRequest,
+    StaticsRequest,
 )
 from paraflex.cli.commands.results import AnimateRequest, CompareRequest, ExportRequest, PlotRequest, ReportRequest
 from paraflex.cli.commands.runs import CompareMethodsRequest, RunRequest, VerifyRequest
@@ -102,6 +103,10 @@ COMMANDS = (
         Linear models at a pose or along a motion: frequencies and damping, poles, zeros, motors held and free.
 
         With --out it writes linear.nc, linear.json, figures/, and report.html with the mode shapes in motion."""),
+    ListedCommand("statics", StaticsRequest, "statics.statics_command", """
+        Equilibria under loads and travel in steps, past limit points: forces, stiffness, buckling, frequencies.
+
+        With --out it writes statics.nc, statics.json and figures/."""),
     ListedCommand("methods", MethodsRequest, "methods.methods_command", """
         List the methods of integration, what each takes and what keeps the constraints."""),
     ListedCommand("info", InfoRequest, "inspect.info_command", """

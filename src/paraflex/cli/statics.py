@@ -1,0 +1,149 @@
+"""`paraflex statics`: equilibria under loads and travel, in steps."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import xarray as xr
+
+from paraflex.cli import COMPLETE, TROUBLE
+from paraflex.cli.commands.models import StaticsRequest
+from paraflex.cli.ending import say_where, tell
+from paraflex.cli.replacing import hold_results
+from paraflex.cli.request import asked_model, of_assembly
+from paraflex.cli.statics_tables import print_statics
+from paraflex.equilibria import Statics, statics
+from paraflex.equilibria.equations import coordinate_named
+from paraflex.errors import AssemblyError, EquilibriumError, InputError
+from paraflex.files import Model
+from paraflex.files.fields import number_in
+from paraflex.folders import EQUILIBRIA
+from paraflex.results.statics_data import statics_dataset, statics_summary
+from paraflex.results.storage import save_results
+from paraflex.writing import write_json
+
+# The options that arguments of `statics` come from.
+_FLAGS = {
+    "loads": "--load", "torques": "--torque", "moved": "--move", "held": "--hold", "steps": "--steps",
+    "stiffness": "--stiffness", "assembly": "--assembly", "buckling": "--buckling",
+}  # fmt: skip
+_NONE = "none"
+
+
+def statics_command(request: StaticsRequest) -> int:
+    """Find the equilibria, print them, and write files where that is asked for; the exit code."""
+    began = time.perf_counter()
+    model = asked_model(request.model)
+    if request.out is None:
+        data = _data(model, request)
+        _tell(data, request)
+        return _code(data)
+    with hold_results(request.out, EQUILIBRIA, force=request.force) as folder:
+        data = _data(model, request)
+        _tell(data, request)
+        with folder.replaced() as new:
+            save_results(data, new / "statics.nc")
+            write_json(new / "statics.json", statics_summary(data))
+        from paraflex.cli.writing import write_drawn
+
+        write_drawn(data, folder)
+    if not request.json:
+        say_where(began, "numbers, figures", folder.path)
+    return _code(data)
+
+
+def _code(data: xr.Dataset) -> int:
+    return COMPLETE if data["status"].item() == "complete" else TROUBLE
+
+
+def _tell(data: xr.Dataset, request: StaticsRequest) -> None:
+    tell(statics_summary(data), lambda out: print_statics(out, data), as_json=request.json)
+
+
+def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
+    return statics_dataset(_found(model, request), parameters=_parameters(model, request))
+
+
+def _found(model: Model, request: StaticsRequest) -> Statics:
+    """The equilibria, or those until one is not found."""
+    mechanism = model.mechanism
+    with _flagged():
+        loads, moved = (
+            {name: _number(text, coordinate_named(mechanism, name, f"{field}.{name}"), field)
+             for name, text in _pairs(given, _FLAGS[field]).items()}
+            for field, given in (("loads", request.loads), ("moved", request.moved))
+        )  # fmt: skip
+        units = dict(zip([motor.name for motor in mechanism.motors], mechanism.motor_units(), strict=True))
+        torques = {
+            name: _in_unit(text, units.get(name, "N m"), f"--torque {name}")
+            for name, text in _pairs(request.torques, "--torque").items()
+        }
+        try:
+            return statics(
+                model, loads=loads, torques=torques, moved=moved, held=[] if request.held == [_NONE] else request.held,
+                steps=request.steps, stiffness=_directions(model, request), buckling=request.buckling,
+                assembly=request.assembly or (None if model.start is not None else model.study.assembly), warning=False,
+            )  # fmt: skip
+        except EquilibriumError as error:
+            if error.partial is None:
+                raise
+            return error.partial
+        except AssemblyError as error:
+            raise of_assembly(error, model) from error
+
+
+def _directions(model: Model, request: StaticsRequest) -> Sequence[str] | None:
+    """Coordinates with a stiffness; of nothing that is given those of the end-effector."""
+    effector = model.mechanism.end_effector
+    if request.stiffness is not None or request.loads or request.torques or request.moved or effector is None:
+        return request.stiffness
+    return [f"{effector.point}.{axis}" for axis in effector.coordinates]
+
+
+def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
+    """Names and values, each name once."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise InputError("no name and value", field=flag, value=text, remedy=f'say {flag} "stage.T.x=1"')
+        if name in found:
+            raise InputError("given twice", field=flag, value=name, remedy="leave one of them out")
+        found[name] = value
+    return found
+
+
+def _number(text: str, one: Any, field: str) -> float:
+    unit = one.unit if field == "moved" else one.effort_unit
+    return _in_unit(text, unit, f"{_FLAGS[field]} {one.name}")
+
+
+def _in_unit(text: str, unit: str, field: str) -> float:
+    try:
+        return number_in(text, unit)
+    except InputError as error:
+        raise error.at(field) from None
+
+
+@contextmanager
+def _flagged() -> Iterator[None]:
+    """An error that names an argument of `statics` names the option instead."""
+    try:
+        yield
+    except InputError as error:
+        flag = _FLAGS.get(error.field.partition(".")[0])
+        raise (error if flag is None else error.at(flag)) from None
+
+
+def _parameters(model: Model, request: StaticsRequest) -> dict[str, Any]:
+    """What was asked for."""
+    asked = {name: getattr(request, name) for name in ("loads", "torques", "moved", "held", "steps", "stiffness",
+                                                        "assembly")}  # fmt: skip
+    run = {name: value for name, value in asked.items() if value not in (None, [])}
+    return {
+        "model": dict(model.parameters),
+        "run": {"mechanism": model.source, "set": dict(model.settings), "statics": True} | run,
+    }
