@@ -214,7 +214,7 @@ def _nominal(task: TrackingTask, times: Array) -> _NominalMotion:
     q, v, a = np.zeros((3, times.size, task.system.n))
     for body in task.system.bodies:
         # A beam in one segment has another name; more segments have springs between them.
-        carrier, _ = task.carriers.get(body.name, (body.name, 0.0))
+        carrier, _ = task.system.carrier(body.name)
         source = rigid.system.body(carrier).all
         target = slice(body.offset, body.offset + 3)
         q[:, target], v[:, target], a[:, target] = rigid.q[:, source], rigid.v[:, source], rigid.a[:, source]

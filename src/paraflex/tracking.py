@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
@@ -22,6 +22,7 @@ from paraflex.dynamics import (
     joint_motions,
     pack_signals,
     still_signals,
+    undeformed_motion,
 )
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
@@ -72,9 +73,6 @@ class TrackingTask:
         Undeformed, at the start of the path, moving as the path does.
     whole : TrackingTask or None
         The task of the uncut mechanism, where this one is of its finite segments.
-    carriers : mapping
-        For each finite segment the beam it was cut from, and how far along that it starts [m]; empty where nothing
-        was cut.
     after : Ending
         What the active motors do after the path; a name is taken for it.
     """
@@ -87,7 +85,6 @@ class TrackingTask:
     plan: TorquePlan
     start: State
     whole: TrackingTask | None = None
-    carriers: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     after: Ending = Ending.FREE
 
     def __post_init__(self) -> None:
@@ -148,7 +145,7 @@ class TrackingTask:
             self,
             mechanism=mechanism,
             system=system,
-            start=_start(system, self.motion, self.carriers),
+            start=_start(system, self.motion),
         )
 
     @checked_arguments()
@@ -173,9 +170,8 @@ class TrackingTask:
             self,
             mechanism=segmented.mechanism,
             system=system,
-            start=_start(system, self.motion, segmented.carriers),
+            start=_start(system, self.motion),
             whole=self,
-            carriers=segmented.carriers,
         )
 
     @checked_arguments()
@@ -339,7 +335,7 @@ def plan_tracking(
         motion=motion,
         effort=required_effort(motion),
         plan=plan_torques(follow, path_knots(path, end, mechanism)),
-        start=_start(system, motion, {}),
+        start=_start(system, motion),
         after=as_enum(Ending, after, "after"),
     )
 
@@ -480,30 +476,15 @@ def _drive_and_hold(
     return whole(held)
 
 
-def _start(system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str, float]]) -> State:
-    """Bodies at the start of the planned motion; each at its distance along its carrier."""
-    q, v, _ = undeformed_motion(system, motion, carriers, 0)
+def _start(system: System, motion: RigidMotion) -> State:
+    """The state at the start of a rigid motion, undeformed."""
+    q, v, _ = undeformed_at(system, motion, 0)
     return State(float(motion.t[0]), q, v)
 
 
-def undeformed_motion(
-    system: System, motion: RigidMotion, carriers: Mapping[str, tuple[str, float]], sample: int
-) -> tuple[Array, Array, Array]:
-    """Coordinates (n,) and their derivatives at a sample of a rigid motion, bodies at their places along carriers.
-
-    `carriers` is empty where nothing was cut.
-    """
-    q, v, a = np.zeros((3, system.n))
-    for body in system.bodies:
-        name, along = carriers.get(body.name, (body.name, 0.0))
-        own = motion.system.body(name).all
-        (x, y, phi), (vx, vy, w), (ax, ay, dw) = (part[sample, own] for part in (motion.q, motion.v, motion.a))
-        c, s = along * np.cos(phi), along * np.sin(phi)
-        rigid = slice(body.offset, body.offset + 3)
-        q[rigid] = x + c, y + s, phi
-        v[rigid] = vx - w * s, vy + w * c, w
-        a[rigid] = ax - dw * s - w * w * c, ay + dw * c - w * w * s, dw
-    return q, v, a
+def undeformed_at(system: System, motion: RigidMotion, sample: int) -> tuple[Array, Array, Array]:
+    """Coordinates (n,) and their derivatives at a sample of a rigid motion, bodies undeformed."""
+    return undeformed_motion(system, motion.system, motion.q[sample], motion.v[sample], motion.a[sample])
 
 
 def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Array:

@@ -51,6 +51,7 @@ from paraflex.dynamics.soundness import (
     closure_of as closure_of,
     mobility as mobility,
     undeformed as undeformed,
+    undeformed_motion as undeformed_motion,
 )
 from paraflex.dynamics.start import pose_at_rest as pose_at_rest, start_state as start_state
 from paraflex.dynamics.state import (

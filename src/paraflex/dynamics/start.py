@@ -29,6 +29,8 @@ from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start
 # of them.
 _GAP = 1e-6
 _SLIP = 1e-6
+# Terms of a row that are a smaller part of the largest of all rows are rounding of the projection.
+_SMALL_TERMS = 1e-4
 # Given deflections of one beam may contradict each other by this fraction of them.
 _CONTRADICTION = 1e-9
 # Weight of stiffness against mass [s^2]: links move and do not begin to bend, unless they must.
@@ -210,7 +212,7 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     slip = np.abs(C @ v - wanted)
     # What is left beside the terms that a row adds up, lengths in sizes of the mechanism.
     size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted)) / units
-    bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SLIP)
+    bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SMALL_TERMS)
     if np.any(bad):
         _refuse_velocities(system, given, slip, bad)
     return v

@@ -16,7 +16,7 @@ from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.limits import solvable
-from paraflex.mechanism import Mechanism, PointRef
+from paraflex.mechanism import Mechanism, PointRef, in_frames
 
 
 @given_as("a system", "the system that dynamics.build_system makes")
@@ -97,12 +97,36 @@ class System:
         return terms_by_joint(row_order(self.mechanism, self.index))
 
     def body(self, name: str) -> BodyCoordinates:
-        """Coordinates of a body by name."""
-        return self.bodies[self.index[name]]
+        """Coordinates of a body by name; of one that was cut those of its first part."""
+        return self.bodies[self.index[name] if name in self.index else self.index[self.parts(name)[0]]]
 
     def marker(self, ref: PointRef) -> Marker:
-        """The material point of a name."""
-        return make_marker(self.mechanism, self.bodies, self.index, ref)
+        """The material point of a name, of a body as described or of a part of it."""
+        cut = self.mechanism.cut
+        return make_marker(self.mechanism, self.bodies, self.index, ref if cut is None else cut.points.get(ref, ref))
+
+    @property
+    def described(self) -> Mechanism:
+        """The mechanism as the user described it."""
+        return self.mechanism.described
+
+    def parts(self, name: str) -> tuple[str, ...]:
+        """Parts of a body of the mechanism as described, first end first; itself where it was not cut."""
+        cut = self.mechanism.cut
+        return (name,) if cut is None else cut.parts.get(name, (name,))
+
+    def carrier(self, part: str) -> tuple[str, float]:
+        """The body as described that a body is a part of, and how far along that it starts [m]."""
+        cut = self.mechanism.cut
+        return (part, 0.0) if cut is None else cut.carriers.get(part, (part, 0.0))
+
+    @cached_property
+    def described_rows(self) -> tuple[str, ...]:
+        """Names of the rows of the mechanism as described."""
+        if self.mechanism.cut is None:
+            return self.rows
+        index = {body.name: i for i, body in enumerate(self.described.bodies)}
+        return tuple(label for one in row_order(self.described, index) for label in one.labels)
 
     def workspace(self) -> Workspace:
         """A fresh workspace for the kernels."""
@@ -144,6 +168,7 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     ProportionError
         One whose damping cannot be found, for numbers too far apart.
     """
+    mechanism = in_frames(mechanism)
     bodies, offset = [], 0
     for body in mechanism.bodies:
         modes = None if like is None else like.body(body.name).modes

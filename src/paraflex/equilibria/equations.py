@@ -34,6 +34,7 @@ from paraflex.kernel.packed import CONSTRAINT, Signals
 from paraflex.linear.coordinates import Coordinates
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
+from paraflex.mechanism.cut import Cut
 
 # A matrix of fewer entries has its independent rows found by a QR factorisation, others by elimination.
 _DENSE_ENTRIES = 400_000
@@ -164,9 +165,10 @@ class Equations:
         mechanism = self.system.mechanism
         prescribed = {one.joint for one in mechanism.prescribed}
         origin, pins, more = PointRef(GROUND, _ORIGIN), {}, []
+        cut = mechanism.cut or Cut(mechanism, {}, {})
         for one in self.given.coordinates:
             if one.point is not None:
-                pins[_pin(one.point)] = RevoluteJoint(_pin(one.point), origin, one.point)
+                pins[_pin(one.point)] = RevoluteJoint(_pin(one.point), origin, cut.points.get(one.point, one.point))
             if one.point is None and one.name not in prescribed:
                 more.append(one.name)
             elif one.point is not None and one.axis == "angle":
@@ -174,7 +176,7 @@ class Equations:
         laws = (PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0)) for joint in more)
         extended = replace(
             mechanism, ground={**mechanism.ground, _ORIGIN: (0.0, 0.0)}, joints=(*mechanism.joints, *pins.values()),
-            prescribed=(*mechanism.prescribed, *laws),
+            prescribed=(*mechanism.prescribed, *laws), cut=cut,
         )  # fmt: skip
         return with_constraints_of(self.system, extended)
 

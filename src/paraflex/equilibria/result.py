@@ -194,4 +194,4 @@ class Statics(Shown):
         rigid = {body.name: shape[body.offset : body.offset + 3] for body in self.system.bodies}
         name = max(rigid, key=lambda body: float(np.max(np.abs(rigid[body]))))
         which = int(np.argmax(np.abs(rigid[name])))
-        return f"{name} {('moves along x', 'moves along y', 'turns')[which]} most"
+        return f"{self.system.carrier(name)[0]} {('moves along x', 'moves along y', 'turns')[which]} most"

@@ -77,6 +77,7 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
         modes=body.modes,
         damping=_damping(body.damping, name),
         flexible=body.flexible,
+        frames=body.frames,
     )
 
 

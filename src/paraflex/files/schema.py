@@ -325,6 +325,9 @@ class BeamTable(_Table):
     modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
     damping: DampingTable | None = Field(default=None, description="a damping table")
     flexible: Yes = Field(default=True, description="false for a rigid beam")
+    frames: Count = Field(
+        default=1, description="floating frames of equal length, joined rigidly: more of them for large deflections"
+    )
 
 
 class RigidTable(_Table):

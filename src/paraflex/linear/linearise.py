@@ -24,7 +24,17 @@ from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, V
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import planned_point, resting_point, run_point
-from paraflex.mechanism import ActuationMode, Encoder, Mechanism, PointRef, PositionSensor, Sensor, Start, parse_mode
+from paraflex.mechanism import (
+    ActuationMode,
+    Encoder,
+    Mechanism,
+    PointRef,
+    PositionSensor,
+    Sensor,
+    Start,
+    in_frames,
+    parse_mode,
+)
 from paraflex.mechanism.checks import known_point
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
@@ -195,7 +205,8 @@ def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], p
     points = tuple(PointRef.parse(text, "forces") for text in forces)
     for point in points:
         known_point(mechanism, point, "forces")
-    return Ports(mode, points, tuple(prescribed), _sensors(mechanism))
+    # Of beams in several frames the sensors are on the parts.
+    return Ports(mode, points, tuple(prescribed), _sensors(in_frames(mechanism)))
 
 
 def _sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:

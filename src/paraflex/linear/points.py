@@ -15,7 +15,7 @@ from paraflex.kernel.packed import CONSTRAINT
 from paraflex.linear.coordinates import Coordinates
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
-from paraflex.tracking import TrackingRun, TrackingTask, undeformed_motion
+from paraflex.tracking import TrackingRun, TrackingTask, undeformed_at
 
 
 def resting_point(coordinates: Coordinates, state: State, mode: ActuationMode) -> tuple[MotionPoint, float]:
@@ -44,7 +44,7 @@ def planned_point(task: TrackingTask, mode: ActuationMode, sample: int) -> Motio
     deflections have a residual there, which the linear model leaves out.
     """
     system, rigid = task.system, task.motion
-    q, v, a = undeformed_motion(system, rigid, task.carriers, sample)
+    q, v, a = undeformed_at(system, rigid, sample)
     time = float(rigid.t[sample])
     efforts = task.torques(mode).evaluate(rigid.t[sample : sample + 1])[0]
     forces = RestingForces(system, time)

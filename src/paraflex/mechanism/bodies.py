@@ -132,6 +132,9 @@ class FlexibleBeam(CheckedFields):
         Of its material; none by default.
     flexible : bool
         False holds all flexible coordinates at zero: the same inertia, rigid.
+    frames : int
+        Floating frames of equal length, joined rigidly (`mechanism.frames`): with more of them large deflections
+        converge to the exact beam. Results see one beam.
     """
 
     _table = "body"
@@ -148,6 +151,7 @@ class FlexibleBeam(CheckedFields):
     modes: int | None = None
     damping: Damping | None = None
     flexible: bool = True
+    frames: int = 1
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -8,8 +8,9 @@ from typing import TypeVar
 
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import Polynomial, mesh_beam
+from paraflex.limits import ELEMENTS
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam, RigidBody
-from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping
+from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping, stiffness_proportional
 from paraflex.mechanism.modal import ModalBody
 from paraflex.mechanism.quantities import finite, not_negative, positive
 
@@ -43,6 +44,8 @@ def check_body(body: Body) -> None:
         _check_bar(body, field)
         with _within(field):
             n = body.mesh.n_flexible
+    if isinstance(body, FlexibleBeam):
+        _check_frames(body, field)
     check_damping(body.damping, f"{field}.damping")
     if body.modes is not None and not 1 <= body.modes <= n:
         raise InputError(
@@ -51,6 +54,26 @@ def check_body(body: Body) -> None:
             value=body.modes,
             remedy=f"from 1 to {n}, or leave it out for all",
         )
+
+
+def _check_frames(beam: FlexibleBeam, field: str) -> None:
+    """Check that a beam may have so many frames."""
+    if not 1 <= beam.frames <= ELEMENTS:
+        raise InputError(
+            "no such number of frames", field=f"{field}.frames", value=beam.frames, remedy=f"from 1 to {ELEMENTS}"
+        )
+    if beam.frames == 1:
+        return
+    if beam.modes is not None:
+        raise InputError(
+            "modes of the whole beam have no meaning in several frames", field=f"{field}.modes", value=beam.modes,
+            remedy="leave modes out, or frames",
+        )  # fmt: skip
+    if beam.damping is not None and stiffness_proportional(beam.damping) is None:
+        raise InputError(
+            "a beam in several frames can be damped in proportion to stiffness only", field=f"{field}.damping",
+            value=beam.damping, remedy="give damping = { stiffness = ... }, a loss factor, or none",
+        )  # fmt: skip
 
 
 def check_damping(damping: Damping | None, field: str) -> None:

@@ -59,6 +59,8 @@ class Mechanism(Members, Shown):
     description : str
     payload : Payload or None
         What `with_payload` has added to the body that carries the end-effector, for drawings and lists.
+    cut : Cut or None
+        The mechanism as described, of one that was made for computing: of segments, or of beams in several frames.
 
     Raises
     ------

@@ -11,6 +11,7 @@ from typing import Self, TypeVar
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body
+from paraflex.mechanism.cut import Cut
 from paraflex.mechanism.gears import Gear, Relation
 from paraflex.mechanism.groups import Group, group, grouped
 from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
@@ -143,6 +144,13 @@ class Members(CheckedFields):
     description: str = field(default="", compare=False)
     # The body that carries it has it, so that it is no part of what is compared, saved or simulated.
     payload: Payload | None = field(default=None, compare=False, repr=False)
+    # Where it was made of another for computing.
+    cut: Cut | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def described(self) -> Self:
+        """The mechanism as the user described it: itself, unless it was made of another for computing."""
+        return self if self.cut is None else self.cut.whole
 
     @classmethod
     def taken_from(cls, given: object, field: str = "mechanism") -> Self | None:

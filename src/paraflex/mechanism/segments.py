@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
-from typing import Any
+from typing import Any, TypeVar
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import SpanProperties
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
+from paraflex.mechanism.cut import Cut
 from paraflex.mechanism.damping import stiffness_proportional
 from paraflex.mechanism.groups import groups_of
 from paraflex.mechanism.joints import Joint, PointRef, RevoluteJoint, points_named
@@ -20,6 +21,8 @@ from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import Assembly
 from paraflex.mechanism.poses import approximate_poses
 from paraflex.mechanism.sensors import DeflectionSensor, Sensor
+
+T = TypeVar("T")
 
 # Points at which segments are joined.
 FIRST_END = "_first"
@@ -87,7 +90,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
     springs: list[TorsionalSpring] = []
     dampers: list[TorsionalDamper] = []
     carriers: dict[str, tuple[str, float]] = {}
-    places: dict[tuple[str, str], str] = {}
+    places: dict[PointRef, PointRef] = {}
     for body in mechanism.bodies:
         if body not in beams:
             bodies.append(body)
@@ -108,37 +111,47 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
             springs.append(TorsionalSpring(hinge, hinge, stiffness))
             if lag:
                 dampers.append(TorsionalDamper(hinge, hinge, lag * stiffness))
-        places |= {(body.name, point): names[i] for point, i in owners.items()}
+        places |= {PointRef(body.name, point): PointRef(names[i], point) for point, i in owners.items()}
 
-    def moved(member: Any) -> Any:
-        at = {
-            field: replace(ref, body=places.get((ref.body, ref.point), ref.body))
-            for field, ref in points_named(member).items()
-        }
-        return replace(member, **at)
-
-    effector = mechanism.end_effector
-    kept = {
-        name: tuple(moved(one) for one in getattr(mechanism, name) if _remains(one, counts))
-        for name, group in groups_of(Mechanism).items()
-        if group.kinds
-    }
-    segmented = replace(
-        mechanism,
+    segmented = rebuilt(
+        replace(mechanism, sensors=tuple(one for one in mechanism.sensors if _remains(one, counts))),
+        bodies, joints, Cut(mechanism, carriers, places),
         name=f"{mechanism.name}, finite segments",
-        bodies=tuple(bodies),
-        joints=(*map(moved, mechanism.joints), *joints),
-        **kept | {"springs": (*mechanism.springs, *springs), "dampers": (*mechanism.dampers, *dampers)},
-        end_effector=None if effector is None else moved(effector),
-        assemblies=tuple(_assembly(mechanism, assembly, carriers) for assembly in mechanism.assemblies),
-    )
+        springs=(*mechanism.springs, *springs), dampers=(*mechanism.dampers, *dampers),
+    )  # fmt: skip
     return Segmented(segmented, carriers)
 
 
-def _remains(member: Any, cut: Mapping[str, int]) -> bool:
+def moved(member: T, points: Mapping[PointRef, PointRef]) -> T:
+    """A member at the points that those it names are now."""
+    return replace(member, **{field: points.get(ref, ref) for field, ref in points_named(member).items()})  # type: ignore[type-var]
+
+
+def rebuilt(
+    mechanism: Mechanism, bodies: Sequence[Body], joints: Sequence[Joint], cut: Cut, **changed: Any
+) -> Mechanism:
+    """A mechanism of other bodies and more joints, whose members are at the points that theirs are now."""
+    kept = {
+        name: tuple(moved(one, cut.points) for one in getattr(mechanism, name))
+        for name, group in groups_of(Mechanism).items()
+        if group.kinds
+    }
+    effector = mechanism.end_effector
+    return replace(
+        mechanism,
+        bodies=tuple(bodies),
+        joints=(*(moved(joint, cut.points) for joint in mechanism.joints), *joints),
+        end_effector=None if effector is None else moved(effector, cut.points),
+        assemblies=tuple(_assembly(mechanism, assembly, cut.carriers) for assembly in mechanism.assemblies),
+        cut=cut,
+        **kept | changed,
+    )
+
+
+def _remains(member: Sensor, cut: Mapping[str, int]) -> bool:
     """Whether a member has a meaning in segments: of sensors those that need no frame and no inside of a cut beam."""
     frame = member.point.body if isinstance(member, DeflectionSensor) else getattr(member, "body", "")
-    return not isinstance(member, Sensor) or frame not in cut
+    return frame not in cut
 
 
 def is_hinge(joint: Joint) -> bool:

@@ -115,8 +115,8 @@ def system_drawing(system: System, q: Array) -> Drawing:
         body = system.body(name)
         return q[:, body.position], q[:, body.angle]
 
-    shapes = {one.body: outline_motion(system, one, q) for one in outlines(system.mechanism)}
-    return drawing(system.mechanism, shapes, lambda ref: material_angle(system, ref, q), frame)
+    shapes = {one.body: outline_motion(system, one, q) for one in outlines(system.described)}
+    return drawing(system.described, shapes, lambda ref: material_angle(system, ref, q), frame)
 
 
 def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:

@@ -116,7 +116,7 @@ def _last_places(run: MotionRun) -> list[tuple]:
 
     solution = run.solution
     q, v, a = (values[-1:] for values in (solution.q, solution.v, solution.a))
-    names = [PointRef(body.name, point) for body in run.system.mechanism.bodies for point in body.points]
+    names = [PointRef(body.name, point) for body in run.system.described.bodies for point in body.points]
     shown = [ref for ref in names if "._" not in str(ref)][:_MOST_LISTED]
     return [(str(ref), *map(float, point_motion(run.system, ref, q, v, a).position[0])) for ref in shown]
 

@@ -211,14 +211,14 @@ def padded(values: NDArray[Any], total: int) -> NDArray[Any]:
 
 def link_coordinates(system: System, links: Links) -> dict[str, Any]:
     """Labels of the dimensions that the variables of links have."""
-    mechanism = system.mechanism
+    mechanism = system.described
     drives, sensors = ([one.name for one in members] for members in (mechanism.prescribed, mechanism.sensors))
     return {
         "axis": ["x", "y"],
         "body": [body.name for body in mechanism.bodies],
         "motor": [motor.name for motor in mechanism.motors],
         "joint": [joint.name for joint in mechanism.joints],
-        "row": list(system.rows),
+        "row": list(system.described_rows),
         "point": [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points],
         **drawing_coordinates(mechanism),
         **({SENSOR: sensors} if sensors and links.sensors is not None else {}),

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +13,7 @@ from paraflex.dynamics.joint_loads import FrameLoad, drive_torques, frame_load, 
 from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
-from paraflex.results.drawing import Drawing, drawing, system_drawing
-from paraflex.results.outlines import outline_motion, outlines, segment_motion
+from paraflex.results.drawing import Drawing, system_drawing
 from paraflex.results.stress import SectionResult, section_result
 
 Array = NDArray[np.float64]
@@ -91,15 +89,8 @@ class Links:
     sensors: Array | None = None
 
 
-def system_links(
-    system: System,
-    solution: Solution,
-    torques: Array,
-    samples: int,
-    whole: System | None = None,
-    carriers: Mapping[str, tuple[str, float]] | None = None,
-) -> Links:
-    """Motion of the links in a run; links cut into segments are reported as the original links.
+def system_links(system: System, solution: Solution, torques: Array, samples: int) -> Links:
+    """Motion of the links in a run, as the mechanism was described: parts of what was cut are reported as one.
 
     Parameters
     ----------
@@ -109,35 +100,31 @@ def system_links(
         Torque or force of every motor.
     samples : int
         How many of the solution's to take.
-    whole : System, optional
-        Of the mechanism before it was cut; by default it was not.
-    carriers : mapping, optional
-        Of every segment the link it is of and where along that it begins [m].
     """
     q, v, a = (x[:samples] for x in (solution.q, solution.v, solution.a))
-    cut = _Cut(system, system if whole is None else whole, carriers or {})
-    mechanism = cut.whole.mechanism
-    first = [system.body(names[0]).angle for names in cut.parts.values()]
-    chords = [_chord(system, names, q, v) for names in cut.parts.values()]
+    mechanism = system.described
+    parts = [system.parts(body.name) for body in mechanism.bodies]
+    first = [system.body(names[0]).angle for names in parts]
+    chords = [_chord(system, names, q, v) for names in parts]
     named = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
-    points = stacked_motions([point_motion(system, cut.there(ref), q, v, a) for ref in named], samples)
+    points = stacked_motions([point_motion(system, ref, q, v, a) for ref in named], samples)
     multipliers = solution.multipliers[:samples]
     coordinates = {joint.name: joint_coordinate(system, joint.name, q, v) for joint in mechanism.joints}
     loads = joint_loads(system, [joint.name for joint in mechanism.joints], q, multipliers, torques[:samples])
-    drawn = _drawing(cut, q)
+    drawn = system_drawing(system, q)
     return Links(
         angle=q[:, first],
         rate=v[:, first],
         acceleration=a[:, first],
         chord=np.stack([angle for angle, _ in chords], axis=1),
         chord_rate=np.stack([rate for _, rate in chords], axis=1),
-        tip=np.stack([_tip(system, names, q) for names in cut.parts.values()], axis=1),
+        tip=np.stack([_tip(system, names, q) for names in parts], axis=1),
         points=points.position,
         point_velocity=points.velocity,
         point_acceleration=points.acceleration,
         joint_force=loads.force,
         joint_moment=loads.moment,
-        multiplier=_multipliers(system, cut.whole, multipliers),
+        multiplier=_multipliers(system, multipliers),
         motor_speed=_stacked([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
         kinetic_energy=solution.kinetic_energy[:samples],
         strain_energy=solution.strain_energy[:samples],
@@ -145,11 +132,11 @@ def system_links(
         drawing=drawn,
         joint_coordinate=_stacked([each.value for each in coordinates.values()], samples),
         joint_speed=_stacked([each.rate for each in coordinates.values()], samples),
-        drive_torque=drive_torques(system, multipliers),
+        drive_torque=drive_torques(system, multipliers)[:, : len(mechanism.prescribed)],
         drive_speed=_stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
         frame_load=frame_load(system, drawn.joints, loads, q, v),
         sections=section_result(system, q, v, a, multipliers),
-        sensors=_sensors(cut, sensor_readings(system, q, v, a, multipliers, torques[:samples])),
+        sensors=_sensors(system, sensor_readings(system, q, v, a, multipliers, torques[:samples])),
     )
 
 
@@ -164,85 +151,42 @@ def stacked_motions(points: Sequence[PointMotion], samples: int) -> PointMotion:
     return PointMotion(*(np.stack(parts, axis=1) for parts in zip(*points, strict=True)))
 
 
-@dataclass(frozen=True)
-class _Cut:
-    """A system whose links may be segments of those of another."""
-
-    system: System
-    whole: System
-    carriers: Mapping[str, tuple[str, float]]
-
-    @cached_property
-    def parts(self) -> dict[str, list[str]]:
-        """Names of the parts of each original body, first end first: itself if it was not cut."""
-        parts: dict[str, list[str]] = {body.name: [] for body in self.whole.bodies}
-        for body in self.system.bodies:
-            parts[self.carriers.get(body.name, (body.name, 0.0))[0]].append(body.name)
-        return parts
-
-    def there(self, ref: PointRef) -> PointRef:
-        """A point of an original body, on the part that has it."""
-        owner = next(name for name in self.parts[ref.body] if ref.point in self.system.mechanism.body(name).points)
-        return PointRef(owner, ref.point)
-
-
-def _multipliers(system: System, whole: System, multipliers: Array) -> Array:
-    """Multipliers by the rows of the original mechanism; NaN for those that the cut one does not have."""
-    if system is whole:
+def _multipliers(system: System, multipliers: Array) -> Array:
+    """Multipliers by the rows of the mechanism as described; NaN for those that the system does not have."""
+    if system.described_rows == system.rows:
         return multipliers
-    out = np.full((len(multipliers), whole.m), np.nan)
-    for i, row in enumerate(whole.rows):
-        if row in system.rows:
-            out[:, i] = multipliers[:, system.rows.index(row)]
+    place = {row: i for i, row in enumerate(system.rows)}
+    out = np.full((len(multipliers), len(system.described_rows)), np.nan)
+    for i, row in enumerate(system.described_rows):
+        if row in place:
+            out[:, i] = multipliers[:, place[row]]
     return out
 
 
-def _sensors(cut: _Cut, readings: Array) -> Array:
-    """Readings by the sensors of the original mechanism; NaN of those that the cut one does not have."""
-    place = {sensor.name: k for k, sensor in enumerate(cut.system.mechanism.sensors)}
-    out = np.full((len(readings), len(cut.whole.mechanism.sensors)), np.nan)
-    for k, sensor in enumerate(cut.whole.mechanism.sensors):
+def _sensors(system: System, readings: Array) -> Array:
+    """Readings by the sensors of the mechanism as described; NaN of those that the system does not have."""
+    place = {sensor.name: k for k, sensor in enumerate(system.mechanism.sensors)}
+    sensors = system.described.sensors
+    out = np.full((len(readings), len(sensors)), np.nan)
+    for k, sensor in enumerate(sensors):
         if sensor.name in place:
             out[:, k] = readings[:, place[sensor.name]]
     return out
 
 
-def _drawing(cut: _Cut, q: Array) -> Drawing:
-    """Bodies by their shape functions; cut bodies by their segments."""
-    system, mechanism = cut.system, cut.whole.mechanism
-    if system is cut.whole:
-        return system_drawing(system, q)
-    shapes = {}
-    for one in outlines(mechanism):
-        pieces = cut.parts[one.body]
-        if pieces == [one.body]:
-            shapes[one.body] = outline_motion(system, one, q)
-        else:
-            shapes[one.body] = segment_motion(system, pieces, [cut.carriers[piece][1] for piece in pieces], one, q)
-
-    def angle(ref: PointRef) -> Array:
-        return material_angle(system, cut.there(ref), q)
-
-    def frame(body: str) -> tuple[Array, Array]:
-        first = system.body(cut.parts[body][0])
-        return q[:, first.position], q[:, first.angle]
-
-    return drawing(mechanism, shapes, angle, frame)
-
-
-def _ends(system: System, names: list[str], q: Array, v: Array) -> list[PointMotion]:
+def _ends(system: System, names: Sequence[str], q: Array, v: Array) -> list[PointMotion]:
     """Motion of the first and last end of a beam, or of what it was cut into."""
     return [marker_motion(system, marker, q, v, np.zeros_like(q)) for marker in _end_markers(system, names)]
 
 
-def _end_markers(system: System, names: list[str]) -> tuple[Marker, ...]:
+def _end_markers(system: System, names: Sequence[str]) -> tuple[Marker, ...]:
     """First and last end of a body, or of the parts it was cut into; none for a body without ends."""
     if len(names) == 1:
         return end_markers(system.index[names[0]], system.body(names[0]))
     return system.marker(PointRef(names[0], FIRST_END)), system.marker(PointRef(names[-1], LAST_END))
 
 
-def _chord(system: System, names: list[str], q: Array, v: Array) -> tuple[Array, Array]:
+def _chord(system: System, names: Sequence[str], q: Array, v: Array) -> tuple[Array, Array]:
     """Angle and rate of the line from a beam's first end to its last; a rigid body's own, or where both ends are one.
 
     Less the line's angle in the undeformed body, which is zero of a beam.
@@ -266,12 +210,14 @@ def line_angle(line: Array, rate: Array, near: Array) -> tuple[Array, Array]:
     return angle, (x * rate[:, 1] - y * rate[:, 0]) / (x**2 + y**2)
 
 
-def _tip(system: System, names: list[str], q: Array) -> Array:
-    """Displacement and slope of a beam's last end in its frame; with segments in that of the first one."""
+def _tip(system: System, names: Sequence[str], q: Array) -> Array:
+    """Displacement and slope of a beam's last end in its frame; of one that was cut from the tangent at its first end."""
     if len(names) == 1:
         return tip_deflection(system, names[0], q)
     first, last = _ends(system, names, q, np.zeros_like(q))
-    phi, end = q[:, system.body(names[0]).angle], q[:, system.body(names[-1]).angle]
+    phi, end = (
+        material_angle(system, PointRef(name, point), q) for name, point in ((names[0], FIRST_END), (names[-1], LAST_END))
+    )
     c, s = np.cos(phi), np.sin(phi)
     x, y = (last.position - first.position).T
     length = sum(system.marker(PointRef(name, LAST_END)).x0[0] for name in names)

@@ -64,7 +64,7 @@ def motion_dataset(
         Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end, section, drive, load,
         sensor; units and signs in the attributes of every variable.
     """
-    system, solution, mechanism = run.system, run.solution, run.system.mechanism
+    system, solution, mechanism = run.system, run.solution, run.system.described
     q, v = solution.q, solution.v
     torques = run.applied
     links = system_links(system, solution, torques, len(q))

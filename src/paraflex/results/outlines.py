@@ -116,7 +116,7 @@ def deflections(system: System, q: Array) -> Array:
     Signed: see `across_chord`. NaN as in `chord_deflections`.
     """
     parts = [np.zeros((len(q), 0))]
-    for body, one in zip(system.mechanism.bodies, outlines(system.mechanism), strict=True):
+    for body, one in zip(system.described.bodies, outlines(system.described), strict=True):
         if system.body(body.name).nf:
             bent = across_chord(outline_motion(system, one, q), one.places)
             parts.append(bent if len(one.places) >= _LEAST_ON_LINE else np.full_like(bent, np.nan))
@@ -128,6 +128,9 @@ def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
 
     Of second-order geometry with the shortening of the model: s(x) = x + N u - 1/2 e_x int_0^x (N2' u)^2 dx.
     """
+    parts = system.parts(drawn.body)
+    if parts != (drawn.body,):
+        return _of_parts(system, parts, drawn, q)
     body = system.body(drawn.body)
     u = q[:, body.flexible]
     local = drawn.places + np.einsum("kn,sin->ksi", u, _rows(system, body, drawn))
@@ -136,15 +139,13 @@ def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
     return turned(q[:, body.position], q[:, body.angle], local)
 
 
-def segment_motion(system: System, names: Sequence[str], starts: Sequence[float], drawn: Outline, q: Array) -> Array:
-    """Places of the stations of a beam cut into rigid segments (k, s, 2), which start at these distances [m]."""
-    x = drawn.places[:, 0]
+def _of_parts(system: System, names: Sequence[str], drawn: Outline, q: Array) -> Array:
+    """Places of the stations of a beam that was cut (k, s, 2), each on its part."""
+    x, starts = drawn.places[:, 0], [system.carrier(name)[1] for name in names]
     owners = np.searchsorted(starts, x + _SAME * drawn.size, side="right") - 1
-    out = np.empty((q.shape[0], x.size, 2))
+    out = np.empty((q.shape[0], x.size, 2), dtype=q.dtype)
     for i, (name, start) in enumerate(zip(names, starts, strict=True)):
-        body, own = system.body(name), owners == i
-        local = np.broadcast_to(drawn.places[own] - [start, 0.0], (q.shape[0], int(own.sum()), 2))
-        out[:, own] = turned(q[:, body.position], q[:, body.angle], local)
+        out[:, owners == i] = outline_motion(system, Outline(name, drawn.places[owners == i] - [start, 0.0], {}), q)
     return out
 
 

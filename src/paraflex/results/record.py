@@ -80,7 +80,7 @@ def record(run: TrackingRun) -> Record:
     whole = task if task.whole is None else task.whole
     effector = task.mechanism.end_effector
     assert effector is not None
-    links = system_links(task.system, solution, torque, k, whole.system, task.carriers)
+    links = system_links(task.system, solution, torque, k)
     return Record(
         **{each.name: getattr(links, each.name) for each in fields(Links)},
         task=whole,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -12,14 +11,13 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.dynamics.joint_loads import JointLoads, frame_load
 from paraflex.equilibria import Statics
 from paraflex.findings import Finding
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.drawing import system_drawing
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, with_totals
-from paraflex.results.links import Links, system_links
+from paraflex.results.links import system_links
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.storage import SCHEMA
 from paraflex.results.validity import validity_summary, validity_variables
@@ -79,8 +77,10 @@ def statics_dataset(
         point, joint, row, axis, station, section and others. Units and signs in the attributes of every variable; those
         of each named coordinate in `unit` and `effort_unit`.
     """
-    system, mechanism = found.system, found.system.mechanism
-    links = _own_links(found)
+    system, mechanism = found.system, found.system.described
+    # Joints with all that holds, moves or loads them, reported of the mechanism as described.
+    torques = np.zeros((len(found.equilibria), len(mechanism.motors)))
+    links = system_links(found.equations.extended, found.solution, torques, len(torques))
     values = link_variables(links, mechanism)
     data: dict[str, Any] = {name: (("time", *dims), each) for name, (dims, each) in values.items()}
     data |= {name: each.item() for name, each in validity_variables([found.validity]).items()}
@@ -107,28 +107,6 @@ def statics_dataset(
     beyond = [] if found.validity is None or found.validity.holds else [found.validity.finding()]
     keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *found.doubts])
     return out
-
-
-def _own_links(found: Statics) -> Links:
-    """What a run has of its links, joints with all that holds, moves or loads them; of the mechanism's own members."""
-    extended, own, mechanism = found.equations.extended, found.system, found.system.mechanism
-    torques = np.zeros((len(found.equilibria), len(mechanism.motors)))
-    links = system_links(extended, found.solution, torques, len(torques))
-    joints, drives = len(mechanism.joints), len(mechanism.prescribed)
-    drawn, still = system_drawing(own, found.q), np.zeros_like(found.q)
-    loads = JointLoads(links.joint_force[:, :joints], links.joint_moment[:, :joints])
-    return replace(
-        links,
-        joint_force=loads.force,
-        joint_moment=loads.moment,
-        multiplier=links.multiplier[:, found.equations.own],
-        joint_coordinate=None if links.joint_coordinate is None else links.joint_coordinate[:, :joints],
-        joint_speed=None if links.joint_speed is None else links.joint_speed[:, :joints],
-        drive_torque=None if links.drive_torque is None else links.drive_torque[:, :drives],
-        drive_speed=None if links.drive_speed is None else links.drive_speed[:, :drives],
-        drawing=drawn,
-        frame_load=frame_load(own, drawn.joints, loads, found.q, still),
-    )
 
 
 def _of_steps(found: Statics) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,7 +63,16 @@ class SectionResult:
 def section_result(system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionResult | None:
     """Section forces for coordinates (k, n), their derivatives and multipliers; None where no beam is flexible."""
     sections = sections_of(system)
-    return None if sections is None else SectionResult(sections, sections.loads(system, q, v, a, multipliers))
+    if sections is None:
+        return None
+    loads = sections.loads(system, q, v, a, multipliers)
+    owners, starts = zip(*(system.carrier(name) for name in sections.bodies), strict=True)
+    if owners == sections.bodies:
+        return SectionResult(sections, loads)
+    # Places of parts of a beam count from the first end of the whole.
+    x = loads.x.copy()
+    x[:, : len(starts)] += starts
+    return SectionResult(replace(sections, bodies=owners, x=sections.x + starts), loads._replace(x=x))
 
 
 def section_variables(found: SectionResult, bodies: list[str]) -> Variables:

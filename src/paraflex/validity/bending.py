@@ -65,7 +65,7 @@ def bending_of(system: System, name: str, solution: Solution) -> Bending:
     if line.weights.size:
         shortening = 0.5 * slopes**2 @ line.weights
         axial = _axial_force(system, body, line, solution) / _buckling_load(body, line)
-    return Bending(body.name, body.points is None, given, tangent, slope, shortening, axial)
+    return Bending(system.carrier(name)[0], body.points is None, given, tangent, slope, shortening, axial)
 
 
 class _Line(NamedTuple):

@@ -106,7 +106,7 @@ def doubtful_results(
     """
     if not solution.t.size:
         return []
-    mechanism = mechanism or system.mechanism
+    mechanism = mechanism or system.described
     where = _Where("" if driven is None else f"mode {driven.mode}", mechanism)
     found = [
         *_large_slopes(where, system, solution),
@@ -121,7 +121,7 @@ def doubtful_results(
 
 def doubtful_stresses(system: System, solution: Solution) -> list[Finding]:
     """Findings about the stresses of equilibria or a run."""
-    return list(_overstressed(_Where("", system.mechanism), system, solution))
+    return list(_overstressed(_Where("", system.described), system, solution))
 
 
 def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
@@ -130,7 +130,10 @@ def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
 
 
 def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
-    slopes = {body.name: bending_of(system, body.name, solution).slope for body in system.bodies if body.nf}
+    bent = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
+    slopes = {
+        name: np.max([one.slope for one in bent if one.name == name], axis=0) for name in {one.name for one in bent}
+    }
     if not slopes:
         return
     worst = max(slopes, key=lambda name: np.max(slopes[name]))
@@ -156,11 +159,11 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
     used = np.nan_to_num(loads.stress / loads.strength)
     k, station = np.unravel_index(np.argmax(used), used.shape)
     if used[k, station] > 1.0:
-        name = sections.owners[station]
+        name, start = system.carrier(sections.owners[station])
         stress, strength = (STRESS.factor * one[k, station] for one in (loads.stress, loads.strength))
         yield Finding(
             "stress-over-strength", where.place,
-            f"a stress of {stress:.3g} {STRESS.name} in {name} at {loads.x[k, station]:.3g} m, "
+            f"a stress of {stress:.3g} {STRESS.name} in {name} at {start + loads.x[k, station]:.3g} m, "
             f"{solution.instant(int(k), 4)}: its material bears {strength:.3g} {STRESS.name}, the safety factor is "
             f"{1.0 / used[k, station]:.2g}",
             where.blame(name) or (
@@ -174,9 +177,10 @@ def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding
     speeds = np.stack([np.linalg.norm(solution.v[:, body.position], axis=1) for body in system.bodies], axis=1)
     k, b = np.unravel_index(np.argmax(np.where(np.isfinite(speeds), speeds, -1.0)), speeds.shape)
     if speeds[k, b] > FAST:
+        name = system.carrier(system.bodies[b].name)[0]
         yield Finding(
             "speed-large", where.place,
-            f"{system.bodies[b].name} moves at {speeds[k, b]:.3g} m/s at {solution.instant(int(k), 4)}",
+            f"{name} moves at {speeds[k, b]:.3g} m/s at {solution.instant(int(k), 4)}",
             where.blame() or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
         )  # fmt: skip
 

@@ -1,0 +1,123 @@
+"""Beams with several floating frames: cut into as many beams, welded end to end.
+
+Deflections count from each frame, so that slopes stay small where the whole beam bends far.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+from paraflex.errors import InputError
+from paraflex.mechanism.bodies import Body, FlexibleBeam
+from paraflex.mechanism.cut import Cut
+from paraflex.mechanism.joints import PointRef, WeldJoint
+from paraflex.mechanism.mechanism import Mechanism
+from paraflex.mechanism.segments import FIRST_END, LAST_END, moved, rebuilt
+from paraflex.mechanism.sensors import DeflectionSensor, Sensor, StrainGauge
+
+# Places nearer than this part of the beam are one.
+_SAME = 1e-9
+
+
+def in_frames(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with a beam for each frame of its flexible beams; itself where all have one.
+
+    Raises
+    ------
+    InputError
+        A sensor that reads in the frame of such a beam, or a joint that slides along it.
+    """
+    beams = {body.name: body for body in mechanism.bodies
+             if isinstance(body, FlexibleBeam) and body.flexible and body.frames > 1}  # fmt: skip
+    if not beams:
+        return mechanism
+    _check(mechanism, set(beams))
+    bodies: list[Body] = []
+    welds: list[WeldJoint] = []
+    places: dict[PointRef, PointRef] = {}
+    carriers: dict[str, tuple[str, float]] = {}
+    for body in mechanism.bodies:
+        if body.name not in beams:
+            bodies.append(body)
+            carriers[body.name] = (body.name, 0.0)
+            continue
+        beam = beams[body.name]
+        parts = _parts(beam)
+        bodies += parts
+        carriers |= {part.name: (beam.name, k * beam.length / beam.frames) for k, part in enumerate(parts)}
+        welds += [WeldJoint(f"{a.name}-{b.name}", PointRef(a.name, LAST_END), PointRef(b.name, FIRST_END))
+                  for a, b in pairwise(parts)]  # fmt: skip
+        places |= {PointRef(beam.name, point): PointRef(part.name, point) for part in parts for point in part.points}
+    cut = Cut(mechanism, carriers, places)
+    sensors = tuple(moved(_on_part(one, beams), places) for one in mechanism.sensors)
+    return rebuilt(mechanism, bodies, welds, cut, sensors=sensors)
+
+
+def _check(mechanism: Mechanism, beams: set[str]) -> None:
+    for joint in mechanism.joints:
+        if joint.follows_beam and joint.a.body in beams:
+            raise InputError(
+                "a joint slides along it, which takes one frame", field=f"body.{joint.a.body}.frames",
+                value=getattr(mechanism.body(joint.a.body), "frames", None), remedy="leave it out, or give it elements",
+            )  # fmt: skip
+    for sensor in mechanism.sensors:
+        frame = sensor.point.body if isinstance(sensor, DeflectionSensor) else getattr(sensor, "body", "")
+        if frame in beams and not isinstance(sensor, StrainGauge):
+            raise InputError(
+                f"reads in the frame of {frame}, which has several", field=f"sensor.{sensor.name}",
+                remedy=f"measure in the ground frame, or give {frame} one frame",
+            )  # fmt: skip
+
+
+def _on_part(sensor: Sensor, beams: Mapping[str, FlexibleBeam]) -> Sensor:
+    """A strain gauge on the part of its beam that it is on; at a cut on the side of the last end."""
+    if not isinstance(sensor, StrainGauge) or sensor.body not in beams:
+        return sensor
+    beam = beams[sensor.body]
+    place = sensor.place(beam.points)
+    number = _part_at(beam, place)
+    return replace(sensor, body=_name(beam, number), at=place - number * beam.length / beam.frames)
+
+
+def _name(beam: FlexibleBeam, number: int) -> str:
+    return f"{beam.name}_{number + 1}"
+
+
+def _part_at(beam: FlexibleBeam, place: float) -> int:
+    """Number of the part at a distance from the first end; at a cut that which begins there."""
+    return min(int(place / beam.length * beam.frames + _SAME), beam.frames - 1)
+
+
+def _parts(beam: FlexibleBeam) -> list[FlexibleBeam]:
+    """The beams that a beam is cut into, each with the sections, materials and elements of its spans."""
+    knots = [0.0, *sorted({x for x in beam.points.values() if _SAME < x / beam.length < 1.0 - _SAME}), beam.length]
+    knots = [knots[0], *(b for a, b in pairwise(knots) if b - a > _SAME * beam.length)]
+    length = beam.length / beam.frames
+    parts = []
+    for number in range(beam.frames):
+        start = number * length
+        points = {name: _near(x - start, length) for name, x in beam.points.items() if _part_at(beam, x) == number}
+        ends = [0.0, *sorted({x for x in points.values() if 0.0 < x < length}), length]
+        spans = [bisect_right(knots, start + 0.5 * (a + b)) - 1 for a, b in pairwise(ends)]
+        parts.append(replace(
+            beam, name=_name(beam, number), length=length, frames=1,
+            section=_of_spans(beam.section, spans), material=_of_spans(beam.material, spans),
+            elements=_of_spans(beam.elements, spans),
+            points={FIRST_END: 0.0, LAST_END: length, **points},
+            lumps=tuple(lump for lump in beam.lumps if lump.point in points),
+        ))  # fmt: skip
+    return parts
+
+
+def _near(x: float, length: float) -> float:
+    """A place, at an end where rounding alone puts it elsewhere."""
+    return 0.0 if abs(x) < _SAME * length else length if abs(x - length) < _SAME * length else x
+
+
+def _of_spans(values: Any, spans: Sequence[int]) -> Any:
+    """What was given for each span of the whole beam, for the spans of a part."""
+    return tuple(values[span] for span in spans) if isinstance(values, tuple) else values
