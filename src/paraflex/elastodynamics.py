@@ -156,6 +156,12 @@ def _check(task: TrackingTask, step: float) -> None:
                 value=member.name,
                 remedy="leave it out; of finite segments use the task they were cut from",
             )
+    for body in mechanism.bodies:
+        if len(task.system.parts(body.name)) > 1 and task.whole is None:
+            raise InputError(
+                "kineto-elastodynamics takes one frame a beam", field=f"body.{body.name}.frames",
+                remedy="leave frames out",
+            )  # fmt: skip
     if not (math.isfinite(step) and step > 0.0):
         raise InputError("must be positive", field="step", value=step, remedy="give a time in seconds, say 1e-4")
 

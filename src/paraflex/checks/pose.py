@@ -110,7 +110,7 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
             yield from loose_points(seen.rigid, seen.chosen.state.q)
     yield from _reduced(seen.system)
     if seen.chosen is not None and seen.chosen.state is not None:
-        yield from axes_along_beams(seen.system.mechanism, seen.rigid, seen.chosen.state.q)
+        yield from axes_along_beams(seen.system.described, seen.rigid, seen.chosen.state.q)
     yield from _vibration(seen, at_rest)
 
 
@@ -172,11 +172,12 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
     if seen.chosen is None or seen.chosen.state is None or seen.mobility is None or seen.reach is None:
         return
     for body in seen.system.bodies:
+        name = seen.system.carrier(body.name)[0]
         slowest = float(np.min(body.modes.omega, initial=math.inf)) / (2.0 * math.pi)
         if slowest < SLOWEST_LINK:
             yield Finding(
-                "frequency-low", f"body.{body.name}", f"it vibrates on its own at {slowest:.2g} Hz, as no link does",
-                f"look at Young's modulus, section and length of {body.name}: Pa and m",
+                "frequency-low", f"body.{name}", f"it vibrates on its own at {slowest:.2g} Hz, as no link does",
+                f"look at Young's modulus, section and length of {name}: Pa and m",
             )  # fmt: skip
     mechanism = seen.system.mechanism
     motors = list(dict.fromkeys(motor.joint for motor in mechanism.motors))

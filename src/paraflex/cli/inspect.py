@@ -161,16 +161,19 @@ def _equation(one: Relation) -> str:
 
 def _links(mechanism: Mechanism, system: System) -> list[dict[str, Any]]:
     links = []
-    for body, coordinates in zip(mechanism.bodies, system.bodies, strict=True):
+    for body in mechanism.bodies:
+        parts = [system.body(part) for part in system.parts(body.name)]
         links.append(
             {
                 "name": body.name,
                 "kind": "flexible" if getattr(body, "flexible", False) else "rigid",
                 "length": getattr(body, "length", None),
-                "mass": coordinates.integrals.m,
-                "elements": coordinates.mesh.n_elements if coordinates.mesh else None,
-                "coordinates": 3 + coordinates.nf,
-                "frequencies_hz": hertz(coordinates.modes.omega),
+                "mass": sum(part.integrals.m for part in parts),
+                "elements": sum(part.mesh.n_elements for part in parts if part.mesh) or None,
+                "frames": len(parts),
+                "coordinates": sum(3 + part.nf for part in parts),
+                # Of each part in its own frame.
+                "frequencies_hz": hertz(parts[0].modes.omega),
             }
         )
     return links

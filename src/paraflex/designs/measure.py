@@ -93,7 +93,7 @@ def metrics_of(
 
 def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
     """Columns of the metrics by name, NAME.MEMBER for those of each motor, drive or joint."""
-    members = members_of(run.system.mechanism if isinstance(run, MotionRun) else run.task.mechanism)
+    members = members_of(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
     return tuple(column for name in names for column in METRICS[name].columns(members))
 
 

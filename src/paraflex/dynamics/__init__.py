@@ -50,8 +50,6 @@ from paraflex.dynamics.soundness import (
     Redundancy as Redundancy,
     closure_of as closure_of,
     mobility as mobility,
-    undeformed as undeformed,
-    undeformed_motion as undeformed_motion,
 )
 from paraflex.dynamics.start import pose_at_rest as pose_at_rest, start_state as start_state
 from paraflex.dynamics.state import (
@@ -61,5 +59,7 @@ from paraflex.dynamics.state import (
     project_position as project_position,
     project_velocity as project_velocity,
     reference_pose as reference_pose,
+    undeformed as undeformed,
+    undeformed_motion as undeformed_motion,
 )
 from paraflex.dynamics.system import System as System, build_system as build_system

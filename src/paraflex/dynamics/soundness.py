@@ -82,29 +82,6 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
     return Closure(assembly.name, before, position, velocity, 0.0, (), "", state)
 
 
-def undeformed(system: System, rigid: System, state: State) -> State:
-    """The state of rest of a flexible system with its undeformed bodies at the places of the rigid ones."""
-    still = np.zeros_like(state.q)
-    return State(state.time, undeformed_motion(system, rigid, state.q, still, still)[0], np.zeros(system.n))
-
-
-def undeformed_motion(system: System, rigid: System, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-    """Coordinates (n,) and their derivatives of undeformed bodies that move as the rigid ones.
-
-    Parts of a beam that was cut are at their places along it.
-    """
-    there = np.zeros((3, system.n))
-    for body in system.bodies:
-        name, along = system.carrier(body.name)
-        (x, y, phi), (vx, vy, w), (ax, ay, dw) = (part[rigid.body(name).all] for part in (q, v, a))
-        c, s = along * np.cos(phi), along * np.sin(phi)
-        own = slice(body.offset, body.offset + 3)
-        there[0, own] = x + c, y + s, phi
-        there[1, own] = vx - w * s, vy + w * c, w
-        there[2, own] = ax - dw * s - w * w * c, ay + dw * c - w * w * s, dw
-    return there[0], there[1], there[2]
-
-
 @dataclass(frozen=True)
 class Redundancy:
     """A constraint that follows from others.

@@ -17,8 +17,7 @@ from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.soundness import undeformed
-from paraflex.dynamics.state import State, consistent_state, reference_pose
+from paraflex.dynamics.state import State, consistent_state, reference_pose, undeformed
 from paraflex.dynamics.system import System, build_system
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
@@ -65,7 +64,14 @@ def start_state(
     InputError
         See `check_start`; coordinates at which joints are open, or velocities they do not allow, with the residual.
     """
-    check_start(system.mechanism, start)
+    check_start(system.described, start)
+    for field, given in (("coordinates", start.coordinates), ("rates", start.rates), ("deflection", start.deflection)):
+        for name in given:
+            if len(system.parts(name)) > 1:
+                raise InputError(
+                    "cannot be given of a beam in several frames", field=f"start.{field}.{name}",
+                    remedy="give velocities of points, or the beam one frame",
+                )  # fmt: skip
     if isinstance(assembly, str):
         assembly = system.mechanism.assembly(assembly)
     signals = moment_signals(system.mechanism, time)
@@ -88,7 +94,7 @@ def pose_at_rest(system: System, start: Start | State | None, assembly: str | No
         return start
     mechanism = system.mechanism
     if start is None:
-        rigid = build_system(mechanism.rigid())
+        rigid = build_system(system.described.rigid())
         return undeformed(system, rigid, consistent_state(rigid, assembly))
     return start_state(system, start, mechanism.assembly(assembly) if mechanism.assemblies else None)
 

@@ -25,7 +25,7 @@ from paraflex.dynamics.projection import (
 )
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
-from paraflex.dynamics.system import System
+from paraflex.dynamics.system import System, build_system
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
@@ -71,11 +71,42 @@ def momentum(system: System, state: State) -> tuple[Array, float]:
     return linear, angular
 
 
+def undeformed(system: System, rigid: System, state: State) -> State:
+    """The state of rest of a flexible system with its undeformed bodies at the places of the rigid ones."""
+    still = np.zeros_like(state.q)
+    return State(state.time, undeformed_motion(system, rigid, state.q, still, still)[0], np.zeros(system.n))
+
+
+def undeformed_motion(system: System, rigid: System, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+    """Coordinates (n,) and their derivatives of undeformed bodies that move as the rigid ones.
+
+    Parts of a beam that was cut are at their places along it.
+    """
+    there = np.zeros((3, system.n))
+    for body in system.bodies:
+        name, along = system.carrier(body.name)
+        (x, y, phi), (vx, vy, w), (ax, ay, dw) = (part[rigid.body(name).all] for part in (q, v, a))
+        c, s = along * np.cos(phi), along * np.sin(phi)
+        own = slice(body.offset, body.offset + 3)
+        there[0, own] = x + c, y + s, phi
+        there[1, own] = vx - w * s, vy + w * c, w
+        there[2, own] = ax - dw * s - w * w * c, ay + dw * c - w * w * s, dw
+    return there[0], there[1], there[2]
+
+
 def reference_pose(system: System, assembly: Assembly) -> Array:
     """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
 
-    Bodies whose places follow from the assembly's points are there. Loops are not closed yet.
+    Bodies whose places follow from the assembly's points are there. Loops are not closed yet, but for a mechanism with
+    beams that were cut: its parts are where the rigid links of the mechanism as described are, loops closed, so that
+    the pose does not depend on how many parts there are.
     """
+    if system.mechanism.cut is not None and assembly.name in [one.name for one in system.described.assemblies]:
+        rigid = build_system(system.described.rigid())
+        signals = moment_signals(rigid.mechanism, 0.0)
+        start = reference_pose(rigid, rigid.mechanism.assembly(assembly.name))
+        pose = project_position(rigid, signals, 0.0, start)
+        return undeformed(system, rigid, State(0.0, pose, np.zeros(rigid.n))).q
     q = np.zeros(system.n)
     placed = set()
     for name, pose in approximate_poses(system.mechanism, assembly).items():

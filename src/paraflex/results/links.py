@@ -211,12 +211,13 @@ def line_angle(line: Array, rate: Array, near: Array) -> tuple[Array, Array]:
 
 
 def _tip(system: System, names: Sequence[str], q: Array) -> Array:
-    """Displacement and slope of a beam's last end in its frame; of one that was cut from the tangent at its first end."""
+    """Displacement and slope of a beam's last end in its frame; of a cut one from the tangent at its first end."""
     if len(names) == 1:
         return tip_deflection(system, names[0], q)
     first, last = _ends(system, names, q, np.zeros_like(q))
     phi, end = (
-        material_angle(system, PointRef(name, point), q) for name, point in ((names[0], FIRST_END), (names[-1], LAST_END))
+        material_angle(system, PointRef(name, point), q)
+        for name, point in ((names[0], FIRST_END), (names[-1], LAST_END))
     )
     c, s = np.cos(phi), np.sin(phi)
     x, y = (last.position - first.position).T

@@ -58,7 +58,7 @@ class SolutionTraces(Generic[R]):
     @cached_property
     def power(self) -> Trace:
         """Power of every motor (k, motors) [W]; zero for passive ones."""
-        return self._of_joints([motor.joint for motor in self.system.mechanism.motors]) * self.torque
+        return self._of_joints([motor.joint for motor in self.system.described.motors]) * self.torque
 
     @cached_property
     def drive_torque(self) -> Trace:
@@ -68,7 +68,7 @@ class SolutionTraces(Generic[R]):
     @cached_property
     def drive_power(self) -> Trace:
         """Power of every prescribed motion (k, drives) [W]."""
-        return self._of_joints([one.joint for one in self.system.mechanism.prescribed]) * self.drive_torque
+        return self._of_joints([one.joint for one in self.system.described.prescribed]) * self.drive_torque
 
     @cached_property
     def joint_force(self) -> Trace:
@@ -77,14 +77,14 @@ class SolutionTraces(Generic[R]):
         multipliers = np.where(np.isnan(solution.multipliers), 0.0, solution.multipliers)
         forces = [
             load_in(system, joint.name, joint_parts(system, joint.name), solution.q, multipliers, self.torque)[0]
-            for joint in system.mechanism.joints
+            for joint in system.described.joints
         ]
         return np.stack([length(each) for each in forces], axis=1) if forces else np.zeros((len(solution.q), 0))
 
     @cached_property
     def joint_speed(self) -> Trace:
         """Rate of every joint's angle [rad/s], or travel [m/s] (k, joints)."""
-        return self._of_joints([joint.name for joint in self.system.mechanism.joints])
+        return self._of_joints([joint.name for joint in self.system.described.joints])
 
     def _of_joints(self, names: list[str]) -> Trace:
         """Rates of joints by name (k, joints)."""

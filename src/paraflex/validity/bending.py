@@ -27,6 +27,9 @@ class Bending(NamedTuple):
     Attributes
     ----------
     name : str
+        Of the beam that it is a part of, where that has several frames.
+    frames : int
+        How many that has.
     linear : bool
         Whether its geometry is linear.
     given : bool
@@ -43,6 +46,7 @@ class Bending(NamedTuple):
     """
 
     name: str
+    frames: int
     linear: bool
     given: bool
     tangent: bool
@@ -65,7 +69,8 @@ def bending_of(system: System, name: str, solution: Solution) -> Bending:
     if line.weights.size:
         shortening = 0.5 * slopes**2 @ line.weights
         axial = _axial_force(system, body, line, solution) / _buckling_load(body, line)
-    return Bending(system.carrier(name)[0], body.points is None, given, tangent, slope, shortening, axial)
+    whole = system.carrier(name)[0]
+    return Bending(whole, len(system.parts(whole)), body.points is None, given, tangent, slope, shortening, axial)
 
 
 class _Line(NamedTuple):

@@ -198,4 +198,4 @@ def _remedy(body: Bending) -> str:
         return "use second-order geometry (--geometry second-order)"
     if body.tangent:
         return 'use reference = "pinned"'
-    return f"make {body.name} of several beams welded together, or compare with exact beams (paraflex verify)"
+    return f"give {body.name} more frames (frames = {2 * body.frames}), or compare with exact beams (paraflex verify)"

@@ -38,7 +38,7 @@ from paraflex.kernel.packed import Signals, make_scratch
 from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
 from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
-from paraflex.mechanism import ActuationMode, Mechanism, RigidBody
+from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody
 from paraflex.tracking import TrackingTask, path_knots
 
 Array = NDArray[np.float64]
@@ -100,6 +100,16 @@ class ModeChange:
     error: float
 
 
+def refuse_frames(mechanism: Mechanism) -> None:
+    """Refuse beams in several frames, whose parts have no derivatives."""
+    for body in mechanism.bodies:
+        if isinstance(body, FlexibleBeam) and body.flexible and body.frames > 1:
+            raise InputError(
+                "a beam in several frames has no derivatives yet", field=f"body.{body.name}.frames", value=body.frames,
+                remedy="give it one frame and more elements, or take differences by a sweep",
+            )  # fmt: skip
+
+
 class Change:
     """Derivatives of a design by one parameter, relative to its size.
 
@@ -127,6 +137,7 @@ class Change:
         self.name: str = setting.names[k]
         self.size = size
         self.planned = planned
+        refuse_frames(planned.mechanism)
         here = _described(setting, task, planned.mechanism)
         self.stencil, self.near = self._near(setting, task, k)
         try:
