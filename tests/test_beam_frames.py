@@ -82,6 +82,18 @@ def test_runs_sensors_and_stresses_are_those_of_the_whole_beam():
     assert cut["stress_place"].values[:2] == pytest.approx(whole["stress_place"].values[:2], abs=1e-12)
 
 
+def test_a_run_whose_energy_does_not_balance_says_so():
+    """Undamped, many stiff frames: the default method lets their stretching grow at the default tolerance."""
+    model = pf.load(
+        "leaf_spring_guide", set={"left.frames": 6, "right.frames": 6, "left.elements": 1, "right.elements": 1}
+    )
+    with pytest.warns(pf.ResultWarning, match="energy and work do not balance"):
+        run = pf.simulate_motion(model, 0.1, samples=51)
+    assert any(one.code == "energy-unbalanced" for one in run.doubts)
+    other = pf.simulate_motion(model, 0.1, samples=51, method="esdirk4")
+    assert not any(one.code == "energy-unbalanced" for one in other.doubts)
+
+
 def test_tracking_linear_models_and_segments_take_them():
     robot = pf.load("five_bar")
     path = next(iter(robot.paths.values()))

@@ -181,8 +181,10 @@ def test_a_rigid_linkage_follows_the_plan():
 
 
 def test_rigid_bodies_and_springs_are_the_same_in_both(bar):
-    """Finite segments, told as a mechanism of their own: one model, two programs."""
-    task = dataclasses.replace(bar.in_segments(3), whole=None, carriers={})
+    """Finite segments, as a mechanism of their own: one model, two programs."""
+    cut = bar.in_segments(3)
+    own = dataclasses.replace(cut.mechanism, cut=None)
+    task = dataclasses.replace(cut, mechanism=own, system=build_system(own), whole=None)
     theirs = simulate_exudyn(task, "+++", FINE)
     solution = task.simulate("+++", options=IntegrationOptions(tolerance=1e-7)).solution
     angles = [body.angle for body in task.system.bodies]

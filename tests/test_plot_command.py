@@ -61,6 +61,7 @@ FILES = {
     "motion": "results.nc",
     "verification": "verify.nc",
     "linear": "linear.nc",
+    "statics": "statics.nc",
     "methods": "compare-methods.json",
     "sweep": "results.parquet",
     "optimisation": "result.json",
@@ -69,6 +70,9 @@ FILES = {
     "sensitivity": "sensitivity.json",
     "modes": "",
 }
+
+# Figures without axes.
+PICTURES = ("mechanism_drawing", "mode_shapes", "deformed_shapes", "buckling_shapes")
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +105,9 @@ def _runs(folder: Path) -> None:
     linear = [[pf.linearise(task, mode=mode, at=at) for at in (0.0, 0.02, 0.04)] for mode in ("++", None)]
     (folder / "linear").mkdir()
     save_results(pf.linear_dataset([each[1] for each in linear], along=linear), folder / "linear" / "linear.nc")
+    (folder / "statics").mkdir()
+    pushed = pf.statics(pf.load("leaf_spring_guide"), loads={"stage.T.x": 5.0, "stage.T.y": -20.0}, steps=3, buckling=2)
+    save_results(pf.statics_dataset(pushed), folder / "statics" / "statics.nc")
     run = tracking_dataset([task.simulate("++")])
     # A second mode by name; the first is all that the motors can do.
     data = xr.concat([run, run.assign_coords(mode=["+-"])], "mode", combine_attrs="override")
@@ -178,7 +185,7 @@ def test_every_figure_of_every_kind_at_both_widths(results: Path, kind: str, nam
         assert figure.axes
         stays_on_the_page(figure)
         labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel())]
-        assert any(labels) or name in ("parallel_coordinates", "mechanism_drawing", "mode_shapes")
+        assert any(labels) or name in ("parallel_coordinates", *PICTURES)
 
 
 def test_catalogue_and_package_have_the_same_figures() -> None:

@@ -109,6 +109,7 @@ _DOUBTFUL = {
     "force-large": "Forces of joints or drives are far beyond what mass, acceleration and loads make plausible.",
     "stress-over-strength": "The stress in a beam exceeds the strength of its material: the safety factor is below 1.",
     "deflection-large": "A link bends so far that it is more a spring than a link.",
+    "energy-unbalanced": "Energy and work of a run do not balance: it is not accurate, or unstable.",
     "speed-large": "A body moves, or a drive turns, as fast as no mechanism does.",
     "error-large": "The tracking error is of the size of the path.",
     "tolerance-loose": "The tolerance is a large part of the mechanism's size: positions may be off by as much.",

@@ -213,8 +213,12 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
             body = system.body(name)
             v[body.all] = _all_values(body, values, f"start.rates.{name}")
     else:
-        change = least_change(link_metric(system, q, _VELOCITY_STIFFNESS), C, units)
-        v = project(change, np.zeros(system.n), lambda v: C @ v - wanted)
+        for stiffness in (_VELOCITY_STIFFNESS, 0.0):
+            change = least_change(link_metric(system, q, stiffness), C, units)
+            v = project(change, np.zeros(system.n), lambda v: C @ v - wanted)
+            # Flexures move by bending alone: while links are held stiff their projection is too ill-conditioned.
+            if np.max(np.abs(C @ v - wanted) / units, initial=0.0) <= _SLIP * _SMALL_TERMS * np.max(np.abs(wanted)):
+                break
     slip = np.abs(C @ v - wanted)
     # What is left beside the terms that a row adds up, lengths in sizes of the mechanism.
     size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted)) / units

@@ -20,8 +20,11 @@ from paraflex.mechanism import Mechanism, PointForce, grouped
 from paraflex.units import STRESS, speed_text
 from paraflex.validity.bending import bending_of
 from paraflex.validity.blame import most_likely
-from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
+from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, doubtful_numbers, mechanism_size
 
+# Energy that is missing or too much, over the largest: the library's runs have up to 3e-4 with the default tolerance.
+# An energy below the second part of weight times size is none.
+UNBALANCED, NO_ENERGY = 1e-3, 1e-9
 # Slope of a link in its frame beyond which it is a spring rather than a link [rad].
 STEEP = 0.7
 # Tracking error over the diagonal of the path: the library's worst mode, RAParM-I's +-+-, has 0.34, dwell included.
@@ -111,6 +114,7 @@ def doubtful_results(
     found = [
         *_large_slopes(where, system, solution),
         *_overstressed(where, system, solution),
+        *_unbalanced(where, system, solution),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
     ]
@@ -170,6 +174,20 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
                 f"give {name} a stronger section or material, or move and load it less"
                 + _moving(where.mechanism, solution)
             ),
+        )  # fmt: skip
+
+
+def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+    """Runs whose energy is not what work has made it."""
+    energy = np.abs(solution.kinetic_energy) + np.abs(solution.strain_energy)
+    largest = max(float(np.nanmax(energy)), float(np.nanmax(np.abs(solution.work))))
+    least = NO_ENERGY * system.total_mass * STANDARD_GRAVITY * system.size
+    if largest > least and solution.energy_balance_max > UNBALANCED * largest:
+        yield Finding(
+            "energy-unbalanced", where.place,
+            f"energy and work do not balance: {100.0 * solution.energy_balance_max / largest:.2g} % of the largest "
+            "energy is missing or too much, so that vibrations of stiff links, and stresses, are wrong",
+            "give a smaller tolerance, or another method (esdirk4, tr-bdf2); damping of the material helps",
         )  # fmt: skip
 
 
