@@ -29,6 +29,7 @@ from paraflex.mechanism import (
     StrainGauge,
     WeldJoint,
 )
+from short_studies import check_derivatives, stress_study
 
 L = 0.8
 BAR, STEEL = Section.rectangle(0.02, 0.005), Material(2.1e11, 7800.0, 3e8)
@@ -267,21 +268,6 @@ type = "sliding"
 points = ["lever.G", "distal1.C"]
 """
 
-STUDY = """
-mechanism = "slotted.toml"
-paths = ["line"]
-duration = 0.05
-samples = 26
-metrics = ["stress_max", "section_moment_max"]
-
-[integration]
-step = 1e-3
-tolerance = 1e-9
-
-[vary.thickness]
-fields = ["section.thin.thickness"]
-"""
-
 
 def test_the_stress_under_what_slides_has_exact_derivatives(tmp_path):
     """A five-bar whose end-effector drags a lever with a mass along; the largest stress is in the lever."""
@@ -289,10 +275,4 @@ def test_the_stress_under_what_slides_has_exact_derivatives(tmp_path):
     text = text.replace('"distal2.C"]', '"distal2.C"]\nG = ["ground.G", "lever.G"]', 1)
     text = text.replace("distal2 = 2.89", "distal2 = 2.89\nlever = -1.8", 1)
     (tmp_path / "slotted.toml").write_text(text + LEVER, encoding="utf-8")
-    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
-    found = pf.sensitivities(tmp_path / "study.toml")
-    (tmp_path / "near.toml").write_text(STUDY + "values = [0.003999, 0.004001]\n", encoding="utf-8")
-    table = pf.sweep(tmp_path / "near.toml", tmp_path / "out", workers=1).data
-    for metric, derivative in zip(found.metrics, np.asarray(found.derivatives).ravel(), strict=True):
-        low, high = table[metric].values.ravel()
-        assert derivative == pytest.approx((high - low) / 2e-6, rel=1e-6)
+    check_derivatives(tmp_path, stress_study("slotted.toml", "section.thin.thickness"), 0.004, rel=1e-6)

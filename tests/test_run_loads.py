@@ -32,6 +32,7 @@ from paraflex.results import load_results, motion_dataset, motion_summary, save_
 from paraflex.results.export import result_tables
 from paraflex.results.loads import effort_lines, joint_line, load_figures, stress_line
 from paraflex.tracking import plan_tracking
+from short_studies import check_derivatives, stress_study
 
 OPTIONS = pf.IntegrationOptions(tolerance=1e-7)
 
@@ -248,34 +249,13 @@ def test_metrics_are_the_largest_of_the_dataset(run):
     assert any(title == "Stresses of beams" for title, _ in tracking_page(data).more)
 
 
-STUDY = """
-mechanism = "five_bar"
-paths = ["line"]
-duration = 0.05
-samples = 26
-metrics = ["stress_max", "section_moment_max"]
-
-[integration]
-step = 1e-3
-tolerance = 1e-9
-
-[vary.thickness]
-fields = ["section.bar.thickness"]
-"""
+STUDY = stress_study("five_bar", "section.bar.thickness")
 
 
 def test_the_stress_has_exact_derivatives(tmp_path):
-    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
-    found = pf.sensitivities(tmp_path / "study.toml")
-    assert found.to_dict()["units"] == {"stress_max": "Pa", "section_moment_max": "N m"}
     thickness = pf.load("five_bar").mechanism.bodies[0].section.shape.thickness
-    step = 1e-6
-    near = STUDY + f"values = [{thickness - step}, {thickness + step}]\n"
-    (tmp_path / "near.toml").write_text(near, encoding="utf-8")
-    table = pf.sweep(tmp_path / "near.toml", tmp_path / "out", workers=1).data
-    for k, metric in enumerate(found.metrics):
-        low, high = table[metric].values.ravel()
-        assert np.asarray(found.derivatives).ravel()[k] == pytest.approx((high - low) / (2 * step), rel=2e-4)
+    found = check_derivatives(tmp_path, STUDY, thickness, rel=2e-4)
+    assert found.to_dict()["units"] == {"stress_max": "Pa", "section_moment_max": "N m"}
 
 
 SEARCH = (
