@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ fields = ["{field}"]
 """
 
 
-def check_derivatives(folder: Path, study: str, value: float, rel: float) -> pf.studies.Sensitivities:
+def check_derivatives(folder: Path, study: str, value: float, rel: float) -> Any:
     """Derivatives of the study at a value of its field, which differences over +-1e-6 must meet; the sensitivities."""
     (folder / "study.toml").write_text(study, encoding="utf-8")
     found = pf.sensitivities(folder / "study.toml")

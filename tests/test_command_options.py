@@ -14,7 +14,7 @@ COMMANDS = get_command(program.app).commands
 NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}
 STUDIES = ("sensitivity", "sweep", "optimise", "optimize", "identify", "indices")
 NEEDED |= {name: ["study.toml"] for name in STUDIES}
-MODEL_COMMANDS = ("run", "verify", "compare-methods", "modes", "linearise", "statics", "draw", "info")
+MODEL_COMMANDS = ("run", "verify", "compare-methods", "modes", "linearise", "reduce", "statics", "draw", "info")
 
 
 def options():

@@ -61,6 +61,7 @@ FILES = {
     "motion": "results.nc",
     "verification": "verify.nc",
     "linear": "linear.nc",
+    "reduction": "reduced.nc",
     "statics": "statics.nc",
     "methods": "compare-methods.json",
     "sweep": "results.parquet",
@@ -108,6 +109,9 @@ def _runs(folder: Path) -> None:
     (folder / "statics").mkdir()
     pushed = pf.statics(pf.load("leaf_spring_guide"), loads={"stage.T.x": 5.0, "stage.T.y": -20.0}, steps=3, buckling=2)
     save_results(pf.statics_dataset(pushed), folder / "statics" / "statics.nc")
+    (folder / "reduction").mkdir()
+    models = [pf.linearise(model, mode=mode) for mode in ("++", None)]
+    save_results(pf.reduction_dataset(models, 16), folder / "reduction" / "reduced.nc")
     run = tracking_dataset([task.simulate("++")])
     # A second mode by name; the first is all that the motors can do.
     data = xr.concat([run, run.assign_coords(mode=["+-"])], "mode", combine_attrs="override")

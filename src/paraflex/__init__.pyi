@@ -116,6 +116,7 @@ from .results import (
     tracking_dataset as tracking_dataset,
     motion_dataset as motion_dataset,
     linear_dataset as linear_dataset,
+    reduction_dataset as reduction_dataset,
     statics_dataset as statics_dataset,
     summary as summary,
     save_results as save_results,

@@ -26,6 +26,7 @@ RUN_COMPARISON = "comparison of runs"
 STUDY_OF_RUNS = "study of many runs"
 LINEAR_MODELS = "study of linear models"
 EQUILIBRIA = "study of equilibria"
+REDUCED_MODELS = "study of reduced models"
 KINDS: Mapping[str, tuple[str, ...]] = {
     STUDY_OF_RUNS: ("study.json", "journal.sqlite", "results.parquet"),
     VERIFICATION: ("verify.json", "verify.nc"),
@@ -34,6 +35,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     SENSITIVITY: ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
     LINEAR_MODELS: ("linear.json", "linear.nc"),
     EQUILIBRIA: ("statics.json", "statics.nc"),
+    REDUCED_MODELS: ("reduced.json", "reduced.nc"),
     RUN: ("summary.json", "results.nc"),
 }
 # What else a study of many runs keeps, listed or not: they come and go while it runs.

@@ -181,6 +181,12 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
         CatalogueFigure("poles_along_path", "linear", "frequencies and real parts of poles along the motion",
                         "mode", "poles_along_path", variables=("branch_real",)),
     ),
+    "reduction": (
+        CatalogueFigure("reduced_responses", "reduction", "gains of reduced models over those of the full one", "mode",
+                        "reduced_responses"),
+        CatalogueFigure("reduction_errors", "reduction", "errors of reduced models over frequency, all modes",
+                        written_as="reduction_errors"),
+    ),
     "statics": (
         CatalogueFigure("force_travel", "equilibria", "force against travel of what is loaded and moved",
                         written_as="force_travel", variables=("given_travel",)),

@@ -20,15 +20,16 @@ _MADE_BY = {
     "verification": "Verification.dataset",
     "linear": "linear_dataset",
     "statics": "statics_dataset",
+    "reduction": "reduction_dataset",
 }
 
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """Kind of a dataset: "verification", "motion" (without a path), "linear" (models), "statics", or "tracking"."""
+    """Kind: "verification", "motion" (without a path), "linear" (models), "reduction", "statics", "tracking"."""
     if "model" in data.dims:
         return "verification"
-    return data.attrs["kind"] if data.attrs.get("kind") in ("motion", "linear", "statics") else "tracking"
+    return data.attrs["kind"] if data.attrs.get("kind") in ("motion", "linear", "statics", "reduction") else "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:

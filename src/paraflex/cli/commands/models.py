@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from typer import Argument, Option
 
@@ -73,8 +73,8 @@ class ModesRequest:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LineariseRequest:
-    """What `paraflex linearise` is asked for."""
+class LinearRequest:
+    """Which linear models are asked for."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     modes: Annotated[
@@ -103,9 +103,7 @@ class LineariseRequest:
             help="About the planned motion at a time; of a model without a path, or of results, about the run.",
         ),
     ] = None
-    along: Annotated[
-        int | None, Option(metavar="N", help="Poles at so many moments of the motion too, as branches over time.")
-    ] = None
+    along: ClassVar[int | None] = None
     path: PathOption = None
     assembly: AssemblyOption = None
     forces: Annotated[
@@ -120,12 +118,44 @@ class LineariseRequest:
         list[str],
         Option("--prescribed", metavar="NAME", help="Prescribed motion whose acceleration is an input; repeatable."),
     ] = field(default_factory=list)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineariseRequest(LinearRequest):
+    """What `paraflex linearise` is asked for."""
+
+    along: Annotated[  # type: ignore[misc]
+        int | None, Option(metavar="N", help="Poles at so many moments of the motion too, as branches over time.")
+    ] = None
     out: Annotated[
         str | None,
         Option("--out", "--output", metavar="DIR", help="Folder for linear.nc, linear.json, figures and report."),
     ] = None
     force: ReplaceOption = False
     report: ReportOption = True
+    json: Json = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReduceRequest(LinearRequest):
+    """What `paraflex reduce` is asked for."""
+
+    states: Annotated[int, Option(metavar="N", help="States of the reduced models.")] = 16
+    methods: Annotated[
+        list[str],
+        Option(
+            "--method",
+            metavar="NAME",
+            help="craig-bampton, modal or balanced; repeatable. Default: the first two. Balanced needs damping.",
+        ),
+    ] = field(default_factory=list)
+    until: Annotated[float, Option(metavar="HZ", help="Highest frequency [Hz].")] = 40.0
+    error: Annotated[float, Option(metavar="PART", help="Error that the states needed are counted for.")] = 0.01
+    out: Annotated[
+        str | None,
+        Option("--out", "--output", metavar="DIR", help="Folder for reduced.nc, reduced.json and figures."),
+    ] = None
+    force: ReplaceOption = False
     json: Json = False
 
 

@@ -17,6 +17,7 @@ from paraflex.cli.commands.models import (
     MethodsRequest,
     ModesRequest,
     NewRequest,
+    ReduceRequest,
     SchemaRequest,
     StaticsRequest,
 )
@@ -103,6 +104,10 @@ COMMANDS = (
         Linear models at a pose or along a motion: frequencies and damping, poles, zeros, motors held and free.
 
         With --out it writes linear.nc, linear.json, figures/, and report.html with the mode shapes in motion."""),
+    ListedCommand("reduce", ReduceRequest, "reduce.reduce_command", """
+        Linear models of few states: how many are needed, frequencies, errors and responses beside the full model.
+
+        With --out it writes reduced.nc, reduced.json and figures/."""),
     ListedCommand("statics", StaticsRequest, "statics.statics_command", """
         Equilibria under loads and travel in steps, past limit points: forces, stiffness, buckling, frequencies.
 

@@ -1,0 +1,281 @@
+"""Linear models as commands are asked for them: of a model at rest or in motion, or of the runs of results."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from paraflex.checks import BALANCED
+from paraflex.cli.commands.models import LinearRequest
+from paraflex.cli.commands.options import PlanChoice
+from paraflex.cli.request import asked_model, at_fault, find_modes, find_path, flagged, of_assembly, plan_study
+from paraflex.cli.tables import plain_console
+from paraflex.compilation import compile_kernels_for
+from paraflex.dynamics import State, build_system, consistent_state, start_state, undeformed
+from paraflex.errors import ActuationError, AssemblyError, InputError
+from paraflex.files import Model, library_names
+from paraflex.files.fields import number_in
+from paraflex.kinematics import Line, follow_path
+from paraflex.linear import LinearModel, linearise
+from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.motion import UNBALANCED, MotionRun, simulate_motion
+from paraflex.results.linear_data import motors_of
+from paraflex.tracking import TrackingRun, TrackingTask
+
+ALL, START = "all", "start"
+# Most moments of a motion: each is an eigenvalue problem for every mode.
+_MOST_MOMENTS = 10_000
+# Samples of a run without a path.
+_SAMPLES = 1001
+
+
+class AskedModels(NamedTuple):
+    """Linear models, one for each mode, those along the motion, and what was asked for."""
+
+    models: list[LinearModel]
+    along: list[list[LinearModel]]
+    parameters: dict[str, Any]
+
+
+def asked_models(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
+    """What makes the linear models, once all that can be checked before is checked."""
+    _check(request)
+    return _of_results(request, command) if _names_results(request.model.name) else _of_model(request, command)
+
+
+def _names_results(name: str) -> bool:
+    """Whether a name is that of results, not of a model."""
+    return Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names())
+
+
+def _of_model(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
+    model = asked_model(request.model)
+    modes = _modes(model, request)
+    return lambda: _models(model, modes, request, command)
+
+
+def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
+    """About the runs of a folder of results, which are made again."""
+    given = {"--set": request.model.settings, "--pose": request.pose, "--balanced": request.balanced,
+             "--path": request.path, "--assembly": request.assembly}  # fmt: skip
+    for flag, value in given.items():
+        if value:
+            raise InputError(
+                "means nothing for results, which are what they are", field=flag, value=str(value),
+                remedy="leave it out, or name the model",
+            )  # fmt: skip
+    from paraflex.cli.repeated import repeated_runs  # with the reports, which tell the command of a run
+
+    model, runs = repeated_runs(request.model.name, [] if ALL in request.modes else request.modes)
+
+    def models() -> AskedModels:
+        found = list(runs)
+        modes = [run.mode if isinstance(run, TrackingRun) else _everything(model.mechanism) for run in found]
+        parameters = _parameters(model, modes, request, command)
+        parameters["run"]["results"] = request.model.name
+        return _moving(found, modes, request, parameters)
+
+    return models
+
+
+def _check(request: LinearRequest) -> None:
+    """Check what can be checked without the model."""
+    moving = {"--at": request.at, "--along": request.along, "--path": request.path}
+    for flag, value in moving.items():
+        if value is None:
+            continue
+        for other, given in (("--pose", request.pose), ("--balanced", request.balanced or None)):
+            if given is not None:
+                raise InputError(
+                    f"is about a motion, {other} about rest", field=flag, value=value, remedy="leave one of them out"
+                )
+    if request.at is not None and not (math.isfinite(request.at) and request.at >= 0.0):
+        raise InputError("not a time of the motion", field="--at", value=request.at, remedy="give it in s, from 0 on")
+    if request.along is not None and not 2 <= request.along <= _MOST_MOMENTS:
+        raise InputError(
+            "not a number of moments", field="--along", value=request.along, remedy=f"from 2 to {_MOST_MOMENTS}"
+        )
+    if request.pose is not None and request.assembly is not None:
+        raise InputError(
+            "names the pose as --pose does", field="--assembly", value=request.assembly, remedy="leave one of them out"
+        )
+
+
+def _modes(model: Model, request: LinearRequest) -> list[ActuationMode]:
+    """The modes asked for; of `all` those of the mechanism; by default the one with most motors."""
+    mechanism = model.mechanism
+    own = list(mechanism.modes) or [_everything(mechanism)]
+    chosen = own if ALL in request.modes else find_modes(model, request.modes) if request.modes else None
+    if chosen is None:
+        chosen = [max(model.modes() or own, key=lambda mode: len(mode.motors))]
+    if not (mechanism.motors or request.forces or request.prescribed or mechanism.prescribed):
+        raise InputError(
+            f"{mechanism.name} has neither motors nor prescribed motions: a linear model of it has no inputs",
+            field="--force-at", remedy="name a point at which forces act, such as "
+            + next((f"{body.name}.{point}" for body in mechanism.bodies for point in body.points), "BODY.POINT"),
+        )  # fmt: skip
+    return chosen
+
+
+def _everything(mechanism: Mechanism) -> ActuationMode:
+    motors = tuple(motor.name for motor in mechanism.motors)
+    return ActuationMode("all motors" if motors else "no motors", motors)
+
+
+def _models(model: Model, modes: Sequence[ActuationMode], request: LinearRequest, command: str) -> AskedModels:
+    """Linear models in all modes, and along the motion."""
+    ports = _ports(request)
+    with flagged(request):
+        if request.at is None and request.along is None and request.path is None:
+            pose = _pose(model, request)
+            models = [_at_rest(model, pose, mode, request.balanced, ports) for mode in modes]
+            return AskedModels(models, [], _parameters(model, modes, request, command))
+        motion = _motion(model, request)
+        return _moving([motion] * len(modes), modes, request, _parameters(model, modes, request, command))
+
+
+def _ports(request: LinearRequest) -> dict[str, Any]:
+    """Inputs and first states."""
+    return {"forces": request.forces, "prescribed": request.prescribed, "coordinates": request.coordinates}
+
+
+def _moving(
+    motions: Sequence[TrackingTask | TrackingRun | MotionRun],
+    modes: Sequence[ActuationMode],
+    request: LinearRequest,
+    parameters: dict[str, Any],
+) -> AskedModels:
+    """Linear models about motions, one for each mode, and along them."""
+    ports = _ports(request)
+    with flagged(request):
+        pairs = list(zip(motions, modes, strict=True))
+        about = [_in_motion(motion, mode, request.at or 0.0, ports) for motion, mode in pairs]
+        times = motions[0].motion.t if isinstance(motions[0], TrackingTask) else motions[0].solution.t
+        moments = [] if request.along is None else np.linspace(times[0], times[-1], request.along).tolist()
+        along = [[_in_motion(motion, mode, at, ports) for at in moments] for motion, mode in pairs]
+        return AskedModels(about, along if moments else [], parameters)
+
+
+def _pose(model: Model, request: LinearRequest) -> State:
+    """The pose at rest that is asked for."""
+    mechanism, wanted = model.mechanism, request.pose
+    system, rigid = build_system(mechanism), build_system(mechanism.rigid())
+    try:
+        if wanted is not None and "," in wanted:
+            return _at_place(model, wanted)
+        if wanted in [one.name for one in mechanism.assemblies]:
+            return undeformed(system, rigid, consistent_state(rigid, wanted))
+        if wanted is not None and (wanted != START or model.start is None):
+            raise InputError("no such pose", field="--pose", value=wanted, remedy=_poses(model))
+        named = request.assembly or model.study.assembly
+        if model.start is None:
+            return undeformed(system, rigid, consistent_state(rigid, named))
+        return start_state(system, model.start, mechanism.assembly(named) if mechanism.assemblies else None)
+    except AssemblyError as error:
+        raise of_assembly(error, model) from error
+
+
+def _poses(model: Model) -> str:
+    names = [one.name for one in model.mechanism.assemblies] + ([START] if model.start is not None else [])
+    return f"choose from {', '.join(names)}; or give the end-effector's place, X,Y in m" if names else "leave it out"
+
+
+def _at_place(model: Model, text: str) -> State:
+    """The pose with the end-effector at a place, undeformed."""
+    parts = [part.strip() for part in text.split(",")]
+    effector = model.mechanism.end_effector
+    if effector is None or not {"x", "y"} <= set(effector.coordinates):
+        raise InputError("no end-effector with a place", field="--pose", value=text, remedy="name an assembly")
+    try:
+        x, y = (number_in(part, "m") for part in parts)
+    except (InputError, ValueError) as error:
+        raise InputError(
+            "not a place", field="--pose", value=text, remedy='say 0.05,0.314 or "50 mm, 314 mm"'
+        ) from error
+    path = Line((x, y), (x, y + 1e-3), max_acceleration=1.0)
+    try:
+        motion = follow_path(model.mechanism, path, [0.0], assembly=model.study.assembly)
+    except AssemblyError as error:
+        raise InputError(
+            "the end-effector does not get there", field="--pose", value=text, remedy="choose a place within its reach"
+        ) from error
+    system, rigid = build_system(model.mechanism), build_system(model.mechanism.rigid())
+    return undeformed(system, rigid, State(0.0, motion.q[0], np.zeros(rigid.n)))
+
+
+def _at_rest(model: Model, pose: State, mode: ActuationMode, balanced: bool, ports: dict[str, Any]) -> LinearModel:
+    """The model about a pose, which the mode must hold."""
+    try:
+        found = linearise(model.mechanism, mode=mode, start=pose, balanced=balanced, **ports)
+    except AssemblyError as error:
+        raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
+    free = int(np.sum(found.motions(motors_of(found)).frequencies == 0.0))
+    if free and found.unbalanced > BALANCED:
+        remain = "one motion remains" if free == 1 else f"{free} motions remain"
+        raise InputError(
+            f"it does not hold the mechanism in this pose: with its motors held {remain} free, and let go it would "
+            f"start with {found.unbalanced:.3g} m/s^2",
+            field="--mode", value=mode.name, remedy="name more motors, or say --balanced for a pose in which it stays",
+        )  # fmt: skip
+    return found
+
+
+def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
+    """The planned motion; of a model without a path its own run, until the time asked for."""
+    if request.path is not None or model.paths:
+        path, name = find_path(model, request.path)
+        return plan_study(model, model.mechanism, path, name, PlanChoice(assembly=request.assembly))
+    study = model.study
+    if study.duration is None:
+        raise InputError(
+            "the model has neither a path nor a duration of its own motion", field="--at", value=request.at,
+            remedy="add [study] duration, or leave --at out",
+        )  # fmt: skip
+    if request.at is not None and request.at > study.duration:
+        raise InputError(
+            "is not a time of the motion",
+            field="--at",
+            value=request.at,
+            remedy=f"choose one up to {study.duration:g} s",
+        )
+    compile_kernels_for(model.mechanism, plain_console(stderr=True).print)
+    until = study.duration if request.along is not None or not request.at else request.at
+    try:
+        return simulate_motion(
+            model.mechanism, until, samples=_SAMPLES, torques=study.torques,
+            start=model.start or request.assembly or study.assembly,
+            options=study.integration({}),
+        )  # fmt: skip
+    except AssemblyError as error:
+        raise of_assembly(error, model) from error
+    except InputError as error:
+        raise at_fault(error, model) from None
+
+
+def _in_motion(
+    motion: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode, at: float, ports: dict[str, Any]
+) -> LinearModel:
+    try:
+        return linearise(motion, mode=mode, at=at, **ports)
+    except ActuationError as error:
+        raise InputError(
+            f"it cannot drive this motion: {error}", field="--mode", value=mode.name, remedy="name a mode that can"
+        ) from error
+
+
+def _parameters(model: Model, modes: Iterable[ActuationMode], request: LinearRequest, command: str) -> dict[str, Any]:
+    """What was asked for."""
+    asked = {name: getattr(request, name) for name in ("pose", "balanced", "at", "along", "path", "assembly", "forces",
+                                                        "prescribed", "coordinates")}  # fmt: skip
+    run = {name: value for name, value in asked.items() if value not in (None, False, [], "motors")}
+    return {
+        "model": dict(model.parameters),
+        "run": {
+            "mechanism": model.source, "set": dict(model.settings), command: True,
+            "modes": [mode.name for mode in modes],
+        } | run,
+    }  # fmt: skip

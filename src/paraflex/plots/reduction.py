@@ -1,0 +1,85 @@
+"""Figures of reduced linear models: gains over those of the full model, errors over frequency."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paraflex.plots.given import drawn
+from paraflex.plots.labels import plain, symbol
+from paraflex.plots.layout import is_narrow, lay_out, panels
+from paraflex.plots.scales import mark_powers
+from paraflex.plots.selection import default_mode, names_of, place_of
+from paraflex.plots.style import BLACK, COLOURS, DASHES
+from paraflex.results.kinds import check_kind
+from paraflex.results.reduction_data import FULL
+
+# Decades of a gain that are shown below its largest.
+_DECADES = 7.0
+# Outputs with a panel.
+_PANELS = 6
+
+
+@drawn
+def reduced_responses(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Largest gain of a mode's inputs to every output: of the full model, and of reduced ones over it."""
+    check_kind(data, "reduction")
+    mode = default_mode(data) if mode is None else mode
+    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    outputs = names_of(data, "output")[:_PANELS]
+    columns = 1 if is_narrow() else min(len(outputs), 2)
+    figure, axes = panels(-(-len(outputs) // columns), columns)
+    for panel, output in zip(axes.flat, outputs, strict=False):
+        gains = run["gain"].sel(output=output)
+        for k, name in enumerate(names_of(data, "variant")):
+            look = {"color": BLACK, "linewidth": 1.6} if name == FULL else {
+                "color": COLOURS[(k - 1) % len(COLOURS)], "linestyle": DASHES[k % len(DASHES)]
+            }  # fmt: skip
+            panel.plot(data["frequency"].values, gains.sel(variant=name).values, label=_label(data, name), **look)
+        panel.set_title(f"to {symbol(output)}")
+        panel.set_ylabel(f"largest gain [{data['output_unit'].sel(output=output).item()}/({data.attrs['input_unit']})]")
+        _over_frequency(panel, data)
+        top = float(np.nanmax(gains.values))
+        low = float(np.nanmin(gains.values[gains.values > 0.0]))
+        panel.set_ylim(max(0.5 * low, top * 10.0**-_DECADES), 2.0 * top)
+        panel.set_yscale("log")
+        mark_powers(panel)
+    for panel in axes.flat[len(outputs) :]:
+        panel.set_visible(False)
+    return lay_out(figure, axes, panel_height=46.0)
+
+
+@drawn
+def reduction_errors(data: xr.Dataset) -> Figure:
+    """Error to the worst output over frequency, a panel for each method and a line for each mode."""
+    check_kind(data, "reduction")
+    names, modes = names_of(data, "reduction"), names_of(data, "mode")
+    figure, axes = panels(len(names), 1) if is_narrow() else panels(1, len(names))
+    for panel, name in zip(axes.flat, names, strict=True):
+        for k, mode in enumerate(modes):
+            worst = data["error"].sel(mode=mode, reduction=name).max("output").values
+            panel.plot(data["frequency"].values, np.maximum(worst, 1e-16), label=f"mode {plain(mode)}",
+                       color=COLOURS[k % len(COLOURS)], linestyle=DASHES[(k // len(COLOURS)) % len(DASHES)]
+                       )  # fmt: skip
+        panel.axhline(float(data.attrs["accuracy"]), color="0.6", linewidth=0.6)
+        panel.set_title(f"{name}, {data.attrs['kept_states']} states")
+        panel.set_ylabel("largest error over gain")
+        panel.set_yscale("log")
+        mark_powers(panel)
+        _over_frequency(panel, data)
+    return lay_out(figure, axes, panel_height=62.0)
+
+
+def _label(data: xr.Dataset, name: str) -> str:
+    states = data.attrs["full_states"] if name == FULL else data.attrs["kept_states"]
+    return f"{name}, {states} states"
+
+
+def _over_frequency(panel: Axes, data: xr.Dataset) -> None:
+    panel.set_xscale("log")
+    panel.set_xlim(float(data["frequency"][0]), float(data["frequency"][-1]))
+    panel.axvline(float(data.attrs["until"]), color="0.6", linewidth=0.6)
+    mark_powers(panel, "x")
+    panel.set_xlabel("frequency [Hz]")

@@ -1,0 +1,187 @@
+"""The labelled dataset of reduced linear models: states needed, frequencies, gains and errors beside the full ones."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.arguments import checked_arguments
+from paraflex.errors import InputError
+from paraflex.linear.model import LinearModel
+from paraflex.linear.reduced import ReducedModel, ReductionMethod, reduce
+from paraflex.linear.states_needed import DAMPING, states_needed
+from paraflex.results.kinds import check_kind
+from paraflex.results.linear_data import HOLDINGS, motors_of
+from paraflex.results.numbers import finite_or_none
+from paraflex.results.storage import SCHEMA
+
+Array = NDArray[np.float64]
+
+FULL = "full"
+# Frequencies of responses, from this part of the highest on and somewhat beyond it.
+_FREQUENCIES, _LOWEST, _BEYOND = 400, 1e-2, 2.5
+# Frequencies with motors free and held that are compared.
+_COMPARED = 6
+UNITS = {
+    "states": ("fewest states within the error up to the highest frequency; NaN where more than 80 are needed", "1"),
+    "natural_frequency": ("undamped natural frequency above zero", "Hz"),
+    "gain": ("largest gain of all inputs to an output", "unit of the output, by that of the inputs"),
+    "error": ("largest gain of the error to an output, over that of the full model", "1"),
+    "largest_error": ("largest error up to the highest frequency", "1"),
+    "bound": ("bound of the gain of the error of all inputs and outputs together", "of the gains"),
+    "frequency": ("frequency of the response", "Hz"),
+}
+
+
+@checked_arguments()
+def reduction_dataset(
+    models: Sequence[LinearModel],
+    states: int = 16,
+    *,
+    methods: Sequence[ReductionMethod | str] = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.MODAL),
+    until: float = 40.0,
+    error: float = 0.01,
+    parameters: dict[str, Any] | None = None,
+) -> xr.Dataset:
+    """Reduced models of linear models of one mechanism, one for each actuation mode, beside the full ones.
+
+    Parameters
+    ----------
+    models : sequence of LinearModel
+        Each of another mode, with the same outputs.
+    states : int
+        Of the reduced models.
+    methods : sequence of str
+        Of `reduce`.
+    until : float
+        Highest frequency [Hz].
+    error : float
+        For which states needed are counted.
+    parameters : dict, optional
+        Kept as provenance: what was asked for.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions mode, reduction, variant ("full", then each reduction), output, holding (motors free or held), order,
+        frequency.
+
+    Raises
+    ------
+    InputError
+        See `reduce` and `states_needed`.
+    """
+    needed = states_needed(models, 2.0 * np.pi * until, error=error, methods=methods)
+    names = [str(name) for name in needed["reduction"].values]
+    few = [[reduce(model, states, method=method) for method in names] for model in models]
+    outputs = [one.name for one in models[0].outputs]
+    if any([one.name for one in model.outputs] != outputs for model in models):
+        raise InputError("have other outputs", field="models", remedy="give models of one mechanism")
+    frequency = np.geomspace(_LOWEST * until, _BEYOND * until, _FREQUENCIES)
+    gains, errors = _responses(models, few, frequency)
+    reached = frequency <= until
+    data: dict[str, Any] = {
+        "states": needed["states"],
+        "natural_frequency": (("mode", "variant", "holding", "order"), _frequencies(models, few)),
+        "gain": (("mode", "variant", "output", "frequency"), gains),
+        "error": (("mode", "reduction", "output", "frequency"), errors),
+        "largest_error": (("mode", "reduction", "output"), errors[..., reached].max(axis=-1)),
+        "bound": (("mode", "reduction"), np.array([[np.nan if one.bound is None else one.bound for one in row]
+                                                   for row in few])),
+    }  # fmt: skip
+    coordinates = {
+        "mode": [model.mode for model in models], "reduction": names, "variant": [FULL, *names], "output": outputs,
+        "output_unit": ("output", [one.unit for one in models[0].outputs]), "holding": list(HOLDINGS),
+        "order": np.arange(1, _COMPARED + 1), "frequency": frequency,
+    }  # fmt: skip
+    units = dict.fromkeys(one.unit for model in models for one in model.inputs)
+    attrs = {
+        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about, "kept_states": states,
+        "full_states": len(models[0].states), "until": until, "accuracy": error, "damping_ratio": DAMPING,
+        "input_unit": ", ".join(units), "parameters": json.dumps(parameters or {}, sort_keys=True),
+        "paraflex_version": version("paraflex"), "schema": SCHEMA,
+    }  # fmt: skip
+    out = xr.Dataset(data, coords=coordinates, attrs=attrs)
+    for name, (meaning, unit) in UNITS.items():
+        out[name].attrs = {"long_name": meaning, "units": unit}
+    return out
+
+
+def _responses(
+    models: Sequence[LinearModel], few: Sequence[Sequence[ReducedModel]], frequency: Array
+) -> tuple[Array, Array]:
+    """Gains (mode, model, output, frequency) and errors (mode, reduction, output, frequency), a little damped."""
+    s = 2.0 * np.pi * frequency * (1j + DAMPING)
+    gains, errors = [], []
+    for model, reduced in zip(models, few, strict=True):
+        full = model.frequency_response(s)
+        found = [one.frequency_response(s) for one in reduced]
+        size = np.linalg.norm(full, axis=2)
+        gains.append([np.linalg.norm(each, axis=2).T for each in (full, *found)])
+        errors.append([(np.linalg.norm(each - full, axis=2) / np.where(size > 0.0, size, np.inf)).T for each in found])
+    return np.array(gains), np.array(errors)
+
+
+def _frequencies(models: Sequence[LinearModel], few: Sequence[Sequence[ReducedModel]]) -> Array:
+    """Lowest frequencies above zero (mode, model, holding, order) [Hz]; NaN of balanced models."""
+    out = np.full((len(models), 1 + len(few[0]), len(HOLDINGS), _COMPARED), np.nan)
+    for m, (model, reduced) in enumerate(zip(models, few, strict=True)):
+        motors = motors_of(model)
+        for k, one in enumerate((model, *reduced)):
+            if isinstance(one, ReducedModel) and one.basis is None:
+                continue
+            for h, found in enumerate((one.frequencies, one.held_frequencies(motors))):
+                above = found[found > 0.0][:_COMPARED]
+                out[m, k, h, : above.size] = above / (2.0 * np.pi)
+    return out
+
+
+@checked_arguments()
+def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
+    """Reduced models as plain numbers."""
+    check_kind(data, "reduction")
+
+    def of(mode: str, name: str) -> dict[str, Any]:
+        run = data.sel(mode=mode, reduction=name)
+        frequencies = data["natural_frequency"].sel(mode=mode, variant=name)
+        return {
+            "states_needed": _numbers(run["states"], "output"),
+            "largest_error": _numbers(run["largest_error"], "output"),
+            "bound": finite_or_none(float(run["bound"])),
+            **{f"frequencies_{holding}": _list(frequencies.sel(holding=holding)) for holding in HOLDINGS},
+        }
+
+    modes = [str(mode) for mode in data["mode"].values]
+    return {
+        "mechanism": data.attrs["mechanism"],
+        "about": data.attrs["about"],
+        "states": int(data.attrs["kept_states"]),
+        "full_states": int(data.attrs["full_states"]),
+        "until": float(data.attrs["until"]),
+        "accuracy": float(data.attrs["accuracy"]),
+        "modes": {
+            mode: {
+                FULL: {f"frequencies_{holding}": _list(data["natural_frequency"].sel(mode=mode, variant=FULL,
+                                                                                     holding=holding))
+                       for holding in HOLDINGS},
+                **{str(name): of(mode, str(name)) for name in data["reduction"].values},
+            }
+            for mode in modes
+        },
+        "parameters": json.loads(data.attrs["parameters"]),
+        "version": data.attrs["paraflex_version"],
+    }  # fmt: skip
+
+
+def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:
+    return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}
+
+
+def _list(values: xr.DataArray) -> list[float]:
+    return [float(x) for x in values.values if np.isfinite(x)]
