@@ -178,9 +178,12 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
 
 
 def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
-    """Runs whose energy is not what work has made it."""
+    """Runs of flexible links whose energy is not what work has made it."""
+    if not system.n_flexible:
+        return
     energy = np.abs(solution.kinetic_energy) + np.abs(solution.strain_energy)
-    largest = max(float(np.nanmax(energy)), float(np.nanmax(np.abs(solution.work))))
+    # Models without energies have NaN there.
+    largest = max(float(np.nanmax(each, initial=0.0)) for each in (energy, np.abs(solution.work)))
     least = NO_ENERGY * system.total_mass * STANDARD_GRAVITY * system.size
     if largest > least and solution.energy_balance_max > UNBALANCED * largest:
         yield Finding(
