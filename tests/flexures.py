@@ -122,3 +122,26 @@ def truss(stiffness: float = 1000.0, half: float = 1.0, rise: float = 0.3) -> pf
         assemblies=(pf.Assembly("up", {"apex": 0.0}, {"apex.T": (0.0, rise)}),),
         gravity=(0.0, 0.0),
     )
+
+
+def toggle(stiffness: float = 1000.0, bar: float = 0.5, angle: float = 0.4) -> pf.Mechanism:
+    """Two rigid bars in a shallow arch: hinged at O and to one another at P, on a rail against a spring at Q."""
+    half, height = bar * math.cos(angle), bar * math.sin(angle)
+    return pf.Mechanism(
+        name="toggle",
+        ground={"O": (0.0, 0.0), "R": (2.0 * half, 0.0), "S": (2.0 * half + 0.5, 0.0)},
+        bodies=(
+            pf.RigidBody("left", 0.1, 1e-3, (0.5 * bar, 0.0), {"O": (0.0, 0.0), "P": (bar, 0.0)}),
+            pf.RigidBody("right", 0.1, 1e-3, (0.5 * bar, 0.0), {"P": (0.0, 0.0), "Q": (bar, 0.0)}),
+        ),
+        joints=(
+            pf.RevoluteJoint("O", pf.PointRef("ground", "O"), pf.PointRef("left", "O")),
+            pf.RevoluteJoint("P", pf.PointRef("left", "P"), pf.PointRef("right", "P")),
+            pf.SlotJoint("rail", pf.PointRef("ground", "R"), pf.PointRef("right", "Q")),
+        ),
+        linear_springs=(
+            pf.LinearSpring("spring", pf.PointRef("ground", "S"), pf.PointRef("right", "Q"), stiffness, 0.5),
+        ),
+        assemblies=(pf.Assembly("up", {"left": angle, "right": -angle}, {"left.P": (half, height)}),),
+        gravity=(0.0, 0.0),
+    )

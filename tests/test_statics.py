@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from flexures import EI, LEAF, LENGTH, STEEL, THICKNESS, WIDTH, E, chain, column, guide, pivot, truss
+from flexures import EI, LEAF, LENGTH, STEEL, THICKNESS, WIDTH, E, chain, column, guide, pivot, toggle, truss
 from paraflex.errors import EquilibriumError, LimitPointError, ValidityWarning
 from paraflex.results import load_results, save_results, statics_summary
 
@@ -90,6 +90,20 @@ def test_travel_passes_the_limit_of_the_load() -> None:
     assert found.stiffness("apex.T.y") == pytest.approx(slope, rel=1e-6, abs=1e-5)
     assert found.stable.all()
     assert (found.stiffness("apex.T.y")[5:8] < 0.0).all()
+
+
+def test_buckling_factors_take_the_turn_of_links_with_them():
+    """Two bars in an arch turn as they are pressed down, so that the directions their joints allow turn too.
+
+    The force is F = 4 k L (cos a - cos a0) tan a; near its largest value the stiffness falls with the root of what is
+    left of the load, and its tangent ends as much beyond the limit as the load is below it.
+    """
+    angles = np.linspace(0.0, 0.4, 400_001)
+    largest = float(np.max(4.0 * 1000.0 * 0.5 * (np.cos(angles) - np.cos(0.4)) * np.tan(angles)))
+    for left in (1e-3, 1e-4):
+        found = pf.statics(toggle(), loads={"left.P.y": -(1.0 - left) * largest}, steps=4)
+        factor = float(found.buckling[-1, 0]) * (1.0 - left)
+        assert factor - 1.0 == pytest.approx(left, rel=0.1)
 
 
 def test_below_the_limit_the_branch_ends_with_what_is_given() -> None:
