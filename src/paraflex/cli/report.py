@@ -59,6 +59,8 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
         return motion_page(data)
     if kind == "linear":
         return linear_page(data)
+    if kind in ("statics", "reduction"):
+        raise InputError("there is no report of these results", field=str(folder), remedy="paraflex plot draws them")
     summary = folder / "summary.json"
     modes = _beside(summary)["modes"] if summary.is_file() else {}
     # Modes that could not start are in the summary only.

@@ -217,7 +217,8 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
             change = least_change(link_metric(system, q, stiffness), C, units)
             v = project(change, np.zeros(system.n), lambda v: C @ v - wanted)
             # Flexures move by bending alone: while links are held stiff their projection is too ill-conditioned.
-            if np.max(np.abs(C @ v - wanted) / units, initial=0.0) <= _SLIP * _SMALL_TERMS * np.max(np.abs(wanted)):
+            missed, largest = (float(np.max(np.abs(each) / units, initial=0.0)) for each in (C @ v - wanted, wanted))
+            if missed <= _SLIP * _SMALL_TERMS * largest:
                 break
     slip = np.abs(C @ v - wanted)
     # What is left beside the terms that a row adds up, lengths in sizes of the mechanism.

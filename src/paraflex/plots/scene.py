@@ -170,6 +170,11 @@ def check_shapes(data: xr.Dataset) -> None:
             "these are linear models, not a run", field="results",
             remedy="their report.html shows mode shapes in motion, paraflex plot draws mode_shapes",
         )  # fmt: skip
+    if kind_of(data) in ("statics", "reduction"):
+        raise InputError(
+            "these are no run, and nothing moves in them", field="results",
+            remedy="paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
+        )  # fmt: skip
     if "shape" not in data:
         raise InputError(
             "these results hold no shapes of links: they are of an earlier version", field="results",
