@@ -15,7 +15,7 @@ from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.request import asked_model, at_fault, find_modes, find_path, flagged, of_assembly, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
-from paraflex.dynamics import State, build_system, consistent_state, start_state, undeformed
+from paraflex.dynamics import State, build_system, pose_at_rest, undeformed
 from paraflex.errors import ActuationError, AssemblyError, InputError
 from paraflex.files import Model, library_names
 from paraflex.files.fields import number_in
@@ -163,18 +163,15 @@ def _moving(
 def _pose(model: Model, request: LinearRequest) -> State:
     """The pose at rest that is asked for."""
     mechanism, wanted = model.mechanism, request.pose
-    system, rigid = build_system(mechanism), build_system(mechanism.rigid())
+    system = build_system(mechanism)
     try:
         if wanted is not None and "," in wanted:
             return _at_place(model, wanted)
         if wanted in [one.name for one in mechanism.assemblies]:
-            return undeformed(system, rigid, consistent_state(rigid, wanted))
+            return pose_at_rest(system, None, wanted)
         if wanted is not None and (wanted != START or model.start is None):
             raise InputError("no such pose", field="--pose", value=wanted, remedy=_poses(model))
-        named = request.assembly or model.study.assembly
-        if model.start is None:
-            return undeformed(system, rigid, consistent_state(rigid, named))
-        return start_state(system, model.start, mechanism.assembly(named) if mechanism.assemblies else None)
+        return pose_at_rest(system, model.start, request.assembly or model.study.assembly)
     except AssemblyError as error:
         raise of_assembly(error, model) from error
 

@@ -17,8 +17,6 @@ from paraflex.cli.replacing import hold_results
 from paraflex.folders import LINEAR_MODELS, ResultsFolder
 from paraflex.results.linear_data import linear_dataset
 from paraflex.results.linear_summary import linear_summary
-from paraflex.results.storage import save_results
-from paraflex.writing import write_json
 
 
 def linearise_command(request: LineariseRequest) -> int:
@@ -47,11 +45,9 @@ def _tell(data: xr.Dataset, request: LineariseRequest) -> None:
 
 def _write(data: xr.Dataset, folder: ResultsFolder, request: LineariseRequest) -> None:
     """Numbers first, then what is drawn of them."""
-    from paraflex.cli.writing import write_drawn
+    from paraflex.cli.writing import write_drawn, write_numbers
 
-    with folder.replaced() as new:
-        save_results(data, new / "linear.nc")
-        write_json(new / "linear.json", linear_summary(data))
+    write_numbers(data, linear_summary(data), folder, ("linear.nc", "linear.json"))
     write_drawn(data, folder, _page(data) if request.report else None)
 
 

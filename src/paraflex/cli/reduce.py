@@ -16,8 +16,6 @@ from paraflex.cli.request import flagged
 from paraflex.folders import REDUCED_MODELS
 from paraflex.linear.reduced import ReductionMethod
 from paraflex.results.reduction_data import reduction_dataset, reduction_summary
-from paraflex.results.storage import save_results
-from paraflex.writing import write_json
 
 _METHODS = (ReductionMethod.CRAIG_BAMPTON.value, ReductionMethod.MODAL.value)
 
@@ -32,11 +30,9 @@ def reduce_command(request: ReduceRequest) -> int:
     with hold_results(request.out, REDUCED_MODELS, force=request.force) as folder:
         data = _data(make(), request)
         _tell(data, request)
-        with folder.replaced() as new:
-            save_results(data, new / "reduced.nc")
-            write_json(new / "reduced.json", reduction_summary(data))
-        from paraflex.cli.writing import write_drawn
+        from paraflex.cli.writing import write_drawn, write_numbers
 
+        write_numbers(data, reduction_summary(data), folder, ("reduced.nc", "reduced.json"))
         write_drawn(data, folder)
     if not request.json:
         say_where(began, "numbers, figures", folder.path)

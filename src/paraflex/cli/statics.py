@@ -22,8 +22,6 @@ from paraflex.files import Model
 from paraflex.files.fields import number_in
 from paraflex.folders import EQUILIBRIA
 from paraflex.results.statics_data import statics_dataset, statics_summary
-from paraflex.results.storage import save_results
-from paraflex.writing import write_json
 
 # The options that arguments of `statics` come from.
 _FLAGS = {
@@ -44,11 +42,9 @@ def statics_command(request: StaticsRequest) -> int:
     with hold_results(request.out, EQUILIBRIA, force=request.force) as folder:
         data = _data(model, request)
         _tell(data, request)
-        with folder.replaced() as new:
-            save_results(data, new / "statics.nc")
-            write_json(new / "statics.json", statics_summary(data))
-        from paraflex.cli.writing import write_drawn
+        from paraflex.cli.writing import write_drawn, write_numbers
 
+        write_numbers(data, statics_summary(data), folder, ("statics.nc", "statics.json"))
         write_drawn(data, folder)
     if not request.json:
         say_where(began, "numbers, figures", folder.path)

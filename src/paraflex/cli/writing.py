@@ -21,11 +21,16 @@ if TYPE_CHECKING:
 _LATER = "paraflex plot and paraflex report draw them"
 
 
-def write_numbers(data: xr.Dataset, summary: dict[str, Any], folder: ResultsFolder) -> None:
-    """Write a run and its summary, in place of the results before."""
+def write_numbers(
+    data: xr.Dataset,
+    summary: dict[str, Any],
+    folder: ResultsFolder,
+    names: tuple[str, str] = ("results.nc", "summary.json"),
+) -> None:
+    """Write a dataset and its summary, of a run by default, in place of the results before."""
     with folder.replaced() as new:
-        save_results(data, new / "results.nc")
-        write_json(new / "summary.json", summary)
+        save_results(data, new / names[0])
+        write_json(new / names[1], summary)
 
 
 def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest, began: float) -> str:

@@ -7,7 +7,7 @@ passes a wanted value, and where it turns back, the point there is found exactly
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -254,8 +254,8 @@ class Branch:
         """A change of the fraction alone."""
         return Unknowns(np.zeros_like(like.q), np.zeros_like(like.mu), 1.0)
 
-    def _factor(self, at: Unknowns, across: Unknowns) -> Callable[[Array, Array, float], Unknowns]:
-        """Solver of the linear equations at a point: right-hand sides are forces, rows, the product with `across`.
+    def _change(self, at: Unknowns, across: Unknowns, f: Array, phi: Array, product: float) -> Unknowns:
+        """The change that forces (n,), rows and the product with `across` want, by the linear equations at a point.
 
         Multipliers of rows that follow from others stay.
         """
@@ -267,27 +267,22 @@ class Branch:
             [found.stiffness, rows.T, csr_matrix(found.load[:, None])],
             [rows, None, csr_matrix(-equations.change[kept][:, None])],
         ])  # fmt: skip
-        matrix = scipy.sparse.vstack([inner, csr_matrix(border[None])])
+        matrix = csr_matrix(scipy.sparse.vstack([inner, csr_matrix(border[None])]))
         n, units = equations.system.n, equations.units
         units = np.concatenate([units[:n], units[n:-1][kept], units[-1:]])
-
-        def solve(f: Array, phi: Array, product: float) -> Unknowns:
-            try:
-                found = solved(csr_matrix(matrix), units, np.concatenate([f, phi[kept], [product]]))
-            except np.linalg.LinAlgError:
-                raise _Failed from None
-            if not np.all(np.isfinite(found)):
-                raise _Failed
-            mu = np.zeros(phi.size)
-            mu[kept] = found[n:-1]
-            return Unknowns(found[:n], mu, float(found[-1]))
-
-        return solve
+        try:
+            change = solved(matrix, units, np.concatenate([f, phi[kept], [product]]))
+        except np.linalg.LinAlgError:
+            raise _Failed from None
+        if not np.all(np.isfinite(change)):
+            raise _Failed
+        mu = np.zeros(phi.size)
+        mu[kept] = change[n:-1]
+        return Unknowns(change[:n], mu, float(change[-1]))
 
     def _tangent(self, at: Unknowns, along: Unknowns) -> Unknowns:
         """The tangent of length one at a point, in the direction of another."""
-        solve = self._factor(at, along)
-        found = solve(np.zeros_like(at.q), np.zeros_like(at.mu), 1.0)
+        found = self._change(at, along, np.zeros_like(at.q), np.zeros_like(at.mu), 1.0)
         size = self._size(found)
         return Unknowns(found.q / size, found.mu / size, found.s / size)
 
@@ -311,7 +306,7 @@ class Branch:
             if not (np.all(np.isfinite(f)) and np.all(np.isfinite(phi))):
                 raise _Failed
             left = -self._product(at.plus(begin, -1.0), across) if fraction is None else fraction - at.s
-            change = self._factor(at, across)(-f, -phi, left)
+            change = self._change(at, across, -f, -phi, left)
             move = float(np.max(np.abs(change.q / self.equations.scale)))
             at = at.plus(change, min(1.0, longest / max(move, longest)))
             if move <= _CONVERGED or (move <= _ROUNDED and move > 0.1 * before):

@@ -31,7 +31,7 @@ from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
 from paraflex.errors import InputError, suggestion
 from paraflex.kernel.packed import CONSTRAINT, Signals
-from paraflex.linear.coordinates import Coordinates
+from paraflex.linear.coordinates import Coordinates, unit_in
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
 from paraflex.mechanism.cut import Cut
@@ -310,15 +310,10 @@ class Equations:
 
     def independent(self, rows: csr_matrix, more: csr_matrix | None = None) -> tuple[NDArray[np.int64], ...]:
         """Which rows (rows, n) do not follow from one another, and which of more rows do not from these."""
-        groups = [self._unit(part) for part in (rows, more) if part is not None]
+        groups = [unit_in(part, self.scale) for part in (rows, more) if part is not None]
         entries = sum(int(np.prod(group.shape or ())) for group in groups)
         choose = independent_dense if entries <= _DENSE_ENTRIES else independent_sparse
         return choose(groups, np.ones(self.system.n)).groups
-
-    def _unit(self, rows: csr_matrix) -> csr_matrix:
-        scaled = csr_matrix(rows @ scipy.sparse.diags(self.scale))
-        size = np.sqrt(np.asarray(scaled.multiply(scaled).sum(axis=1)).ravel())
-        return csr_matrix(scipy.sparse.diags(1.0 / np.where(size > 0.0, size, 1.0)) @ scaled)
 
     def gap(self, at: Unknowns) -> float:
         """The largest residual of rows [sizes of the mechanism, rad]."""

@@ -14,7 +14,8 @@ from paraflex.arrays import Array
 from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, slowest, typical_square, undamped_modes
 from paraflex.dynamics.sparse import solved
 from paraflex.equilibria.branch import Point
-from paraflex.equilibria.equations import Coordinate, Equations, Unknowns
+from paraflex.equilibria.equations import Coordinate, Equations, Matrices, Unknowns
+from paraflex.linear.independent import unit_rows
 
 Complex = NDArray[np.complex128]
 # Differences along the branch move links by this [sizes of the mechanism, rad], and change the fraction by no more.
@@ -63,12 +64,11 @@ class Buckling(NamedTuple):
     shapes: Array
 
 
-def vibrations(equations: Equations, at: Unknowns) -> Vibrations:
+def vibrations(equations: Equations, found: Matrices) -> Vibrations:
     """Small vibrations about an equilibrium.
 
     All loads are gradients of coordinates, so that the stiffness is symmetric but for rounding.
     """
-    found = equations.matrices(at)
     K, M, C, elastic = found.stiffness, found.mass, found.rows, equations.elastic
     typical = typical_square(elastic, csr_matrix(K - scipy.sparse.diags(elastic)), M)
     symmetric = csr_matrix(0.5 * (K + K.T))
@@ -126,9 +126,7 @@ def _reduced(equations: Equations, at: Unknowns, shapes: Array) -> Array:
     """Stiffness (f, f) at a point near by, in displacements nearest to shapes that the rows allow there."""
     found = equations.matrices(at)
     scale = equations.scale
-    rows = found.rows.toarray() * scale
-    size = np.linalg.norm(rows, axis=1)
-    rows = rows[size > 0.0] / size[size > 0.0, None]
+    rows = unit_rows(found.rows.toarray() * scale)
     moved = shapes / scale[:, None]
     moved = scale[:, None] * (moved - np.linalg.lstsq(rows, rows @ moved, rcond=1e-10)[0])
     return moved.T @ (found.stiffness @ moved)
@@ -141,12 +139,12 @@ def _largest_one(equations: Equations, shapes: Array) -> Array:
     return shapes / np.where(largest == 0.0, 1.0, largest)
 
 
-def stiffness(equations: Equations, at: Unknowns, directions: Sequence[Coordinate]) -> Array:
+def stiffness(equations: Equations, at: Unknowns, found: Matrices, directions: Sequence[Coordinate]) -> Array:
     """Force for a unit displacement (directions,) of each coordinate [N/m, N m/rad]; infinite where it cannot move.
 
     What is held and moved stays, the coordinate itself set free.
     """
-    found, n = equations.matrices(at), equations.system.n
+    n = equations.system.n
     wanted = equations.rows_named(directions, at.q)
     out = np.zeros(len(directions))
     for k, one in enumerate(directions):

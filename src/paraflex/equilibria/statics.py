@@ -135,10 +135,11 @@ def _followed(
 
 
 def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibrium:
-    vibration = vibrations(equations, point.at)
+    found = equations.matrices(point.at)
+    vibration = vibrations(equations, found)
     return Equilibrium(
         point, vibration, buckling_about(equations, point, vibration, buckling),
-        stiffness_at(equations, point.at, equations.given.measured),
+        stiffness_at(equations, point.at, found, equations.given.measured),
     )  # fmt: skip
 
 

@@ -260,7 +260,7 @@ class Coordinates:
         InputError
             The end-effector's coordinates are to be states, but do not describe the motion.
         """
-        constraints, joints = (_unit(part.jacobian, self.scale) for part in (tangents.constraints, tangents.joints))
+        constraints, joints = (unit_in(part.jacobian, self.scale) for part in (tangents.constraints, tangents.joints))
         # Those that are driven must be states.
         free, driven = np.split(np.arange(len(self.measured)), [len(self.measured) - len(self.driven)])
         free = np.array([k for k in free.tolist() if k not in without], dtype=int)
@@ -355,7 +355,7 @@ def _row(joint: str) -> str:
     return f"coordinate of {joint}"
 
 
-def _unit(rows: csr_matrix, scale: Array) -> csr_matrix:
+def unit_in(rows: csr_matrix, scale: Array) -> csr_matrix:
     """Rows of size one in units (n,) of the coordinates, those of zeros as they are."""
     scaled = csr_matrix(rows @ scipy.sparse.diags(scale))
     size = np.sqrt(np.asarray(scaled.multiply(scaled).sum(axis=1)).ravel())

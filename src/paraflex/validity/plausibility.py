@@ -134,9 +134,10 @@ def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
 
 
 def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
-    bent = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
+    bendings = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
     slopes = {
-        name: np.max([one.slope for one in bent if one.name == name], axis=0) for name in {one.name for one in bent}
+        name: np.max([one.slope for one in bendings if one.name == name], axis=0)
+        for name in dict.fromkeys(one.name for one in bendings)
     }
     if not slopes:
         return
