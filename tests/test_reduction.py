@@ -9,12 +9,17 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+import paraflex as pf
 from paraflex.checks import check
 from paraflex.dynamics import build_system, missed_turns
+from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import load
-from paraflex.mechanism import PointRef, Section
+from paraflex.linear import linearise
+from paraflex.mechanism import AppliedTorque, Assembly, PointForce, PointRef, RigidBody, Section, SlidingJoint, raparm_i
+from short_studies import check_derivatives, stress_study
 from test_damping import STEEL, beam, held, on_a_roller, unit_frequency, vibrations
+from test_linear import hub_beam
 
 PINNED, CANTILEVER, FREE = ReferenceCondition.PINNED, ReferenceCondition.CANTILEVER, ReferenceCondition.FREE
 
@@ -108,5 +113,84 @@ def test_info_complains_of_a_beam_that_is_too_stiff_under_its_motor():
     (finding,) = check(replace(model, mechanism=reduced))
     assert (finding.code, finding.place) == ("modes-too-stiff", "body.beam.modes")
     assert finding.text.startswith("2 modes miss 24 % of its turn under a moment at root, which the prescribed")
-    assert "leave modes out" in finding.remedy
+    assert "craig-bampton" in finding.remedy
     assert not check(replace(model, mechanism=model.mechanism.with_beams(reference=CANTILEVER, modes=2)))
+
+
+# --- Craig-Bampton: static shapes of what acts on a beam, and modes with that held ------------------------------------
+
+
+def with_static_shapes(mechanism, modes, reference=PINNED):
+    return mechanism.with_beams(modes=modes, reduction="craig-bampton", reference=reference)
+
+
+# Exact frequencies of a beam on a hub with a tip mass, and how far off those of its reductions are: from roots of the
+# transcendental equation, and from another program with cubic elements that holds the slope of the tip too.
+HUB = [5.69177290724, 18.100719840919]
+HUB_OFF = {0: (1.7e-3, 3.5e-1), 1: (1.1e-4, 8.3e-4), 2: (4.0e-6, 1.8e-6), 3: (3.5e-6, 1.7e-6)}
+
+
+@pytest.mark.parametrize("reference", [PINNED, CANTILEVER, FREE])
+@pytest.mark.parametrize("modes", [0, 1, 2, 3])
+def test_a_beam_on_a_hub_in_every_frame(modes, reference):
+    # A moment of inertia that is nothing beside the beam's makes the turn of the tip a part of the interface.
+    found = linearise(with_static_shapes(hub_beam(0.1, 0.5, 1e-12), modes, reference)).poles()
+    off = np.sort(np.abs(found))[::2][1:3] / HUB - 1.0
+    assert off == pytest.approx(HUB_OFF[modes], rel=0.03)
+
+
+@pytest.mark.parametrize("reference", [PINNED, CANTILEVER, FREE])
+def test_static_shapes_carry_moments_and_forces_exactly(reference):
+    mechanism = clamped(reference, None)
+    end = PointRef("beam", "B")
+    mechanism = replace(mechanism, loads=(PointForce("push", end, (0.0, 1.0)), AppliedTorque("turn", end, 1.0)))
+    few = with_static_shapes(mechanism, 0, reference)
+    # Stretch, force and moment at the end.
+    assert build_system(few).n_flexible == 3
+    assert not missed_turns(build_system(few))
+    for given in ({"force": 1.0}, {"moment": 1.0}):
+        assert bending(few, **given) == pytest.approx(bending(mechanism, **given), rel=1e-9)
+
+
+def test_coordinates_that_are_kept_of_the_links_of_raparm_i():
+    """Of each bar two static shapes in bending, as lumps turn with both ends, and its stretch; three more at a third pin."""
+    system = build_system(with_static_shapes(raparm_i(), 1))
+    assert [body.nf for body in system.bodies] == [4, 4, 4, 7, 4, 4, 4, 7]
+
+
+def test_so_many_shapes_are_the_whole_beam():
+    """With all vibrations nothing is missing, and nothing there twice."""
+    whole = build_system(clamped(FREE, None)).body("beam")
+    all_kept = build_system(with_static_shapes(clamped(FREE, None), whole.nf, FREE)).body("beam")
+    assert all_kept.modes.omega == pytest.approx(whole.modes.omega, rel=1e-7)
+
+
+@pytest.mark.parametrize("geometry", ["linear", "second-order"])
+def test_derivatives_of_runs_with_reduced_beams(tmp_path, geometry):
+    model = pf.load("five_bar")
+    few = with_static_shapes(model.mechanism.with_geometry(geometry), 1)
+    replace(model, mechanism=few).save(tmp_path / "few.toml")
+    study = stress_study(str(tmp_path / "few.toml"), "section.bar.thickness")
+    check_derivatives(tmp_path, study, value=0.005, rel=2e-4)
+
+
+def test_a_file_says_what_is_kept(tmp_path):
+    few = with_static_shapes(pf.load("five_bar").mechanism, 2)
+    few.save(tmp_path / "few.toml")
+    read = pf.load(tmp_path / "few.toml").mechanism
+    assert read == few
+    assert 'reduction = "craig-bampton"' in (tmp_path / "few.toml").read_text(encoding="utf-8")
+
+
+def test_what_cannot_be_reduced_is_said():
+    with pytest.raises(InputError, match=r"body\.beam\.reduction: says nothing without modes .* modes = 2"):
+        clamped(PINNED, None).with_beams(reduction="craig-bampton")
+    with pytest.raises(InputError, match="no such number of modes"):
+        with_static_shapes(clamped(PINNED, None), -1)
+    lever = clamped(PINNED, None)
+    carriage = RigidBody("carriage", 0.1, 1e-5, points={"P": (0.0, 0.0)})
+    sliding = SlidingJoint("rail", PointRef("beam", "A"), PointRef("carriage", "P"))
+    pose = (Assembly("straight", {"beam": 0.0, "carriage": 0.0}),)
+    lever = replace(lever, bodies=(*lever.bodies, carriage), joints=(*lever.joints, sliding), assemblies=pose)
+    with pytest.raises(InputError, match=r"body\.beam\.reduction: something slides along it"):
+        build_system(with_static_shapes(lever, 1))

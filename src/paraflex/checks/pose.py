@@ -163,7 +163,7 @@ def _reduced(system: System) -> Iterator[Finding]:
             "modes-too-stiff", f"body.{one.point.body}.modes",
             f"{one.modes} modes miss {100.0 * one.part:.0f} % of its turn under a moment at {one.point.point}, which "
             f"{one.cause} brings in: it is too stiff there",
-            "leave modes out, or keep more",
+            'say reduction = "craig-bampton" beside modes, or leave modes out',
         )  # fmt: skip
 
 

@@ -127,13 +127,12 @@ class Marker:
         return s
 
 
-def body_coordinates(body: Body, offset: int, geometry: Geometry, like: ModalBasis | None = None) -> BodyCoordinates:
-    """Coordinates of a body that start at an offset in q, undamped.
+def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = None) -> BodyCoordinates:
+    """All coordinates of a body, none of its modes left out, undamped and as if they were the first of q.
 
     Parameters
     ----------
     body : Body
-    offset : int
     geometry : Geometry
     like : ModalBasis, optional
         Of a body little different, whose modes these are to follow in order and sign: see `ModalBasis.like`.
@@ -153,14 +152,12 @@ def body_coordinates(body: Body, offset: int, geometry: Geometry, like: ModalBas
         raise _not_definite(body.name) from error
     if like is not None:
         modes = modes.like(like, integrals.Mff)
-    elif not isinstance(body, RigidBody) and body.modes is not None:
-        modes = modes.lowest(body.modes)
     integrals = integrals.in_basis(modes.vectors)
     _check_mass(body.name, integrals)
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
         points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
-    return BodyCoordinates(body.name, offset, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
+    return BodyCoordinates(body.name, 0, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
 
 
 def _check_mass(name: str, body: ShapeIntegrals) -> None:

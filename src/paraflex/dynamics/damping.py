@@ -24,18 +24,14 @@ the deformation in every frame.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
-from paraflex.fem.eigen import eigenpairs
+from paraflex.dynamics.held import held_modes, place_rows, slope_row
 from paraflex.mechanism import GROUND, Damping, Joint, Mechanism, PointRef, RigidBody, stiffness_proportional
 
-# Conditions with less than this fraction independent of the others are redundant.
-_DEPENDENT = 1e-9
 # An entry of the damping matrix below this fraction of the damping of its two modes is rounding.
 _ROUNDED_ENTRY = 1e-9
 
@@ -61,7 +57,7 @@ def damping_matrix(
     if beta is not None:
         return np.diag(beta * squares)
     held = np.array(list(_conditions(mechanism, bodies, index, name))).reshape(-1, 3 + body.nf)
-    return _without_rounding(_by_modes(described.damping, squares, *_held_modes(body, held)))
+    return _without_rounding(_by_modes(described.damping, squares, *held_modes(body, held)))
 
 
 def _by_modes(damping: Damping, squares: Numbers, omega: Numbers, modes: Numbers) -> Numbers:
@@ -80,42 +76,6 @@ def _without_rounding(matrix: Numbers) -> Numbers:
     return np.where(small, 0.0, 0.5 * (matrix + matrix.T))
 
 
-def _held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]:
-    """Frequencies (k,) and flexible part (nf, k) of the mass-normalised elastic modes of a body under conditions.
-
-    `held` has a row a condition on its coordinates (r, phi, u), which are zero together.
-    """
-    s, nf = body.integrals, body.nf
-    mass = np.eye(3 + nf, dtype=np.result_type(s.S2, held))
-    mass[:2, :2] *= s.m
-    mass[2, 2] = s.I0 + s.J
-    mass[:2, 2] = mass[2, :2] = -s.S1[1], s.S1[0]
-    mass[:2, 3:], mass[2, 3:] = s.S2, s.G1 + s.Jf
-    mass[3:, :2], mass[3:, 2] = s.S2.T, s.G1 + s.Jf
-    stiffness = np.diag(np.concatenate([np.zeros(3), body.modes.omega**2]))
-    sizes = 1.0 / np.sqrt(np.real(np.diag(mass)))
-    free, rigid = _null_space(held * sizes)
-    basis = sizes[:, None] * free
-    values, vectors = eigenpairs(basis.T @ stiffness @ basis, basis.T @ mass @ basis)
-    return np.sqrt(values[rigid:]), (basis @ vectors[:, rigid:])[3:]
-
-
-def _null_space(rows: Numbers) -> tuple[Numbers, int]:
-    """Columns that span the null space of conditions on (r, phi, u), and the number of rigid motions in it."""
-    n = rows.shape[1]
-    if not rows.size:
-        return np.eye(n), 3
-    rows = rows / np.linalg.norm(np.real(rows), axis=1)[:, None]
-    factors: Any = scipy.linalg.qr(np.real(rows).T, mode="r", pivoting=True)
-    upper, order = factors
-    rank = int(np.sum(np.abs(np.diag(upper)) > _DEPENDENT))
-    rows = rows[order[:rank]]
-    free = scipy.linalg.null_space(np.real(rows), rcond=_DEPENDENT)
-    # Of a complex step the imaginary part follows the conditions.
-    free = free - rows.T @ np.linalg.solve(rows @ rows.T, rows @ free)
-    return free, 3 - int(np.linalg.matrix_rank(np.real(rows[:, :3]), tol=_DEPENDENT))
-
-
 def _conditions(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
 ) -> Iterator[Numbers]:
@@ -130,34 +90,24 @@ def _conditions(
             marker = make_marker(mechanism, bodies, index, here)
             turns_with, along_itself = "angle" in joint.holds, _along_itself(joint, here)
             if turns_with or (joint.name in driven and not joint.slides):
-                yield _slope(marker)
+                yield slope_row(marker)
             if "points" in joint.holds or (joint.slides and joint.name in driven and not along_itself):
                 pinned.append(marker)
             elif joint.slides and turns_with:
                 angle = joint.direction if here is joint.a else joint.direction - joint.angle
-                yield np.array([-np.sin(angle), np.cos(angle)]) @ _place(marker)
+                yield np.array([-np.sin(angle), np.cos(angle)]) @ place_rows(marker)
             elif joint.slides and not along_itself:
                 across.append(marker)
     pinned.sort(key=lambda marker: np.real(marker.x0).tolist())
     if pinned:
-        yield from _place(pinned[0])
+        yield from place_rows(pinned[0])
     origin = pinned[0].x0 if pinned else None
     for marker in (*pinned[1:], *across):
         line = np.array([1.0, 0.0]) if origin is None else marker.x0 - origin
         if np.any(np.real(line)):
-            yield np.array([-line[1], line[0]]) @ _place(marker)
+            yield np.array([-line[1], line[0]]) @ place_rows(marker)
 
 
 def _along_itself(joint: Joint, here: PointRef) -> bool:
     """Whether a joint slides along the body of a point."""
     return joint.slides and "angle" not in joint.holds and here is joint.a
-
-
-def _place(marker: Marker) -> Numbers:
-    """Derivative of a marker's place in the undeformed body by (r, phi, u), (2, 3 + nf)."""
-    x, y = marker.x0
-    return np.hstack([np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]), marker.N])
-
-
-def _slope(marker: Marker) -> Numbers:
-    return np.concatenate([[0.0, 0.0, 1.0], marker.slope])

@@ -9,6 +9,7 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
+from paraflex.dynamics.body_bases import is_reduced, reduced_body
 from paraflex.dynamics.constraints import RowTerm, row_order, terms_by_joint
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
 from paraflex.dynamics.damping import damping_matrix
@@ -164,25 +165,31 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     Raises
     ------
     InputError
-        A body whose mass matrix is not positive definite.
+        A body whose mass matrix is not positive definite; what `reduced_body` refuses.
     ProportionError
         One whose damping cannot be found, for numbers too far apart.
     """
     mechanism = in_frames(mechanism)
-    bodies, offset = [], 0
-    for body in mechanism.bodies:
-        modes = None if like is None else like.body(body.name).modes
-        coordinates = body_coordinates(body, offset, mechanism.geometry, modes)
-        bodies.append(coordinates)
-        offset += 3 + coordinates.nf
-    index = {body.name: i for i, body in enumerate(bodies)}
-    undamped = tuple(bodies)
-    damped = []
+    index = {body.name: i for i, body in enumerate(mechanism.bodies)}
+    constraints = row_order(mechanism, index)
+    modes = {} if like is None else {body.name: body.modes for body in like.bodies}
+    reduced = [body.name for body in mechanism.bodies if is_reduced(mechanism, body)]
+    whole = [
+        body_coordinates(body, mechanism.geometry, None if body.name in reduced else modes.get(body.name))
+        for body in mechanism.bodies
+    ]
+    undamped, offset = [], 0
+    for body in whole:
+        if body.name in reduced:
+            body = reduced_body(mechanism, whole, constraints, body.name, modes.get(body.name))
+        undamped.append(replace(body, offset=offset))
+        offset += 3 + body.nf
+    bodies = []
     for body in undamped:
         with solvable(f"the damping of {body.name}"):
-            damped.append(replace(body, damping=damping_matrix(mechanism, undamped, index, body.name)))
-    packed, rows = pack_system(mechanism, tuple(damped), index, row_order(mechanism, index))
-    return System(mechanism=mechanism, bodies=tuple(damped), packed=packed, rows=rows)
+            bodies.append(replace(body, damping=damping_matrix(mechanism, tuple(undamped), index, body.name)))
+    packed, rows = pack_system(mechanism, tuple(bodies), index, constraints)
+    return System(mechanism=mechanism, bodies=tuple(bodies), packed=packed, rows=rows)
 
 
 def with_constraints_of(system: System, mechanism: Mechanism) -> System:

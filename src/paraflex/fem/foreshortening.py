@@ -8,7 +8,7 @@ the beam, where slopes are taken too, then the lumps.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,10 @@ class MassPoints:
     N: Array
     slope: Array
     weights: Array
+
+    def in_basis(self, basis: Array) -> MassPoints:
+        """The same points in other flexible coordinates, u_old = basis @ u_new."""
+        return replace(self, N=self.N @ basis, slope=self.slope @ basis)
 
     def bending(self, weights: Array) -> Array:
         """The matrix (nf, nf) of the quadratic form f at a point of these weights (g,)."""

@@ -27,10 +27,6 @@ class ModalBasis:
     omega: Array
     vectors: Array
 
-    def lowest(self, count: int) -> ModalBasis:
-        """The modes of lowest frequency: modal reduction."""
-        return ModalBasis(self.omega[:count], self.vectors[:, :count])
-
     def like(self, other: ModalBasis, Mff: Array) -> ModalBasis:
         """Those of these modes that are nearest to the modes of a slightly different body, in their order and signs.
 

@@ -21,6 +21,7 @@ from paraflex.limits import SHAPE_FUNCTIONS, at_most
 from paraflex.mechanism import (
     AssumedModesBeam,
     Body,
+    BodyReduction,
     Curvature,
     Damping,
     FlexibleBeam,
@@ -78,6 +79,7 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
         damping=_damping(body.damping, name),
         flexible=body.flexible,
         frames=body.frames,
+        reduction=BodyReduction(body.reduction),
     )
 
 

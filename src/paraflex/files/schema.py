@@ -298,6 +298,7 @@ class DampingTable(_Table):
 
 ReferenceName = Literal["pinned", "cantilever", "free"]
 CurvatureName = Literal["separate", "shared"]
+ReductionName = Literal["modal", "craig-bampton"]
 
 
 class BeamTable(_Table):
@@ -323,6 +324,11 @@ class BeamTable(_Table):
         description='curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default',
     )
     modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
+    reduction: ReductionName = Field(
+        default="modal",
+        description='what is kept with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
+        "held, and static shapes of these",
+    )
     damping: DampingTable | None = Field(default=None, description="a damping table")
     flexible: Yes = Field(default=True, description="false for a rigid beam")
     frames: Count = Field(

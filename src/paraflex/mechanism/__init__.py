@@ -9,6 +9,7 @@ from paraflex.mechanism.actuation_modes import (
 from paraflex.mechanism.bodies import (
     AssumedModesBeam as AssumedModesBeam,
     Body as Body,
+    BodyReduction as BodyReduction,
     Curvature as Curvature,
     FlexibleBeam as FlexibleBeam,
     LumpedMass as LumpedMass,

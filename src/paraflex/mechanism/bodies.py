@@ -64,6 +64,22 @@ class Curvature(Enum):
     SEPARATE = "separate"
 
 
+class BodyReduction(Enum):
+    """Shapes that a beam keeps of all that its elements can have.
+
+    MODAL
+        The lowest modes in its frame. Where the frame does not clamp the beam they carry no moment there: too stiff at
+        motors, springs and welds, unless many are kept.
+    CRAIG_BAMPTON
+        What forces at its points bend it to, static shapes of the coordinates that joints, motors, springs, loads and
+        lumps act on, and the lowest modes with these coordinates held (Craig and Bampton 1968). The same in every
+        reference condition.
+    """
+
+    MODAL = "modal"
+    CRAIG_BAMPTON = "craig-bampton"
+
+
 @dataclass(frozen=True)
 class LumpedMass(CheckedFields):
     """A mass [kg] and moment of inertia [kg m^2] at a named point of a beam."""
@@ -127,7 +143,10 @@ class FlexibleBeam(CheckedFields):
         At nodes with a lumped moment of inertia, and at the tip. Separate by default; the paper's is shared. Where
         sections of different bending stiffness meet there is always one on either side.
     modes : int, optional
-        Modes of lowest frequency kept as flexible coordinates, in its frame; all by default.
+        Modes of lowest frequency kept as flexible coordinates; all by default.
+    reduction : BodyReduction or str
+        Of which kind these are: "modal", in its frame; or "craig-bampton", with the points held that something acts on,
+        beside the static shapes of these.
     damping : RayleighDamping or ModalDamping, optional
         Of its material; none by default.
     flexible : bool
@@ -152,10 +171,12 @@ class FlexibleBeam(CheckedFields):
     damping: Damping | None = None
     flexible: bool = True
     frames: int = 1
+    reduction: BodyReduction = BodyReduction.MODAL
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, kind in (("reference", ReferenceCondition), ("curvature", Curvature)):
+        kinds = {"reference": ReferenceCondition, "curvature": Curvature, "reduction": BodyReduction}
+        for name, kind in kinds.items():
             object.__setattr__(self, name, as_enum(kind, getattr(self, name), f"body.{self.name}.{name}"))
 
     @cached_property

@@ -9,7 +9,7 @@ from typing import TypeVar
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
-from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam, RigidBody
+from paraflex.mechanism.bodies import AssumedModesBeam, Body, BodyReduction, FlexibleBeam, RigidBody
 from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping, stiffness_proportional
 from paraflex.mechanism.modal import ModalBody
 from paraflex.mechanism.quantities import finite, not_negative, positive
@@ -47,12 +47,18 @@ def check_body(body: Body) -> None:
     if isinstance(body, FlexibleBeam):
         _check_frames(body, field)
     check_damping(body.damping, f"{field}.damping")
-    if body.modes is not None and not 1 <= body.modes <= n:
+    static = isinstance(body, FlexibleBeam) and body.reduction is BodyReduction.CRAIG_BAMPTON
+    if static and body.modes is None:
+        raise InputError(
+            "says nothing without modes", field=f"{field}.reduction", value=BodyReduction.CRAIG_BAMPTON.value,
+            remedy="say how many vibrations to keep beside the static shapes: modes = 2",
+        )  # fmt: skip
+    if body.modes is not None and not (0 if static else 1) <= body.modes <= n:
         raise InputError(
             "no such number of modes",
             field=f"{field}.modes",
             value=body.modes,
-            remedy=f"from 1 to {n}, or leave it out for all",
+            remedy=f"from {0 if static else 1} to {n}, or leave it out for all",
         )
 
 

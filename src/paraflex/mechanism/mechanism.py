@@ -6,12 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from paraflex.arguments import checked_arguments, given_as, refused
 from paraflex.display import Shown
 from paraflex.errors import InputError, as_enum
 from paraflex.fem import ReferenceCondition
-from paraflex.mechanism.bodies import Body, Curvature, FlexibleBeam, RigidBody, given_shapes
+from paraflex.mechanism.bodies import Body, BodyReduction, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
 from paraflex.mechanism.payload import Payload, loaded, together
@@ -59,6 +60,9 @@ class Mechanism(Members, Shown):
     description : str
     payload : Payload or None
         What `with_payload` has added to the body that carries the end-effector, for drawings and lists.
+    bases : mapping of str to (own, kept) nested sequence
+        Flexible coordinates that bodies keep, as combinations of all that their reference conditions leave them: see
+        `reduce_bodies`.
     cut : Cut or None
         The mechanism as described, of one that was made for computing: of segments, or of beams in several frames.
 
@@ -143,6 +147,7 @@ class Mechanism(Members, Shown):
         reference: ReferenceCondition | str | None = None,
         curvature: Curvature | str | None = None,
         modes: int | None = None,
+        reduction: BodyReduction | str | None = None,
     ) -> Mechanism:
         """The mechanism with another mesh, reference condition, element variant or reduction on every flexible beam.
 
@@ -154,6 +159,8 @@ class Mechanism(Members, Shown):
         curvature : Curvature or str, optional
         modes : int, optional
             Modes of lowest frequency kept of each, and of each other flexible body.
+        reduction : BodyReduction or str, optional
+            Of which kind these are of beams: "modal" or "craig-bampton".
 
         Raises
         ------
@@ -163,9 +170,12 @@ class Mechanism(Members, Shown):
         reference = None if reference is None else as_enum(ReferenceCondition, reference, "reference")
         curvature = None if curvature is None else as_enum(Curvature, curvature, "curvature")
         asked = {"elements": elements, "reference": reference, "curvature": curvature}
-        changes = {name: value for name, value in asked.items() if value is not None}
+        changes: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
         for what in changes:
             self._refuse_given_shapes(what)
+        if reduction is not None:
+            changes |= {"reduction": as_enum(BodyReduction, reduction, "reduction")}
+            changes |= {} if modes is None else {"modes": modes}
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
         changed = self.with_bodies(replace(beam, **changes) for beam in beams) if changes else self
         if modes is None:

@@ -144,6 +144,8 @@ class Members(CheckedFields):
     description: str = field(default="", compare=False)
     # The body that carries it has it, so that it is no part of what is compared, saved or simulated.
     payload: Payload | None = field(default=None, compare=False, repr=False)
+    # Flexible coordinates (own, kept) that were chosen for bodies by name, by a reduction along a motion.
+    bases: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict, repr=False)
     # Where it was made of another for computing.
     cut: Cut | None = field(default=None, compare=False, repr=False)
 

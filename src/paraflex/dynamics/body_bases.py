@@ -1,0 +1,112 @@
+"""Fewer flexible coordinates for a body: its lowest modes, Craig-Bampton shapes, or shapes that are given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from paraflex.arrays import Numbers
+from paraflex.dynamics.constraints import Constraint
+from paraflex.dynamics.coordinates import BodyCoordinates
+from paraflex.dynamics.held import held_modes, static_shapes
+from paraflex.dynamics.interface import interface_rows
+from paraflex.errors import InputError
+from paraflex.fem import ModalBasis, modal_basis
+from paraflex.mechanism import Body, BodyReduction, FlexibleBeam, Mechanism, RigidBody
+
+# A shape of which others make up all but this part, in the root of its strain energy, is left out.
+_DEPENDENT = 1e-10
+
+
+def is_reduced(mechanism: Mechanism, body: Body) -> bool:
+    """Whether a body keeps fewer flexible coordinates than its elements or functions have."""
+    if isinstance(body, RigidBody) or not body.flexible:
+        return False
+    return body.modes is not None or body.name in mechanism.bases
+
+
+def reduced_body(
+    mechanism: Mechanism,
+    bodies: Sequence[BodyCoordinates],
+    constraints: Sequence[Constraint],
+    name: str,
+    like: ModalBasis | None = None,
+) -> BodyCoordinates:
+    """An undamped body in the coordinates that are kept of it.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    bodies : sequence of BodyCoordinates
+        Of the mechanism, each with all its coordinates, undamped.
+    constraints : sequence of Constraint
+        Of the mechanism.
+    name : str
+    like : ModalBasis, optional
+        Of the same body with other numbers: see `build_system`.
+
+    Raises
+    ------
+    InputError
+        Given shapes of another number of coordinates; Craig-Bampton shapes of a body that something slides along.
+    """
+    body = next(one for one in bodies if one.name == name)
+    described = mechanism.body(name)
+    assert not isinstance(described, RigidBody)
+    if name in mechanism.bases:
+        shapes = _vibrations(body, _given(body, np.array(mechanism.bases[name])))
+    elif isinstance(described, FlexibleBeam) and described.reduction is BodyReduction.CRAIG_BAMPTON:
+        rows = interface_rows(mechanism, bodies, constraints, name)
+        held = held_modes(body, rows)[1][:, : described.modes]
+        shapes = _vibrations(body, np.hstack([static_shapes(body, rows), held]))
+    else:
+        shapes = np.eye(body.nf) if like is not None else np.eye(body.nf)[:, : described.modes]
+    if like is not None:
+        own = body.shape.integrals.Mff
+        nearest = ModalBasis(_frequencies(body, shapes), body.modes.vectors @ shapes).like(like, own)
+        shapes = body.modes.vectors.T @ own @ nearest.vectors
+    return _in_basis(body, shapes)
+
+
+def _given(body: BodyCoordinates, shapes: Numbers) -> Numbers:
+    """Given shapes (own, k), in the flexible coordinates of the body's reference condition, in its modes."""
+    own = body.shape.integrals.Mff
+    if shapes.ndim != 2 or len(shapes) != len(own):
+        raise InputError(
+            f"has shapes in {len(shapes)} coordinates, and the body {len(own)}", field=f"bases.{body.name}",
+            remedy="reduce it again after a change of its mesh, points or reference",
+        )  # fmt: skip
+    return body.modes.vectors.T @ own @ shapes
+
+
+def _vibrations(body: BodyCoordinates, shapes: Numbers) -> Numbers:
+    """Modes (nf, k) of unit mass of a body whose deformation is combined of shapes (nf, any), in its modes."""
+    energies = body.modes.omega[:, None] * shapes
+    sizes = np.linalg.norm(np.real(energies), axis=0)
+    shapes = shapes[:, sizes > 0.0] / sizes[sizes > 0.0]
+    if not shapes.size:
+        return np.zeros((body.nf, 0))
+    factors: Any = scipy.linalg.qr(body.modes.omega.real[:, None] * np.real(shapes), mode="r", pivoting=True)
+    upper, order = factors
+    shapes = shapes[:, np.sort(order[: int(np.sum(np.abs(np.diag(upper)) > _DEPENDENT))])]
+    return shapes @ modal_basis(body.integrals.in_basis(shapes)).vectors
+
+
+def _frequencies(body: BodyCoordinates, shapes: Numbers) -> Numbers:
+    """Of modes (nf, k) of unit mass [rad/s]."""
+    return np.sqrt(np.sum((body.modes.omega[:, None] * shapes) ** 2, axis=0))
+
+
+def _in_basis(body: BodyCoordinates, shapes: Numbers) -> BodyCoordinates:
+    """The body in modes (nf, k) of unit mass."""
+    return replace(
+        body,
+        integrals=body.integrals.in_basis(shapes),
+        modes=ModalBasis(_frequencies(body, shapes), body.modes.vectors @ shapes),
+        points=None if body.points is None or not shapes.size else body.points.in_basis(shapes),
+        damping=np.zeros((shapes.shape[1], shapes.shape[1])),
+    )

@@ -1,0 +1,75 @@
+"""A body under conditions, rows on its coordinates (r, phi, u) undeformed: vibrations with them held, static shapes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from paraflex.arrays import Array, Numbers
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker
+from paraflex.fem.eigen import eigenpairs
+
+# Conditions with less than this fraction independent of the others are redundant.
+_DEPENDENT = 1e-9
+
+
+def place_rows(marker: Marker) -> Numbers:
+    """Derivative of a marker's place in the undeformed body by (r, phi, u), (2, 3 + nf)."""
+    x, y = marker.x0
+    return np.hstack([np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]), marker.N])
+
+
+def slope_row(marker: Marker) -> Numbers:
+    """Derivative of the turn of a marker's material by (r, phi, u), (3 + nf,)."""
+    return np.concatenate([[0.0, 0.0, 1.0], marker.slope])
+
+
+def held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]:
+    """Frequencies (k,) and flexible part (nf, k) of the mass-normalised elastic modes of a body under conditions.
+
+    `held` has a row a condition on its coordinates (r, phi, u), which are zero together.
+    """
+    s, nf = body.integrals, body.nf
+    mass = np.eye(3 + nf, dtype=np.result_type(s.S2, held))
+    mass[:2, :2] *= s.m
+    mass[2, 2] = s.I0 + s.J
+    mass[:2, 2] = mass[2, :2] = -s.S1[1], s.S1[0]
+    mass[:2, 3:], mass[2, 3:] = s.S2, s.G1 + s.Jf
+    mass[3:, :2], mass[3:, 2] = s.S2.T, s.G1 + s.Jf
+    stiffness = np.diag(np.concatenate([np.zeros(3), body.modes.omega**2]))
+    sizes = 1.0 / np.sqrt(np.real(np.diag(mass)))
+    basis = sizes[:, None] * null_space(held * sizes)
+    values, vectors = eigenpairs(basis.T @ stiffness @ basis, basis.T @ mass @ basis)
+    rigid = 3 - (int(np.linalg.matrix_rank(_unit(held * sizes)[:, :3], tol=_DEPENDENT)) if held.size else 0)
+    return np.sqrt(values[rigid:]), (basis @ vectors[:, rigid:])[3:]
+
+
+def null_space(rows: Numbers) -> Numbers:
+    """Columns (n, n - rank) that span the null space of rows (k, n) of one scale."""
+    if not rows.size:
+        return np.eye(rows.shape[1])
+    size = np.linalg.norm(np.real(rows), axis=1)
+    rows = rows[size > 0.0] / size[size > 0.0, None]
+    factors: Any = scipy.linalg.qr(np.real(rows).T, mode="r", pivoting=True)
+    upper, order = factors
+    rank = int(np.sum(np.abs(np.diag(upper)) > _DEPENDENT))
+    rows = rows[order[:rank]]
+    free = scipy.linalg.null_space(np.real(rows), rcond=_DEPENDENT)
+    # Of a complex step the imaginary part follows the conditions.
+    return free - rows.T @ np.linalg.solve(rows @ rows.T, rows @ free)
+
+
+def static_shapes(body: BodyCoordinates, held: Numbers) -> Numbers:
+    """Flexible part (nf, k) of the static shapes of a body under forces in balance at its conditions.
+
+    They are all that the conditions can force upon it: k is their number less that of the rigid motions they hold.
+    """
+    balanced = null_space(held[:, :3].T)
+    return held[:, 3:].T @ balanced / (body.modes.omega**2)[:, None]
+
+
+def _unit(rows: Numbers) -> Array:
+    """Rows of size one, of a complex step without it."""
+    return np.real(rows) / np.linalg.norm(np.real(rows), axis=1)[:, None]
