@@ -88,6 +88,9 @@ from .linear import (
     states_needed as states_needed,
 )
 
+# Reduced bodies
+from .reduction import reduced_mechanism as reduced_mechanism
+
 # Statics
 from .equilibria import statics as statics, Statics as Statics
 

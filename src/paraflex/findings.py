@@ -98,6 +98,7 @@ _DOUBTFUL = {
     "law-cut-short": "The run ends before the pieces or the table of a prescribed motion do.",
     "path-fast": "A path asks for a speed or an acceleration that no such machine reaches.",
     "path-ill-conditioned": "A mode passes near a singular position of its motors.",
+    "reduced-too-far": "A run with few flexible coordinates is far from the run with all of them.",
     "modes-too-stiff": "The modes kept of a beam cannot carry a moment that comes in.",
     "equilibrium-unstable": "A static equilibrium is unstable: the mechanism would move away from it.",
     "motions-grow": "Some motions about the pose grow instead of vibrating.",

@@ -18,6 +18,7 @@ from paraflex.cli.collected import apart, collected
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import check_stops, model_parameters
+from paraflex.cli.reduced import asked_reduction, kept_coordinates
 from paraflex.cli.request import at_fault, plan_study
 from paraflex.cli.tables import (
     below_tolerance,
@@ -25,6 +26,7 @@ from paraflex.cli.tables import (
     loads,
     plain_console,
     print_studies,
+    reductions,
     stresses,
     validity,
     warn_of,
@@ -79,10 +81,15 @@ def run_along(
         if request.segments is not None:
             task = task.in_segments(proportional_segments(mechanism, request.segments))
             check_stops(task.mechanism, options, request.stop_at)
+        kept, full = kept_coordinates(request, model.study), None
+        if kept is not None:
+            full, task = task, task.remodelled(asked_reduction(request, task, kept, modes))
         parameters = _parameters(model, name, modes, task, how, request)
         doubts = check_planned(model, task, name, modes, request.plan.assembly)
         method, error = _method(request, options), model.study.error
-        study = TrackingStudy(task, modes, options, parameters, method, error, warning=False, findings=doubts)
+        study = TrackingStudy(
+            task, modes, options, parameters, method, error, warning=False, findings=doubts, full=full
+        )
         planned.append(_Along(name, study, folder, f'path "{name}": ' if len(paths) > 1 else ""))
     return _run(request, model, planned, _model_name(request, mechanism), began)
 
@@ -128,6 +135,7 @@ def _show(out: Console, results: Mapping[str, StudyResult], task: TrackingTask, 
         for path, summary in ran.items()
         for mode, one in summary["modes"].items()
     }
+    reductions(out, ran)
     below_tolerance(out, ran, modes)
     validity(out, {name: mode.get("validity") for name, mode in modes.items()})
     if len(results) > 1:
@@ -197,7 +205,7 @@ def _parameters(
             "after": task.after.value,
             "error": model.study.error,
         }
-        | model_parameters(request, task.mechanism)
+        | model_parameters(request, task.mechanism, kept_coordinates(request, model.study))
         | how,
     }
 

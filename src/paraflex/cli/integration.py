@@ -146,11 +146,12 @@ def check_stops(mechanism: Mechanism, options: IntegrationOptions, stop_at: Sequ
             raise InputError(problem, field="--stop-at", value=text, remedy=error.remedy) from None
 
 
-def model_parameters(request: RunRequest, mechanism: Mechanism) -> dict[str, Any]:
+def model_parameters(request: RunRequest, mechanism: Mechanism, reduced: int | None) -> dict[str, Any]:
     """What a run was asked for besides its integration, for provenance; `mechanism` as it ran."""
     return {
         "rigid": request.rigid,
         "segments": request.segments,
+        "reduced": reduced,
         "ked": request.ked,
         "balanced": request.balanced,
         "assembly": request.plan.assembly,

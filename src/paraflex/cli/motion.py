@@ -18,15 +18,17 @@ from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import model_parameters
+from paraflex.cli.reduced import asked_reduction, kept_coordinates
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     at_fault,
     of_assembly,
 )
-from paraflex.cli.tables import loads, plain_console, validity
+from paraflex.cli.tables import loads, plain_console, reduction, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system
+from paraflex.dynamics.state import nearest_state
 from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning, ValidityWarning
 from paraflex.files import Model, StudyDefaults
 from paraflex.findings import DONE_STATUSES
@@ -35,6 +37,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion, state_at
 from paraflex.results import motion_dataset, motion_summary
+from paraflex.results.reduced_runs import Size, beside_full
 
 # Singular positions listed one by one.
 _MOST_TIMES = 4
@@ -82,7 +85,13 @@ def _run_held(
     console, study = plain_console(stderr=True), model.study
     compile_kernels_for(mechanism, console.print)
     began = time.perf_counter()
-    run = _simulate(console, model, mechanism, options, balanced=request.balanced)
+    full = _simulate(console, model, mechanism, options, balanced=request.balanced)
+    run, kept = full, kept_coordinates(request, study)
+    # What did not get to its end has nothing to be compared with.
+    if kept is not None and full.solution.status in DONE_STATUSES:
+        few = asked_reduction(request, full, kept)
+        start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
+        run = _simulate(console, model, few, options, start=start)
     parameters = {
         "model": dict(model.parameters),
         "run": {
@@ -91,11 +100,14 @@ def _run_held(
             "duration": study.duration,
             "samples": study.samples,
         }
-        | model_parameters(request, mechanism)
+        | model_parameters(request, mechanism, kept)
         | how,
     }
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
+    if run is not full:
+        sizes = [Size.of(one.system, State(0.0, one.solution.q[0], one.solution.v[0])) for one in (run, full)]
+        data = beside_full(data, motion_dataset(full, options=options), *sizes)
     summary = motion_summary(data)
     write_numbers(data, summary, folder)
     tell(summary, lambda out: _report(out, summary, data), as_json=request.json)
@@ -113,7 +125,13 @@ def _run_held(
 
 
 def _simulate(
-    console: Console, model: Model, mechanism: Mechanism, options: IntegrationOptions, *, balanced: bool
+    console: Console,
+    model: Model,
+    mechanism: Mechanism,
+    options: IntegrationOptions,
+    *,
+    balanced: bool = False,
+    start: State | None = None,
 ) -> MotionRun:
     study, progress = model.study, bars(console, TimeElapsedColumn())
     assert study.duration is not None
@@ -125,7 +143,7 @@ def _simulate(
 
     try:
         with begun_late(progress), warnings.catch_warnings():
-            start = start_of(model, mechanism, study.assembly, balanced=balanced) or study.assembly
+            begun = start or start_of(model, mechanism, study.assembly, balanced=balanced) or study.assembly
             # The table and the summary say what the run doubts.
             warnings.simplefilter("ignore", ValidityWarning)
             warnings.simplefilter("ignore", ResultWarning)
@@ -134,7 +152,7 @@ def _simulate(
                 study.duration,
                 samples=study.samples,
                 torques=study.torques,
-                start=start,
+                start=begun,
                 options=options,
                 on_progress=report,
             )
@@ -181,6 +199,7 @@ def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
     out.print(f"{summary['mechanism']}: {_ended(summary)}")
     if summary["event"]:
         out.print(summary["message"], soft_wrap=True)
+    reduction(out, summary)
     loads(out, {"": summary["loads"]})
     out.print("at the end:")
     # Points that segments made by the program hang together at are left out.

@@ -13,13 +13,14 @@ from paraflex.cli.commands.requests import filled
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import integration_options
 from paraflex.cli.motion import own_motion, start_of
+from paraflex.cli.reduced import asked_reduction, kept_coordinates
 from paraflex.cli.request import asked_model, find_path, plan_study
 from paraflex.cli.run import asked_mechanism
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.errors import InputError
 from paraflex.files import Model
-from paraflex.mechanism import proportional_segments
+from paraflex.mechanism import parse_mode, proportional_segments
 from paraflex.motion import MotionRun, simulate_motion
 from paraflex.report.provenance import asked, run_command_line
 from paraflex.results.kinds import kind_of
@@ -91,5 +92,9 @@ def _runs(
     task = plan_study(model, mechanism, *find_path(model, path), request.plan, request.after)
     if request.segments is not None:
         task = task.in_segments(proportional_segments(mechanism, request.segments))
+    kept = kept_coordinates(request, model.study)
+    if kept is not None:
+        chosen = [parse_mode(mechanism, mode) for mode in modes]
+        task = task.remodelled(asked_reduction(request, task, kept, chosen))
     for mode in modes:
         yield simulate(task, mode, options=options, warning=False)

@@ -82,6 +82,9 @@ def _check_fidelity(request: RunRequest) -> None:
     asked = [flag for flag, given in chosen.items() if given]
     if len(asked) > 1:
         raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
+    if request.reduced and any(flag != "--geometry" for flag in asked):
+        raise InputError(f"means nothing with {asked[0]}", field="--reduced", value=request.reduced,
+                         remedy="leave one of them out")  # fmt: skip
     for name, given in asdict(request.frames).items():
         if given is not None and (request.rigid or request.segments is not None):
             raise InputError(

@@ -172,6 +172,40 @@ def loads(console: Console, figures: Mapping[str, Any]) -> None:
         console.print(line, soft_wrap=True)
 
 
+def reductions(console: Console, summaries: Mapping[str, Any]) -> None:
+    """How far off runs with few flexible coordinates are, and how much faster, beside those with all."""
+    from paraflex.results.following import HEADLINE, ErrorSpan
+
+    rows, title, key = [], "", HEADLINE[ErrorSpan(next(iter(summaries.values()))["error"])]
+    for names, mode in _runs(summaries):
+        if (one := mode.get("reduction")) is None:
+            continue
+        error, exact, times = mode[key], one[f"full_{key}"], (mode["wall_time"], one["full_wall_time"])
+        off = None if error is None or exact is None else error - exact
+        rows.append([*names, number(exact, ".4e"), number(off, "+.1e"), number(one["distance"], ".1e"),
+                     "" if None in times else f"{times[0] / times[1]:.2f}"])  # fmt: skip
+        title = _reduced_words(one)
+    if rows:
+        heads = ("full error\n[m]", "off\n[m]", "distance\n[m]", "time of\nfull run")
+        print_titled(console, title, plain_table(*_texts(summaries), numbers=heads, rows=rows))
+
+
+def reduction(console: Console, summary: Mapping[str, Any]) -> None:
+    """The same of a run without a path."""
+    if (one := summary.get("reduction")) is not None:
+        console.print(
+            f"{_reduced_words(one)}: points are up to {one['distance']:.1e} m from their places in the full run, in "
+            f"{summary['wall_time'] / one['full_wall_time']:.2f} of its time", soft_wrap=True,
+        )  # fmt: skip
+
+
+def _reduced_words(one: Mapping[str, Any]) -> str:
+    return (
+        f"{one['flexible_coordinates']} of {one['full_flexible_coordinates']} flexible coordinates, {one['states']} of "
+        f"{one['full_states']} states"
+    )
+
+
 def stresses(console: Console, summaries: Mapping[str, Any]) -> None:
     """The largest stress of every run along some paths, where the mechanism has any."""
     from paraflex.results.loads import ranked

@@ -18,6 +18,7 @@ from paraflex.errors import InputError, NumericalError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.motion import MotionRun
+from paraflex.reduction import reduced_mechanism
 from paraflex.results import motion_dataset, tracking_dataset
 from paraflex.results.metrics import METRICS, Members
 from paraflex.tracking import TrackingTask, simulate
@@ -136,6 +137,9 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
     planned = model.plan(
         task.path, duration=setting.duration, samples=setting.samples, assembly=setting.assembly, warning=False
     )
+    if model.study.reduced:
+        # Chosen anew for each design, from its plan alone: no run with all coordinates is needed.
+        planned = planned.remodelled(reduced_mechanism(planned, model.study.reduced, modes=setting.modes))
     return planned, options
 
 

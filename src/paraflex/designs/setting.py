@@ -319,6 +319,12 @@ def _check(setting: Setting, model: Model) -> None:
         )
     if not setting.has_path:
         own_duration(model, setting.duration)
+        if model.study.reduced:
+            raise InputError(
+                "few flexible coordinates are chosen from the plan of a path, which there is none of",
+                field="study.reduced", value=model.study.reduced, source=setting.source,
+                remedy='leave it out, or say reduction = "craig-bampton" and modes in the tables of beams',
+            )  # fmt: skip
     model.mechanism.assembly(setting.assembly)
 
 

@@ -94,6 +94,26 @@ def undeformed_motion(system: System, rigid: System, q: Array, v: Array, a: Arra
     return there[0], there[1], there[2]
 
 
+def nearest_state(system: System, other: System, state: State) -> State:
+    """The state nearest to one of another system of the same bodies with other flexible coordinates.
+
+    Deflections are those of least mass-weighted difference, constraints are met.
+
+    Raises
+    ------
+    AssemblyError, InconsistentConstraintsError
+        The constraints cannot be met near it.
+    """
+    signals, (q, v) = moment_signals(system.mechanism, state.time), np.zeros((2, system.n))
+    for here, there in zip(system.bodies, other.bodies, strict=True):
+        shapes = here.modes.vectors.T @ here.shape.integrals.Mff @ there.modes.vectors
+        for mine, theirs in ((q, state.q), (v, state.v)):
+            mine[here.offset : here.offset + 3] = theirs[there.offset : there.offset + 3]
+            mine[here.flexible] = shapes @ theirs[there.flexible]
+    q = project_position(system, signals, state.time, q)
+    return State(state.time, q, project_velocity(system, signals, state.time, q, v))
+
+
 def reference_pose(system: System, assembly: Assembly) -> Array:
     """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
 

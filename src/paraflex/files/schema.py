@@ -635,6 +635,10 @@ class StudyDefaultsTable(_Table):
     after: Literal["free", "hold"] = Field(
         default="free", description='what the active motors do after the path: "free" or "hold", by brakes'
     )
+    reduced: Count | None = Field(
+        default=None,
+        description="flexible coordinates that runs keep, all bodies together; all by default, or with 0",
+    )
     error: Literal["motion", "whole"] = Field(
         default="motion", description='which tracking error ranks modes: of the "motion", or the "whole" run with dwell'
     )

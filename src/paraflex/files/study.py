@@ -42,6 +42,8 @@ class StudyDefaults:
         Fixed [s].
     after : str
         What the active motors do after the path: "free" or "hold".
+    reduced : int or None
+        Flexible coordinates that runs keep of all bodies together; all where None or 0.
     error : str
         Which tracking error ranks modes: that of the "motion", or of the "whole" run.
     """
@@ -58,6 +60,7 @@ class StudyDefaults:
     tolerance: float | None = None
     step: float | None = None
     after: str = "free"
+    reduced: int | None = None
     error: str = "motion"
 
     @property
@@ -109,6 +112,11 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
         known(name, motors, "study.torques", "motor")
     if study.assembly is not None:
         known(study.assembly, [one.name for one in mechanism.assemblies], "study.assembly", "assembly")
+    if study.reduced is not None and study.reduced < 0:
+        raise InputError(
+            "no such number of flexible coordinates", field="study.reduced", value=study.reduced,
+            remedy="say how many to keep, 0 or nothing for all",
+        )  # fmt: skip
     try:
         check_times(study.duration, study.samples)
         study.integration()

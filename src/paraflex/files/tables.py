@@ -71,6 +71,11 @@ def model_tables(
     InputError
         A member that a file has no words for.
     """
+    if mechanism.bases:
+        raise InputError(
+            "a file has no words for flexible coordinates that a reduction has chosen", field="bases",
+            remedy="save the mechanism before it, and say reduced = N in its [study]",
+        )  # fmt: skip
     shared = {} if each else _agreed(mechanism)
     names = {kind: _Names(kind, mechanism, file or {}, before) for kind in _NAMED_TABLES}
     said = {

@@ -22,6 +22,7 @@ _REQUEST_FIELDS = (
     "step",
     "constraints",
     "segments",
+    "reduced",
     "reference",
     "curvature",
     "after",

@@ -35,6 +35,7 @@ from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
+from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
@@ -74,6 +75,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         more=[
             ("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {})),
             *load_tables(data, default_mode(data)),
+            *reduction_tables(data),
             ("Integration", solver_table(data)),
         ],
         panels=[*_panels(few, runs), *load_panel(few, runs)],

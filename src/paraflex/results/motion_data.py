@@ -31,6 +31,7 @@ from paraflex.results.links import system_links
 from paraflex.results.loads import load_figures
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.record import RUN_FIGURES
+from paraflex.results.reduced_runs import reduction_figures
 from paraflex.results.sensors import sensor_figures
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
@@ -112,6 +113,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         **sensor_figures(data),
+        **reduction_figures(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]) if reached.size else None,

@@ -14,6 +14,7 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.metrics import METRICS
 from paraflex.results.numbers import finite_or_none
+from paraflex.results.reduced_runs import reduction_figures
 from paraflex.results.sensors import sensor_figures
 from paraflex.results.traces import data_traces
 from paraflex.results.validity import validity_summary
@@ -45,7 +46,8 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     dict
         `modes.<mode>` with tracking errors during the motion, after it and over all, vibration and drift, peak_torque
         and rms_torque per motor, end_effector_final, the solver's figures, validity (None of rigid bodies), `loads`
-        (see `loads.load_figures`) and, where the mechanism has sensors, `sensors` (see `sensors.sensor_figures`);
+        (see `loads.load_figures`) and, where the mechanism has sensors, `sensors` (see `sensors.sensor_figures`), where
+        its bodies are reduced, `reduction` (see `reduced_runs.reduction_figures`);
         `error`, which of the errors ranks the modes; `verdict`, with the level and all findings; `after`, what the
         motors do after the path; `part`, how much of the path a run did that was too short for all of it, else None;
         `parameters`; `version`. A figure not reached is None.
@@ -71,7 +73,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         numbers["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
         numbers["validity"] = validity_summary(run)
         numbers["loads"] = load_figures(run)
-        numbers |= sensor_figures(run)
+        numbers |= sensor_figures(run) | reduction_figures(run)
         modes[str(name)] = numbers
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}

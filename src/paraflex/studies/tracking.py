@@ -22,6 +22,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.results import summary, tracking_dataset
 from paraflex.results.following import ErrorSpan
+from paraflex.results.reduced_runs import Size, beside_full
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 
@@ -94,6 +95,9 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
         a `ResultWarning`.
     findings : iterable of Finding
         Reasons to doubt the model, found before; kept with the results.
+    full : TrackingTask, optional
+        The task with all flexible coordinates, where bodies of the other are reduced: each mode is run with it too, and
+        how far off the reduced run is stands in the results.
     """
 
     _own = ("method",)
@@ -105,6 +109,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
     error: ErrorSpan | str = ErrorSpan.MOTION
     warning: bool = True
     findings: Iterable[Finding] = ()
+    full: TrackingTask | None = None
 
     def run(
         self,
@@ -140,20 +145,23 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
         # The kernels release the GIL, so threads are enough; each run is the same whichever thread it is in.
         with ThreadPoolExecutor(workers.number or os.cpu_count()) as pool:
             futures: dict[str, Future[TrackingRun | str | None]] = {}
+            whole: dict[str, Future[TrackingRun | str | None]] = {}
             try:
                 for mode in chosen:
-                    futures[mode.name] = pool.submit(self._mode, mode, stop, on_progress)
-                wait(futures.values())
+                    futures[mode.name] = pool.submit(self._mode, self.task, mode, stop, on_progress)
+                if self.full is not None:
+                    whole = {mode.name: pool.submit(self._mode, self.full, mode, stop, None) for mode in chosen}
+                wait([*futures.values(), *whole.values()])
             except KeyboardInterrupt:
                 # Ctrl-C reaches the main thread only; runs stop at their next progress report and keep their samples.
                 stop.set()
-        outcomes = {name: future.result() for name, future in futures.items()}
-        return self._result(outcomes, interrupted=stop.is_set())
+        outcomes, full = ({name: future.result() for name, future in each.items()} for each in (futures, whole))
+        return self._result(outcomes, full, interrupted=stop.is_set())
 
     def _mode(
-        self, mode: ActuationMode, stop: threading.Event, on_progress: OnProgress | None
+        self, task: TrackingTask, mode: ActuationMode, stop: threading.Event, on_progress: OnProgress | None
     ) -> TrackingRun | str | None:
-        """A mode's run, or the reason why there is none."""
+        """A mode's run of a task, or the reason why there is none."""
         end, began = float(self.task.motion.t[-1]), time.perf_counter()
 
         def report(reached: float) -> None:
@@ -166,15 +174,23 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
             return None
         try:
             if self.method is not None:
-                return self.method(self.task, mode, on_progress=report)
-            return simulate(self.task, mode, options=self.options, on_progress=report, warning=False)
+                return self.method(task, mode, on_progress=report)
+            return simulate(task, mode, options=self.options, on_progress=report, warning=False)
         except IntegrationError as error:
             return error.partial
         except NumericalError as error:
             return str(error)
 
-    def _result(self, outcomes: Mapping[str, TrackingRun | str | None], *, interrupted: bool) -> StudyResult:
-        runs = [outcome for outcome in outcomes.values() if isinstance(outcome, TrackingRun)]
+    def _result(
+        self,
+        outcomes: Mapping[str, TrackingRun | str | None],
+        full: Mapping[str, TrackingRun | str | None],
+        *,
+        interrupted: bool,
+    ) -> StudyResult:
+        runs, whole = (
+            [outcome for outcome in each.values() if isinstance(outcome, TrackingRun)] for each in (outcomes, full)
+        )
         if self.warning:
             for run in runs:
                 run.warn()
@@ -184,6 +200,9 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
             data = tracking_dataset(
                 runs, options=self.options, parameters=self.parameters, error=self.error, findings=self.findings
             )
+        if data is not None and self.full is not None and whole:
+            sizes = [Size.of(task.system, task.start) for task in (self.task, self.full)]
+            data = beside_full(data, tracking_dataset(whole, options=self.options), *sizes)
         return StudyResult(data, failed, interrupted)
 
 

@@ -81,6 +81,14 @@ class RunRequest:
         str | None, Option(metavar="second-order|linear", help="Shape of the beams. Default: the model's.")
     ] = None
     frames: FramesChoice = field(default_factory=FramesChoice)
+    reduced: Annotated[
+        int | None,
+        Option(
+            metavar="N",
+            help="Keep N flexible coordinates of all bodies together, and tell how far off that is. Default: the "
+            "study's, else all; 0 for all.",
+        ),
+    ] = None
     segments: Annotated[
         int | None, Option(metavar="N", help="Cut beams into finite segments, so many the longest (the paper's: 8).")
     ] = None

@@ -14,6 +14,7 @@ from paraflex.designs.run import Task
 from paraflex.designs.setting import INTEGRATION, Setting
 from paraflex.dynamics import pack_signals
 from paraflex.errors import InputError
+from paraflex.files import Model
 from paraflex.files.overlay import Place, number_at
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
@@ -103,6 +104,15 @@ def check_has_path(setting: Setting) -> None:
         )  # fmt: skip
 
 
+def check_not_reduced(model: Model) -> None:
+    """Check that runs of a design keep all flexible coordinates: few are chosen anew for each design."""
+    if model.study.reduced:
+        raise InputError(
+            "derivatives are of runs with all flexible coordinates", field="study.reduced", value=model.study.reduced,
+            remedy='leave it out, or say reduction = "craig-bampton" and modes in the tables of beams',
+        )  # fmt: skip
+
+
 def check_differentiable_study(setting: Setting, values: Sequence[float], columns: Collection[str]) -> None:
     """Check that metrics of a design's runs have exact derivatives by all of its parameters.
 
@@ -122,8 +132,9 @@ def check_differentiable_study(setting: Setting, values: Sequence[float], column
     """
     check_has_path(setting)
     check_smooth(tuple(column.partition(".")[0] for column in columns))
-    _, options = setting.design(tuple(values))
+    model, options = setting.design(tuple(values))
     check_differentiable(options)
+    check_not_reduced(model)
     for k in range(len(setting.names)):
         size_of(setting, Task(0, 0, tuple(values), setting.paths[0]), k, 1.0)
 

@@ -1,0 +1,32 @@
+"""Runs with few flexible coordinates: how many are asked for, and what takes the place of the mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from paraflex.cli.commands.runs import RunRequest
+from paraflex.errors import InputError
+from paraflex.files import StudyDefaults
+from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.motion import MotionRun
+from paraflex.reduction import reduced_mechanism
+from paraflex.tracking import TrackingTask
+
+
+def kept_coordinates(request: RunRequest, study: StudyDefaults) -> int | None:
+    """How many flexible coordinates a run keeps, as asked, else as the study says; None for all."""
+    if request.rigid or request.ked or request.segments is not None:
+        return None
+    return (study.reduced if request.reduced is None else request.reduced) or None
+
+
+def asked_reduction(
+    request: RunRequest, along: TrackingTask | MotionRun, count: int, modes: Sequence[ActuationMode] | None = None
+) -> Mechanism:
+    """The mechanism that keeps so many coordinates along a plan or a run; errors name the option or the field."""
+    try:
+        return reduced_mechanism(along, count, modes=modes)
+    except InputError as error:
+        if error.field not in ("coordinates", "mechanism"):
+            raise
+        raise error.at("study.reduced" if request.reduced is None else "--reduced") from None

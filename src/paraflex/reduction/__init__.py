@@ -1,0 +1,3 @@
+"""Few flexible coordinates for the bodies of a mechanism, chosen along a motion, for runs of the same equations."""
+
+from paraflex.reduction.reduced import reduced_mechanism as reduced_mechanism

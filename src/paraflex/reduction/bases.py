@@ -1,0 +1,81 @@
+"""Bases of bodies from deflections: the directions of most strain energy (proper orthogonal decomposition).
+
+Deflections u of a body, in modes of unit mass and frequencies omega, have the strain energy |omega u|^2 / 2. The
+singular value decomposition of omega u over all deflections gives directions and what each holds of the energy; of all
+bodies together those are kept that hold most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.dynamics import System
+from paraflex.dynamics.sparse import stiffness_diagonal
+from paraflex.errors import InputError
+
+# Directions that hold less than this part of the energy's root are rounding.
+_ROUNDING = 1e-10
+
+
+def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """Flexible coordinates (own, kept) of every flexible body, so many in all, in those of its reference condition.
+
+    Parameters
+    ----------
+    system : System
+    deflections : sequence of (k, n) arrays
+        Coordinates of the system; each array counts as much as the others, by its strain energy.
+    count : int
+
+    Raises
+    ------
+    InputError
+        More than there are, or than the deflections tell apart.
+    """
+    _check(system, count)
+    together = of_one_energy(system, deflections)
+    found = []
+    for body in system.bodies:
+        energies = body.modes.omega * together[:, body.flexible]
+        directions, sizes, _ = np.linalg.svd(energies.T, full_matrices=False)
+        shapes = body.modes.vectors @ (directions / body.modes.omega[:, None])
+        found += [(size, body.name, shapes[:, k]) for k, size in enumerate(sizes.tolist())]
+    # Of two that are the same the first body's comes first.
+    kept = sorted(found, key=lambda one: -one[0])[:count]
+    if not kept or kept[-1][0] <= _ROUNDING * kept[0][0]:
+        told = sum(size > _ROUNDING * kept[0][0] for size, _, _ in found) if kept else 0
+        raise InputError(
+            f"are more than the {told} directions in which the motion bends the bodies", field="coordinates",
+            value=count, remedy=f"keep at most {told}" if told else "it does not bend them at all",
+        )  # fmt: skip
+    return {
+        body.name: _rows([shape for _, name, shape in kept if name == body.name], len(body.modes.vectors))
+        for body in system.bodies
+        if body.nf
+    }
+
+
+def _check(system: System, count: int) -> None:
+    if not system.n_flexible:
+        raise InputError("has rigid bodies only", field="mechanism", value=system.mechanism.name,
+                         remedy="give it flexible ones")  # fmt: skip
+    if not 1 <= count <= system.n_flexible:
+        raise InputError(
+            "no such number of flexible coordinates", field="coordinates", value=count,
+            remedy=f"from 1 to {system.n_flexible}",
+        )  # fmt: skip
+
+
+def of_one_energy(system: System, parts: Sequence[Array]) -> Array:
+    """Deflections (k, n) that have one unit of strain energy together, as much from each part (any, n)."""
+    stiffness = stiffness_diagonal(system)
+    energies = [np.sum(part**2 @ stiffness) for part in parts]
+    bent = [part / np.sqrt(energy) for part, energy in zip(parts, energies, strict=True) if energy > 0.0]
+    return np.concatenate([np.zeros((0, system.n)), *bent]) / np.sqrt(max(1, len(bent)))
+
+
+def _rows(shapes: list[Array], own: int) -> tuple[tuple[float, ...], ...]:
+    return tuple(map(tuple, np.array(shapes).T.tolist())) if shapes else ((),) * own

@@ -1,0 +1,83 @@
+"""Deflections along a planned motion without a run: bodies bent statically by its inertia, loads and torques.
+
+At an instant of the rigid motion the forces -(M a + h) of inertia, loads and motors are in balance. They bend the
+mechanism, undeformed in its nominal pose, by
+
+    (K + e M) x + Phi_q^T mu = f,    Phi_q x = 0
+
+with a multiple e of the mass that is small beside the stiffness: of motions that are free, x is the one that carries no
+momentum. A force at the end-effector is balanced by the inertia of its free motion (inertia relief).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from paraflex.arrays import Array
+from paraflex.dynamics import System, acting_loads
+from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
+from paraflex.dynamics.linearise import typical_square
+from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.kernel.bodies import motion_forces
+from paraflex.kernel.packed import make_scratch
+from paraflex.mechanism import ActuationMode
+from paraflex.tracking import TrackingTask, undeformed_at
+
+# Instants of the motion along the path.
+_INSTANTS = 12
+# The multiple of the mass, in squares of the lowest frequency of any body: what it adds to a deflection.
+_FREE = 1e-6
+
+
+class PlannedDeflections:
+    """Static deflections (k, n) of bodies at instants of a task's planned motion."""
+
+    def __init__(self, task: TrackingTask) -> None:
+        motion = task.motion
+        self.task, self._samples = task, _instants(motion.t, task.path.duration)
+        states = [undeformed_at(task.system, motion, k) for k in self._samples]
+        self._q, self._v, self._a = (np.array(part) for part in zip(*states, strict=True))
+        self._structures = [_structure(task.system, pose) for pose in self._q]
+
+    def of_mode(self, mode: ActuationMode) -> Array:
+        """Under the torques of a mode, inertia and loads (instants, n).
+
+        Raises
+        ------
+        ActuationError, SingularActuationError
+            The mode cannot drive the mechanism along the path.
+        """
+        system, times = self.task.system, self.task.motion.t[self._samples]
+        torques, forces = self.task.torques(mode).evaluate(times), np.zeros_like(self._q)
+        loads, scratch = acting_loads(system.mechanism, times), make_scratch(system.packed)
+        motion_forces(system.packed, self._q, self._v, self._a, loads, forces, scratch)
+        for motor, torque in zip(system.mechanism.motors, torques.T, strict=True):
+            forces -= torque[:, None] * joint_coordinate(system, motor.joint, self._q).rows
+        return np.array([each.solve(-force)[0] for each, force in zip(self._structures, forces, strict=True)])
+
+    def of_end_effector(self) -> Array:
+        """Under unit forces at the end-effector along x and y (2 instants, n).
+
+        They bend bodies in proportion to how far deflections of these move it.
+        """
+        system = self.task.system
+        effector = system.mechanism.end_effector
+        assert effector is not None
+        rows = marker_place(system, system.marker(effector.point), self._q)[1]
+        pairs = zip(self._structures, rows, strict=True)
+        return np.array([each.solve(row)[0] for each, pair in pairs for row in pair])
+
+
+def _instants(t: Array, end: float) -> list[int]:
+    """Samples evenly spaced within the motion along the path, its ends left out."""
+    last = int(np.searchsorted(t, end, side="right")) - 1
+    return np.unique(np.linspace(0, last, _INSTANTS + 2).astype(int)[1:-1]).tolist()
+
+
+def _structure(system: System, q: Array) -> Saddle:
+    """The equations of a pose, factored."""
+    mass = sparse_mass(system, q)
+    stiffness = elastic_stiffness(system, q, every_spring=True)
+    typical = typical_square(stiffness_diagonal(system), stiffness, mass)
+    return Saddle(scipy.sparse.csr_matrix(stiffness + _FREE * typical * mass), sparse_jacobian(system, q))

@@ -1,0 +1,88 @@
+"""Runs with few flexible coordinates beside the same runs with all of them: how far off they are, how much faster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from paraflex.dynamics import State, System
+from paraflex.dynamics.rank import dependence
+from paraflex.findings import Finding
+from paraflex.results.doubts import MODE, keep_findings, verdict_of
+from paraflex.results.following import HEADLINE, ErrorSpan
+from paraflex.results.numbers import finite_or_none
+
+# The variable by which such a dataset is known, and the prefix of numbers of the full runs.
+DISTANCE, FULL = "reduction_distance", "full_"
+# Numbers of full runs that are kept: tracking errors along a path, and what they cost.
+_NUMBERS = (*HEADLINE.values(), "wall_time", "steps")
+# A distance beyond this part of what flexibility does in the full run is a finding.
+_FAR = 0.1
+
+
+class Size(NamedTuple):
+    """How many flexible coordinates a system has, and how many states its motion at a pose."""
+
+    flexible_coordinates: int
+    states: int
+
+    @classmethod
+    def of(cls, system: System, state: State) -> Size:
+        """That of a system at a state."""
+        return cls(system.n_flexible, 2 * (system.n - dependence(system, state.q).rank))
+
+
+def beside_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> xr.Dataset:
+    """The dataset of reduced runs with what the full runs came to, errors against these, and findings on large ones.
+
+    Parameters
+    ----------
+    data, full : xarray.Dataset
+        Of the same runs, from `tracking_dataset` or `motion_dataset`; the second may lack modes.
+    kept, whole : Size
+        Of the reduced and of the full system.
+    """
+    places = full["point_position"].reindex_like(data["point_position"])
+    squares: xr.DataArray = ((data["point_position"] - places) ** 2).sum("axis", skipna=False).max(["time", "point"])
+    apart = squares**0.5
+    apart.attrs = {"long_name": "largest distance of a named point from its place in the full run", "units": "m"}
+    added = {DISTANCE: apart}
+    for name in _NUMBERS:
+        if name in full and name in data:
+            number = full[name].reindex_like(data[name])
+            meaning = f"{data[name].attrs.get('long_name', name)}, all flexible coordinates"
+            added[f"{FULL}{name}"] = number.assign_attrs(data[name].attrs | {"long_name": meaning})
+    out = data.assign(added)
+    out.attrs |= kept._asdict() | {f"{FULL}{name}": count for name, count in whole._asdict().items()}
+    keep_findings(out, [*verdict_of(data), *_far(out, full)])
+    return out
+
+
+def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
+    """Runs that are far from the full ones."""
+    along = "mode" in data.dims
+    name = HEADLINE[ErrorSpan(data.attrs["error"])] if along else ""
+    for mode in data["mode"].values if along else [""]:
+        run = data.sel(mode=mode) if along else data
+        size = float(run[f"{FULL}{name}"]) if along else float(np.abs(full["deflection"]).max())
+        distance = float(run[DISTANCE])
+        if distance > _FAR * size:
+            kept, whole = data.attrs["flexible_coordinates"], data.attrs[f"{FULL}flexible_coordinates"]
+            what = "its tracking error" if along else "the largest deflection"
+            yield Finding(
+                "reduced-too-far", f"{MODE}{mode}" if along else "study.reduced",
+                f"with {kept} flexible coordinates a point is up to {distance:.2g} m from its place with all {whole}, "
+                f"{100.0 * distance / size:.0f} % of {what}", "keep more of them",
+            )  # fmt: skip
+
+
+def reduction_figures(data: xr.Dataset) -> dict[str, Any]:
+    """Of a run, by itself in a dataset: `reduction`, its error and the full run's numbers; empty if it has all."""
+    if DISTANCE not in data:
+        return {}
+    numbers = {name: finite_or_none(data[name].item()) for name in data if str(name).startswith(FULL)}
+    counts = {name: int(data.attrs[name]) for size in Size._fields for name in (size, FULL + size)}
+    return {"reduction": {"distance": finite_or_none(data[DISTANCE].item()), **numbers, **counts}}
