@@ -6,10 +6,16 @@ mechanism, undeformed in its nominal pose, by
     (K + e M) x + Phi_q^T mu = f,    Phi_q x = 0
 
 with a multiple e of the mass that is small beside the stiffness: of motions that are free, x is the one that carries no
-momentum. A force at the end-effector is balanced by the inertia of its free motion (inertia relief).
+momentum. A force at the end-effector is balanced by the inertia of the free motion that it causes (inertia relief).
+
+Bodies also vibrate. To each x comes what its own inertia bends, y with M x in place of f, times x^T K x / x^T M x:
+load-dependent Ritz vectors (Wilson, Yuan and Dickens 1982, Earthquake Eng. Struct. Dyn. 10, 813-821), which tend to the
+lowest modes that the forces excite.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 import scipy
@@ -31,33 +37,39 @@ _FREE = 1e-6
 
 
 class PlannedDeflections:
-    """Static deflections (k, n) of bodies at instants of a task's planned motion."""
+    """Static deflections (k, n) of bodies at instants of a task's planned motion.
+
+    Attributes
+    ----------
+    samples : list of int
+        Numbers of the instants among the task's sample times.
+    """
 
     def __init__(self, task: TrackingTask) -> None:
         motion = task.motion
-        self.task, self._samples = task, _instants(motion.t, task.path.duration)
-        states = [undeformed_at(task.system, motion, k) for k in self._samples]
+        self.task, self.samples = task, _instants(motion.t, task.path.duration)
+        states = [undeformed_at(task.system, motion, k) for k in self.samples]
         self._q, self._v, self._a = (np.array(part) for part in zip(*states, strict=True))
-        self._structures = [_structure(task.system, pose) for pose in self._q]
+        self._structures = [_Structure(task.system, pose) for pose in self._q]
 
     def of_mode(self, mode: ActuationMode) -> Array:
-        """Under the torques of a mode, inertia and loads (instants, n).
+        """Under the torques of a mode, inertia and loads, then what the inertia of these bends (2 instants, n).
 
         Raises
         ------
         ActuationError, SingularActuationError
             The mode cannot drive the mechanism along the path.
         """
-        system, times = self.task.system, self.task.motion.t[self._samples]
+        system, times = self.task.system, self.task.motion.t[self.samples]
         torques, forces = self.task.torques(mode).evaluate(times), np.zeros_like(self._q)
         loads, scratch = acting_loads(system.mechanism, times), make_scratch(system.packed)
         motion_forces(system.packed, self._q, self._v, self._a, loads, forces, scratch)
         for motor, torque in zip(system.mechanism.motors, torques.T, strict=True):
             forces -= torque[:, None] * joint_coordinate(system, motor.joint, self._q).rows
-        return np.array([each.solve(-force)[0] for each, force in zip(self._structures, forces, strict=True)])
+        return _ritz_vectors(zip(self._structures, -forces, strict=True))
 
     def of_end_effector(self) -> Array:
-        """Under unit forces at the end-effector along x and y (2 instants, n).
+        """Under unit forces at the end-effector along x and y, then what the inertia of these bends (4 instants, n).
 
         They bend bodies in proportion to how far deflections of these move it.
         """
@@ -66,7 +78,7 @@ class PlannedDeflections:
         assert effector is not None
         rows = marker_place(system, system.marker(effector.point), self._q)[1]
         pairs = zip(self._structures, rows, strict=True)
-        return np.array([each.solve(row)[0] for each, pair in pairs for row in pair])
+        return _ritz_vectors((each, row) for each, pair in pairs for row in pair)
 
 
 def _instants(t: Array, end: float) -> list[int]:
@@ -75,9 +87,30 @@ def _instants(t: Array, end: float) -> list[int]:
     return np.unique(np.linspace(0, last, _INSTANTS + 2).astype(int)[1:-1]).tolist()
 
 
-def _structure(system: System, q: Array) -> Saddle:
+class _Structure:
     """The equations of a pose, factored."""
-    mass = sparse_mass(system, q)
-    stiffness = elastic_stiffness(system, q, every_spring=True)
-    typical = typical_square(stiffness_diagonal(system), stiffness, mass)
-    return Saddle(scipy.sparse.csr_matrix(stiffness + _FREE * typical * mass), sparse_jacobian(system, q))
+
+    def __init__(self, system: System, q: Array) -> None:
+        self.mass = sparse_mass(system, q)
+        stiffness = elastic_stiffness(system, q, every_spring=True)
+        self.elastic = stiffness_diagonal(system)
+        self._little = _FREE * typical_square(self.elastic, stiffness, self.mass) * self.mass
+        self._saddle = Saddle(scipy.sparse.csr_matrix(stiffness + self._little), sparse_jacobian(system, q))
+
+    def bent(self, force: Array) -> Array:
+        """Static displacements (n,) under forces (n,) that the inertia of free motions balances."""
+        # Of forces that are not in balance nearly all of this is free motion; what holds it in place is that inertia.
+        moved = self._saddle.solve(force)[0]
+        return self._saddle.solve(force - self._little @ moved)[0]
+
+
+def _ritz_vectors(loaded: Iterable[tuple[_Structure, Array]]) -> Array:
+    """Static displacements under forces, then under the inertia of these, of their size (2 k, n)."""
+    first, second = [], []
+    for structure, force in loaded:
+        x = structure.bent(force)
+        inertia = structure.mass @ x
+        moving = x @ inertia
+        first.append(x)
+        second.append((x**2 @ structure.elastic / moving if moving > 0.0 else 0.0) * structure.bent(inertia))
+    return np.array(first + second)

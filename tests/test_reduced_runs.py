@@ -1,0 +1,314 @@
+"""Runs with few flexible coordinates: how they are chosen, how far off the runs are, and where all of it is said."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import paraflex as pf
+from paraflex.dynamics import build_system
+from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
+from paraflex.dynamics.sparse import sparse_mass, stiffness_diagonal
+from paraflex.dynamics.state import State, nearest_state
+from paraflex.errors import InputError
+from paraflex.reduction.bases import bases_of
+from paraflex.reduction.deflections import PlannedDeflections
+from paraflex.results import load_results
+from paraflex.tracking import undeformed_at
+from shell import paraflex
+
+MODES = ("+-+-", "-+-+", "+--+", "+++-", "++-+", "++++")
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return (
+        pf.load("raparm_i").mechanism.with_geometry("second-order").with_beams(reference="pinned", curvature="separate")
+    )
+
+
+@pytest.fixture(scope="module")
+def task(arm):
+    return pf.plan(arm, pf.load("raparm_i").paths["square"], duration=0.7)
+
+
+@pytest.fixture(scope="module")
+def full(task):
+    return {mode: task.simulate(mode, warning=False) for mode in MODES}
+
+
+def study(task, reduced, modes):
+    return pf.run_study(task.remodelled(reduced), modes, full=task, warning=False)
+
+
+def off(data, mode):
+    """Deviation of the tracking error from the full run's, and of points over that error."""
+    run = data.sel(mode=mode)
+    exact = run["full_tracking_rms"].item()
+    return run["tracking_rms"].item() - exact, run["reduction_distance"].item() / exact
+
+
+def admissible(system, rows):
+    """A basis (n, free) of the displacements that rows allow, stiff coordinates scaled down."""
+    scale = 1.0 / np.sqrt(1.0 + stiffness_diagonal(system) / 1e4)
+    return scale[:, None] * scipy.linalg.null_space(rows * scale, rcond=1e-10)
+
+
+def check_deflections(system, found, expected):
+    for body in system.bodies:
+        size = np.max(np.abs(expected[body.flexible]))
+        np.testing.assert_allclose(found[body.flexible], expected[body.flexible], atol=1e-4 * size)
+
+
+# --- How coordinates are chosen ---------------------------------------------------------------------------------------
+
+
+def test_planned_deflections_are_those_of_links_held_by_two_motors(task):
+    """Two motors for supports, which bear nothing as the forces are in balance; forces by differences of energies."""
+    system, planned = task.system, PlannedDeflections(task)
+    found = planned.of_mode(task.mode("+-+-"))
+    samples = planned.samples
+    for k in (0, 5):
+        q, v, a = undeformed_at(system, task.motion, samples[k])
+        mass = sparse_mass(system, q).toarray()
+        # h = M' v - d(v^T M v / 2)/dq, by differences of the mass matrix.
+        step = 1e-6
+        slopes = np.array(
+            [
+                (sparse_mass(system, q + step * row).toarray() - sparse_mass(system, q - step * row).toarray())
+                / (2.0 * step)
+                for row in np.eye(system.n)
+            ]
+        )
+        h = np.einsum("kij,k,j->i", slopes, v, v) - 0.5 * np.einsum("kij,i,j->k", slopes, v, v)
+        joints = [joint_coordinate(system, name, q[None]).rows[0] for name in ("A1", "D1", "A2", "D2")]
+        torques = task.torques("+-+-").evaluate(task.motion.t[samples[k] : samples[k] + 1])[0]
+        forces = -(mass @ a + h) + torques @ np.array(joints)
+        held = admissible(system, np.vstack([system.jacobian(q), joints[0], joints[2]]))
+        stiffness = held.T @ (stiffness_diagonal(system)[:, None] * held)
+        expected = held @ np.linalg.solve(stiffness, held.T @ forces)
+        check_deflections(system, found[k], expected)
+
+
+def test_deflections_of_the_end_effector_are_balanced_by_free_motion(task):
+    """The sum over all modes but the two that are free."""
+    system, planned = task.system, PlannedDeflections(task)
+    q = undeformed_at(system, task.motion, planned.samples[3])[0]
+    free = admissible(system, system.jacobian(q))
+    mass, stiffness = sparse_mass(system, q).toarray(), np.diag(stiffness_diagonal(system))
+    squares, shapes = scipy.linalg.eigh(free.T @ stiffness @ free, free.T @ mass @ free)
+    elastic = free @ shapes[:, 2:]
+    row = marker_place(system, system.marker(task.mechanism.end_effector.point), q[None])[1][0, 0]
+    found = planned.of_end_effector()
+    expected = elastic @ ((elastic.T @ row) / squares[2:])
+    check_deflections(system, found[6], expected)
+    # Of its inertia the second power of the squares, as large as a vibration of that shape would make it.
+    square = expected @ stiffness @ expected / (expected @ mass @ expected)
+    check_deflections(system, found[24 + 6], square * elastic @ ((elastic.T @ row) / squares[2:] ** 2))
+
+
+def test_of_two_directions_the_one_with_more_strain_energy_is_kept(task):
+    """Deflections of known energies in single modes: the order of the energies is the order in which they are kept."""
+    system = task.system
+    link, other = system.body("link1"), system.body("link4")
+    deflections = np.zeros((3, system.n))
+    for k, (body, mode, energy) in enumerate([(link, 2, 9.0), (other, 0, 4.0), (link, 5, 1.0)]):
+        deflections[k, body.offset + 3 + mode] = np.sqrt(energy) / body.modes.omega[mode]
+    kept = {name: np.array(rows) for name, rows in bases_of(system, [deflections], 2).items()}
+    assert {name: rows.shape[1] for name, rows in kept.items() if rows.size} == {"link1": 1, "link4": 1}
+    for body, mode in ((link, 2), (other, 0)):
+        shape = kept[body.name][:, 0]
+        assert np.abs(shape / np.linalg.norm(shape)) == pytest.approx(
+            np.abs(body.modes.vectors[:, mode] / np.linalg.norm(body.modes.vectors[:, mode])), abs=1e-9
+        )
+
+
+def test_all_coordinates_are_the_whole_mechanism(arm, task, full):
+    rng = np.random.default_rng(3)
+    system = task.system
+    whole = replace(arm, bases=bases_of(system, [rng.standard_normal((40, system.n))], system.n_flexible))
+    assert [body.nf for body in build_system(whole).bodies] == [body.nf for body in system.bodies]
+    run = task.remodelled(whole).simulate("++++", warning=False)
+    errors = [pf.tracking_dataset([one])["tracking_rms"].item() for one in (run, full["++++"])]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-3)
+
+
+# --- How far off runs are ---------------------------------------------------------------------------------------------
+
+
+def test_sixteen_coordinates_of_raparm_i(task):
+    data = study(task, pf.reduced_mechanism(task, 16, modes=MODES), MODES).data
+    sizes = [
+        data.attrs[name] for name in ("flexible_coordinates", "states", "full_flexible_coordinates", "full_states")
+    ]
+    assert sizes == [16, 36, 90, 184]
+    for mode, far in zip(MODES, (2e-5, 5e-6, 2e-5, 5e-6, 5e-6, 2e-6), strict=True):
+        error, distance = off(data, mode)
+        assert abs(error) < far
+        assert distance < 0.05
+        # Steps and coordinates are fewer; times depend on the machine, what is done does not.
+        assert data["steps"].sel(mode=mode) < 0.8 * data["full_steps"].sel(mode=mode)
+    assert not [code for code in codes(data) if code == "reduced-too-far"]
+
+
+def codes(data):
+    return [one["code"] for one in json.loads(data.attrs["findings"])]
+
+
+def test_so_it_is_by_proper_orthogonal_decomposition_of_a_run(task, full):
+    data = study(task, pf.reduced_mechanism(full["++++"], 16), ["++++"]).data
+    error, distance = off(data, "++++")
+    assert abs(error) < 2e-6
+    assert distance < 0.02
+
+
+def test_more_coordinates_are_nearer_and_too_few_are_said(task, full):
+    errors = []
+    for count in (4, 14, 24):
+        data = study(task, pf.reduced_mechanism(full["++++"], count), ["++++"]).data
+        errors.append(off(data, "++++")[1])
+        assert ("reduced-too-far" in codes(data)) is (errors[-1] > 0.1)
+    assert errors[0] > 0.1 > errors[1] > 3.0 * errors[2]
+
+
+def test_beams_of_the_paper_too(tmp_path):
+    model = pf.load("raparm_i")
+    task = pf.plan(model, "square", duration=0.7)
+    data = study(task, pf.reduced_mechanism(task, 16, modes=["++++"]), ["++++"]).data
+    assert abs(off(data, "++++")[0]) < 5e-6
+
+
+def test_beams_in_several_frames_are_reduced_part_by_part():
+    arm = pf.load("five_bar").mechanism
+    task = pf.plan(arm.with_bodies(replace(body, frames=2) for body in arm.bodies), pf.load("five_bar").paths["line"])
+    few = pf.reduced_mechanism(task, 10)
+    assert set(few.bases) == {body.name for body in task.system.bodies}
+    data = study(task, few, ["++"]).data
+    assert off(data, "++")[1] < 0.1
+
+
+def test_the_nearest_state_of_few_coordinates():
+    model = pf.load("slider_crank_flexible")
+    run = pf.simulate_motion(model, 0.02, samples=21, warning=False)
+    few = build_system(pf.reduced_mechanism(run, 2))
+    start = State(0.0, run.solution.q[0], run.solution.v[0])
+    near = nearest_state(few, run.system, start)
+    phi, rate = few.constraints(*signals_at(few), near.q, near.v)
+    assert few.gap(phi) < 1e-9
+    assert np.max(np.abs(rate)) < 1e-9
+    # Of all coordinates it is the state itself.
+    same = nearest_state(run.system, run.system, start)
+    np.testing.assert_allclose(same.q, start.q, atol=1e-12)
+
+
+def signals_at(system):
+    from paraflex.dynamics.signals import moment_signals
+
+    return moment_signals(system.mechanism, 0.0), 0.0
+
+
+# --- The command, files and studies -----------------------------------------------------------------------------------
+
+
+def test_the_command_says_how_far_off_it_is(tmp_path):
+    done = paraflex("run", "five_bar", "--reduced", "14", "--out", "r", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "14 of 52 flexible coordinates, 32 of 108 states" in " ".join(done.stdout.split())
+    numbers = json.loads((tmp_path / "r" / "summary.json").read_text())["modes"]["++"]
+    data = load_results(tmp_path / "r" / "results.nc").sel(mode="++")
+    reduction = numbers["reduction"]
+    assert reduction["distance"] == data["reduction_distance"].item() < 0.05 * numbers["tracking_rms_motion"]
+    assert reduction["full_tracking_rms_motion"] == pytest.approx(numbers["tracking_rms_motion"], rel=0.02)
+    assert (reduction["flexible_coordinates"], reduction["full_flexible_coordinates"]) == (14, 52)
+    page = (tmp_path / "r" / "report.html").read_text()
+    assert "Reduced bodies" in page
+    assert "--reduced 14" in page
+
+
+def test_a_motion_without_a_path_takes_what_its_own_run_shows(tmp_path):
+    done = paraflex("run", "slider_crank_flexible", "--reduced", "2", "--out", "r", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    numbers = json.loads((tmp_path / "r" / "summary.json").read_text())
+    assert numbers["reduction"]["distance"] < 5e-6
+    assert (numbers["reduction"]["states"], numbers["reduction"]["full_states"]) == (4, 8)
+    assert "2 of 4 flexible coordinates, 4 of 8 states: points are up to" in done.stdout
+    assert "Reduced bodies" in (tmp_path / "r" / "report.html").read_text()
+
+
+@pytest.fixture(scope="module")
+def reduced_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("reduced")
+    text = pf.library.text("five_bar").replace("[study]", "[study]\nreduced = 10", 1)
+    (folder / "few.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
+def test_a_study_may_say_it(reduced_file):
+    done = paraflex("run", "few.toml", "--json", "--no-report", "--out", "a", cwd=reduced_file)
+    assert json.loads(done.stdout)["modes"]["++"]["reduction"]["flexible_coordinates"] == 10
+    done = paraflex("run", "few.toml", "--reduced", "0", "--json", "--no-report", "--out", "b", cwd=reduced_file)
+    assert "reduction" not in json.loads(done.stdout)["modes"]["++"]
+
+
+def test_sweeps_take_few_coordinates_anew_for_each_design(reduced_file):
+    sweep = 'mechanism = "{}"\npaths = ["line"]\nmetrics = ["tracking_rms"]\n[vary.thickness]\n' \
+            'fields = ["section.bar.thickness"]\nvalues = [0.004, 0.006]\n'  # fmt: skip
+    errors = []
+    for name in ("few.toml", "five_bar"):
+        file = reduced_file / f"sweep_{name}.toml"
+        file.write_text(sweep.format(name), encoding="utf-8")
+        table = pf.sweep(file, reduced_file / f"out_{name}", workers=1).data
+        assert set(table["status"].values.ravel()) == {"complete"}
+        errors.append(table["tracking_rms"].values.ravel())
+    assert errors[0] == pytest.approx(errors[1], rel=0.02)
+    assert not np.array_equal(*errors)
+
+
+def refusal(folder, *words):
+    done = paraflex(*words, "--out", "no", cwd=folder)
+    assert done.returncode == 2
+    assert not (folder / "no").exists()
+    (line,) = done.stderr.splitlines()
+    return line
+
+
+def test_what_cannot_be_reduced_is_said_in_a_line(tmp_path, reduced_file, task, full):
+    assert refusal(tmp_path, "run", "five_bar", "--reduced", "53").endswith(
+        "--reduced: no such number of flexible coordinates (got 53); from 1 to 52"
+    )
+    assert "--reduced: means nothing with --rigid" in refusal(tmp_path, "run", "--rigid", "--reduced", "4")
+    assert "--reduced: has rigid bodies only" in refusal(tmp_path, "run", "slider_crank", "--reduced", "4")
+    text = (reduced_file / "few.toml").read_text().replace("reduced = 10", "reduced = -1")
+    (tmp_path / "bad.toml").write_text(text)
+    assert "study.reduced: no such number of flexible coordinates (got -1)" in refusal(tmp_path, "run", "bad.toml")
+    derived = 'mechanism = "few.toml"\npaths = ["line"]\nmetrics = ["tracking_rms"]\n[vary.thickness]\n' \
+              'fields = ["section.bar.thickness"]\n'  # fmt: skip
+    (reduced_file / "derived.toml").write_text(derived)
+    with pytest.raises(InputError, match=r"study.reduced: derivatives are of runs with all .*craig-bampton"):
+        pf.sensitivities(reduced_file / "derived.toml")
+    with pytest.raises(InputError, match="are not of one mechanism"):
+        pf.reduced_mechanism([full["++++"], pf.load("five_bar").plan().simulate("++", warning=False)])
+    with pytest.raises(InputError, match="modes: are those of the runs"):
+        pf.reduced_mechanism(full["++++"], modes=["++++"])
+    few = pf.reduced_mechanism(task, 16, modes=["++++"])
+    with pytest.raises(InputError, match=r"bases: .* say reduced = N in its \[study\]"):
+        few.save(tmp_path / "few.toml")
+    with pytest.raises(InputError, match=r"bases\.link1: has shapes in 13 coordinates, and the body 25"):
+        build_system(few.with_beams(elements=6))
+
+
+def test_a_sweep_of_a_motion_without_a_path_cannot_choose(tmp_path):
+    text = pf.library.text("slider_crank_flexible").replace("[study]", "[study]\nreduced = 2", 1)
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "sweep.toml").write_text(
+        'mechanism = "own.toml"\nmetrics = ["joint_force_max"]\n[vary.width]\nfields = ["parameters.width"]\n'
+        "values = [0.008]\n"
+    )
+    with pytest.raises(
+        InputError, match=r"study\.reduced: few flexible coordinates are chosen from the plan of a path"
+    ):
+        pf.sweep(tmp_path / "sweep.toml", tmp_path / "out")
