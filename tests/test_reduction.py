@@ -153,7 +153,7 @@ def test_static_shapes_carry_moments_and_forces_exactly(reference):
 
 
 def test_coordinates_that_are_kept_of_the_links_of_raparm_i():
-    """Of each bar two static shapes in bending, as lumps turn at both ends, and its stretch; three more at a third pin."""
+    """Of each bar two static shapes in bending, as lumps turn at both ends, and its stretch; more at a third pin."""
     system = build_system(with_static_shapes(raparm_i(), 1))
     assert [body.nf for body in system.bodies] == [4, 4, 4, 7, 4, 4, 4, 7]
 

@@ -25,6 +25,7 @@ PACKAGES = (
     "motion",
     "validity",
     "elastodynamics",
+    "reduction",
     "linear",
     "equilibria",
     "integrators.methods",

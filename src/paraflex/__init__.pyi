@@ -87,8 +87,6 @@ from .linear import (
     ReducedModel as ReducedModel,
     states_needed as states_needed,
 )
-
-# Reduced bodies
 from .reduction import reduced_mechanism as reduced_mechanism
 
 # Statics

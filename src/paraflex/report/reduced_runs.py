@@ -31,9 +31,10 @@ def reduction_tables(data: xr.Dataset) -> list[tuple[str, str]]:
     names = names_of(runs, "mode") if along else ["run"]
     rows = [(name, [number(float(cell)) for cell in cells]) for name, *cells in zip(names, *columns, strict=True)]
     kept, whole = ({name: data.attrs[prefix + name] for name in Size._fields} for prefix in ("", FULL))
+    whose = "the end-effector" if along else "a named point"
     note = (
         f"{kept['flexible_coordinates']} of {whole['flexible_coordinates']} flexible coordinates, {kept['states']} of "
-        f"{whole['states']} states. Distance: of a named point from its place with all of them."
+        f"{whole['states']} states. Distance: of {whose} from its place with all of them."
     )
     selects = {name: r for r, name in enumerate(names)} if along else None
     page = table(heads, rows, caption="Beside runs with all flexible coordinates", note=note, runs=selects)

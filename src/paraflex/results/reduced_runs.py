@@ -45,10 +45,13 @@ def beside_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> 
     kept, whole : Size
         Of the reduced and of the full system.
     """
-    places = full["point_position"].reindex_like(data["point_position"])
-    squares: xr.DataArray = ((data["point_position"] - places) ** 2).sum("axis", skipna=False).max(["time", "point"])
-    apart = squares**0.5
-    apart.attrs = {"long_name": "largest distance of a named point from its place in the full run", "units": "m"}
+    # Along a path it is the end-effector that matters, else any named point.
+    along = "end_effector" in data
+    places, exact = (one["end_effector" if along else "point_position"] for one in (data, full))
+    squares = ((places - exact.reindex_like(places)) ** 2).sum("axis", skipna=False)
+    apart: xr.DataArray = squares.max(["time"] if along else ["time", "point"]) ** 0.5
+    whose = "the end-effector" if along else "a named point"
+    apart.attrs = {"long_name": f"largest distance of {whose} from its place in the full run", "units": "m"}
     added = {DISTANCE: apart}
     for name in _NUMBERS:
         if name in full and name in data:
@@ -71,10 +74,10 @@ def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
         distance = float(run[DISTANCE])
         if distance > _FAR * size:
             kept, whole = data.attrs["flexible_coordinates"], data.attrs[f"{FULL}flexible_coordinates"]
-            what = "its tracking error" if along else "the largest deflection"
+            what, whose = ("its tracking error", "the end-effector") if along else ("the largest deflection", "a point")
             yield Finding(
                 "reduced-too-far", f"{MODE}{mode}" if along else "study.reduced",
-                f"with {kept} flexible coordinates a point is up to {distance:.2g} m from its place with all {whole}, "
+                f"with {kept} flexible coordinates {whose} is up to {distance:.2g} m from its place with all {whole}, "
                 f"{100.0 * distance / size:.0f} % of {what}", "keep more of them",
             )  # fmt: skip
 
