@@ -29,7 +29,7 @@ import numpy as np
 
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
-from paraflex.dynamics.held import held_modes, place_rows, slope_row
+from paraflex.dynamics.held import held_modes, place_rows, slope_rows
 from paraflex.mechanism import GROUND, Damping, Joint, Mechanism, PointRef, RigidBody, stiffness_proportional
 
 # An entry of the damping matrix below this fraction of the damping of its two modes is rounding.
@@ -90,7 +90,7 @@ def _conditions(
             marker = make_marker(mechanism, bodies, index, here)
             turns_with, along_itself = "angle" in joint.holds, _along_itself(joint, here)
             if turns_with or (joint.name in driven and not joint.slides):
-                yield slope_row(marker)
+                yield from slope_rows(marker)
             if "points" in joint.holds or (joint.slides and joint.name in driven and not along_itself):
                 pinned.append(marker)
             elif joint.slides and turns_with:

@@ -21,9 +21,9 @@ def place_rows(marker: Marker) -> Numbers:
     return np.hstack([np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]), marker.N])
 
 
-def slope_row(marker: Marker) -> Numbers:
-    """Derivative of the turn of a marker's material by (r, phi, u), (3 + nf,)."""
-    return np.concatenate([[0.0, 0.0, 1.0], marker.slope])
+def slope_rows(marker: Marker) -> Numbers:
+    """Derivative of the turn of a marker's material by (r, phi, u), (1, 3 + nf)."""
+    return np.concatenate([[0.0, 0.0, 1.0], marker.slope])[None]
 
 
 def held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]:

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from enum import Enum
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from paraflex.arrays import Numbers
 from paraflex.dynamics.constraints import Constraint
-from paraflex.dynamics.coordinates import BodyCoordinates, make_marker
-from paraflex.dynamics.held import place_rows, slope_row
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
+from paraflex.dynamics.held import place_rows, slope_rows
 from paraflex.errors import InputError
 from paraflex.kernel.packed import ANGLE, POINT
 from paraflex.mechanism import AppliedTorque, BodyReduction, FlexibleBeam, Mechanism, PointRef
 
-
-class Acting(Enum):
-    """What acts at a point: forces, at its place, or moments, at its turn."""
-
-    FORCE = "force"
-    MOMENT = "moment"
+Rows = Callable[[Marker], Numbers]
 
 
 def interface_rows(
@@ -39,44 +33,44 @@ def interface_rows(
     InputError
         Something slides along the body: it acts everywhere.
     """
-    acting = dict.fromkeys((ref.point, what) for ref, what in _acting(mechanism, constraints) if ref.body == name)
+    acting = dict.fromkeys((ref.point, rows) for ref, rows in _acting(mechanism, constraints) if ref.body == name)
     index = {body.name: i for i, body in enumerate(bodies)}
     rows = [np.zeros((0, 3 + bodies[index[name]].nf))]
-    for point, what in acting:
-        marker = make_marker(mechanism, tuple(bodies), index, PointRef(name, point))
-        rows.append(place_rows(marker) if what is Acting.FORCE else slope_row(marker)[None])
+    for point, of_marker in acting:
+        rows.append(of_marker(make_marker(mechanism, tuple(bodies), index, PointRef(name, point))))
     return np.concatenate(rows)
 
 
-def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator[tuple[PointRef, Acting]]:
+def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator[tuple[PointRef, Rows]]:
+    """Points, and rows of what works there: forces on their places, moments on their turns."""
     for term in (term for constraint in constraints for term in constraint.terms):
         if term.carrier != "material":
             _refuse_sliding(mechanism, term.a)
         if term.kind != ANGLE:
-            yield from ((term.a, Acting.FORCE), (term.b, Acting.FORCE))
+            yield from ((term.a, place_rows), (term.b, place_rows))
         # What slides along an axis pushes beside the point that carries it.
         if term.kind != POINT:
-            yield term.a, Acting.MOMENT
+            yield term.a, slope_rows
         if term.kind == ANGLE:
-            yield term.b, Acting.MOMENT
+            yield term.b, slope_rows
     for motor in mechanism.motors:
         joint = mechanism.joint(motor.joint)
         for ref in (joint.a, joint.b):
             if joint.slides:
-                yield ref, Acting.FORCE
+                yield ref, place_rows
             if not joint.slides or ref is joint.a:
-                yield ref, Acting.MOMENT
+                yield ref, slope_rows
     for load in mechanism.loads:
-        yield load.point, Acting.MOMENT if isinstance(load, AppliedTorque) else Acting.FORCE
+        yield load.point, slope_rows if isinstance(load, AppliedTorque) else place_rows
     for spring in mechanism.linear_springs:
-        yield from ((spring.a, Acting.FORCE), (spring.b, Acting.FORCE))
+        yield from ((spring.a, place_rows), (spring.b, place_rows))
     for body in mechanism.bodies:
         for lump in body.lumps if isinstance(body, FlexibleBeam) else ():
-            yield PointRef(body.name, lump.point), Acting.FORCE
+            yield PointRef(body.name, lump.point), place_rows
             if lump.inertia > 0.0:
-                yield PointRef(body.name, lump.point), Acting.MOMENT
+                yield PointRef(body.name, lump.point), slope_rows
     if mechanism.end_effector is not None:
-        yield mechanism.end_effector.point, Acting.FORCE
+        yield mechanism.end_effector.point, place_rows
 
 
 def _refuse_sliding(mechanism: Mechanism, ref: PointRef) -> None:
