@@ -13,7 +13,7 @@ from __future__ import annotations
 from math import sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
-from paraflex.kernel.compiling import routine
+from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.linear import solve_system
 from paraflex.kernel.metric import mass_norm
@@ -25,6 +25,7 @@ from paraflex.kernel.run_state import (
     NEAR,
     PASSAGES,
     ROOT,
+    ROOT_B,
     ROOT_RATE,
     ROOT_STEP,
     STEPS,
@@ -50,18 +51,34 @@ SAME_POSITION = 2.0
 FAR = 10.0
 
 
+@inlined
+def elastic_measure_changes(system, b, march):
+    """Whether a step of this b is the first after one of another, with links whose elasticity makes a difference."""
+    first = 0 <= march.counts[ROOT_STEP] < march.counts[STEPS]
+    return first and b != march.clock[ROOT_B] and system.modal.size > 0
+
+
 @routine
 def note_root(march, work):
-    """Note how near to dependence constraint rows are at the start of a step, and the rate of change."""
-    march.clock[WIDEST] = max(march.clock[WIDEST], work.least[0])
+    """Note how near to dependence constraint rows are at the start of a step, and the rate of change.
+
+    Steps of other lengths have another measure, M + b K: where rows are independent by elasticity alone, less is left
+    of them the longer the step is. What changes with b in one pose is no approach to a singular position.
+    """
+    root, change, b = sqrt(max(work.least[0], 0.0)), 0.0, work.step[0]
     if march.counts[ROOT_STEP] == march.counts[STEPS]:
+        before = abs(march.clock[ROOT])
+        if b != march.clock[ROOT_B] and before > 0.0:
+            march.clock[WIDEST] = min(1.0, march.clock[WIDEST] * (root / before) ** 2)
+            march.clock[ROOT] *= root / before
+            march.clock[ROOT_B] = b
         return
-    root, change = sqrt(max(work.least[0], 0.0)), 0.0
     if march.counts[ROOT_STEP] >= 0:
         change = (root - march.clock[ROOT]) / march.clock[LAST_STEP]
     size = max(abs(change), FORGETTING * abs(march.clock[ROOT_RATE]))
     march.clock[ROOT_RATE] = size if change > 0.0 else -size
-    march.clock[ROOT], march.counts[ROOT_STEP] = root, march.counts[STEPS]
+    march.clock[ROOT], march.counts[ROOT_STEP], march.clock[ROOT_B] = root, march.counts[STEPS], b
+    march.clock[WIDEST] = max(march.clock[WIDEST], work.least[0])
 
 
 @routine

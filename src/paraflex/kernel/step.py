@@ -22,6 +22,7 @@ from paraflex.kernel.near import (
     NEAR_PART,
     begin_near,
     comes_near,
+    elastic_measure_changes,
     note_passage,
     note_position,
     note_root,
@@ -189,6 +190,10 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         x, g, b = newmark_start(tableau.newmark, t, h, march)
     fresh = march.clock[FACTOR_B] != b
     if fresh:
+        if elastic_measure_changes(system, b, march):
+            # How near rows are to dependence is compared with the last step by that step's matrix.
+            orient(system, march.q, work, controls.dependent_part)
+            note_root(march, work)
         renew_factor(system, b, march, work)
     rubs = note_friction(system, march.q, march.v, work.mu, work.compliance)
     orient(system, march.q, work, controls.dependent_part)
