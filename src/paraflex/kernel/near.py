@@ -53,7 +53,7 @@ FAR = 10.0
 
 @inlined
 def elastic_measure_changes(system, b, march):
-    """Whether a step of this b is the first after one of another, with links whose elasticity makes a difference."""
+    """Whether this is the first attempt of a step whose b is not the last one's, in a mechanism with elastic links."""
     first = 0 <= march.counts[ROOT_STEP] < march.counts[STEPS]
     return first and b != march.clock[ROOT_B] and system.modal.size > 0
 
@@ -62,8 +62,8 @@ def elastic_measure_changes(system, b, march):
 def note_root(march, work):
     """Note how near to dependence constraint rows are at the start of a step, and the rate of change.
 
-    Steps of other lengths have another measure, M + b K: where rows are independent by elasticity alone, less is left
-    of them the longer the step is. What changes with b in one pose is no approach to a singular position.
+    Both are in the metric M + b K of a step. Where welds are redundant but for elasticity the root falls with longer
+    steps: what changes with b at one pose is no approach to a singular position, and rescales what is compared with it.
     """
     root, change, b = sqrt(max(work.least[0], 0.0)), 0.0, work.step[0]
     if march.counts[ROOT_STEP] == march.counts[STEPS]:

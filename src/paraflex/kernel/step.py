@@ -191,7 +191,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
     fresh = march.clock[FACTOR_B] != b
     if fresh:
         if elastic_measure_changes(system, b, march):
-            # How near rows are to dependence is compared with the last step by that step's matrix.
+            # The rate at which rows come near to dependence is that between matrices of one b, the last step's.
             orient(system, march.q, work, controls.dependent_part)
             note_root(march, work)
         renew_factor(system, b, march, work)
