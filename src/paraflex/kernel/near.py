@@ -59,7 +59,7 @@ def elastic_measure_changes(system, b, march):
 
 
 @routine
-def note_root(march, work):
+def note_root(system, march, work):
     """Note how near to dependence constraint rows are at the start of a step, and the rate of change.
 
     Both are in the metric M + b K of a step. Where welds are redundant but for elasticity the root falls with longer
@@ -68,8 +68,9 @@ def note_root(march, work):
     root, change, b = sqrt(max(work.least[0], 0.0)), 0.0, work.step[0]
     if march.counts[ROOT_STEP] == march.counts[STEPS]:
         before = abs(march.clock[ROOT])
-        if b != march.clock[ROOT_B] and before > 0.0:
-            march.clock[WIDEST] = min(1.0, march.clock[WIDEST] * (root / before) ** 2)
+        if system.modal.size > 0 and b != march.clock[ROOT_B] and before > 0.0:
+            widest = march.clock[WIDEST] * (root / before) ** 2
+            march.clock[WIDEST] = max(work.least[0], min(1.0, widest))
             march.clock[ROOT] *= root / before
             march.clock[ROOT_B] = b
         return
