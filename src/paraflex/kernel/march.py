@@ -64,6 +64,8 @@ ENTRY = 100.0
 LEAST_PACE = 3e-3
 # There a step with an error so small, as part of what is allowed, may be twice as long.
 GROWING = 0.05
+# Steps grow no further where elasticity alone leaves less than this of a row's square: rounding would hide it.
+LEAST_PART = 1e-11
 # A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
 SMALLEST_PART = 1e-4
 
@@ -307,7 +309,8 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
             march.clock[LAST_ERROR] = error
             # Keep the step, and with it the factor, unless the change is worth it; a step cut short to land on a stop
             # says nothing about longer ones.
-            if factor < KEEP_ABOVE or (factor > KEEP_BELOW and h >= march.clock[STEP] and not after_failure):
+            grows = h >= march.clock[STEP] and not after_failure and work.least[0] > LEAST_PART
+            if factor < KEEP_ABOVE or (factor > KEEP_BELOW and grows):
                 march.clock[STEP] = factor * h
             continue
         march.counts[REJECTED] += 1

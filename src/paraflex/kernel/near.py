@@ -13,7 +13,7 @@ from __future__ import annotations
 from math import sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
-from paraflex.kernel.compiling import routine
+from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.linear import solve_system
 from paraflex.kernel.metric import mass_norm
@@ -25,6 +25,7 @@ from paraflex.kernel.run_state import (
     NEAR,
     PASSAGES,
     ROOT,
+    ROOT_B,
     ROOT_RATE,
     ROOT_STEP,
     STEPS,
@@ -50,18 +51,35 @@ SAME_POSITION = 2.0
 FAR = 10.0
 
 
+@inlined
+def elastic_measure_changes(system, b, march):
+    """Whether this is the first attempt of a step whose b is not the last one's, in a mechanism with elastic links."""
+    first = 0 <= march.counts[ROOT_STEP] < march.counts[STEPS]
+    return first and b != march.clock[ROOT_B] and system.modal.size > 0
+
+
 @routine
-def note_root(march, work):
-    """Note how near to dependence constraint rows are at the start of a step, and the rate of change."""
-    march.clock[WIDEST] = max(march.clock[WIDEST], work.least[0])
+def note_root(system, march, work):
+    """Note how near to dependence constraint rows are at the start of a step, and the rate of change.
+
+    Both are in the metric M + b K of a step. Where welds are redundant but for elasticity the root falls with longer
+    steps: what changes with b at one pose is no approach to a singular position, and rescales what is compared with it.
+    """
+    root, change, b = sqrt(max(work.least[0], 0.0)), 0.0, work.step[0]
     if march.counts[ROOT_STEP] == march.counts[STEPS]:
+        before = abs(march.clock[ROOT])
+        if system.modal.size > 0 and b != march.clock[ROOT_B] and before > 0.0:
+            widest = march.clock[WIDEST] * (root / before) ** 2
+            march.clock[WIDEST] = max(work.least[0], min(1.0, widest))
+            march.clock[ROOT] *= root / before
+            march.clock[ROOT_B] = b
         return
-    root, change = sqrt(max(work.least[0], 0.0)), 0.0
     if march.counts[ROOT_STEP] >= 0:
         change = (root - march.clock[ROOT]) / march.clock[LAST_STEP]
     size = max(abs(change), FORGETTING * abs(march.clock[ROOT_RATE]))
     march.clock[ROOT_RATE] = size if change > 0.0 else -size
-    march.clock[ROOT], march.counts[ROOT_STEP] = root, march.counts[STEPS]
+    march.clock[ROOT], march.counts[ROOT_STEP], march.clock[ROOT_B] = root, march.counts[STEPS], b
+    march.clock[WIDEST] = max(march.clock[WIDEST], work.least[0])
 
 
 @routine

@@ -24,6 +24,8 @@ PART_END, PART = range(15, 17)
 # and of the row nearest to dependence: the root of the part of its square left, how fast that changes [1/s], and the
 # largest part so far.
 ROOT, ROOT_RATE, WIDEST = range(12, 15)
+# and the b of the iteration matrix that root and the largest part are in.
+ROOT_B = 17
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
 # and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
@@ -129,7 +131,7 @@ def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGA
     """Allocate the state of a run with n coordinates and m constraint rows."""
     stage_v = apart((stages, n))
     return March(
-        clock=apart(17),
+        clock=apart(18),
         counts=apart(17, np.int64),
         q=apart(n),
         v=apart(n),

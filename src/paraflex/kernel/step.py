@@ -22,6 +22,7 @@ from paraflex.kernel.near import (
     NEAR_PART,
     begin_near,
     comes_near,
+    elastic_measure_changes,
     note_passage,
     note_position,
     note_root,
@@ -189,11 +190,15 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         x, g, b = newmark_start(tableau.newmark, t, h, march)
     fresh = march.clock[FACTOR_B] != b
     if fresh:
+        if elastic_measure_changes(system, b, march):
+            # The rate at which rows come near to dependence is that between matrices of one b, the last step's.
+            orient(system, march.q, work, controls.dependent_part)
+            note_root(system, march, work)
         renew_factor(system, b, march, work)
     rubs = note_friction(system, march.q, march.v, work.mu, work.compliance)
     orient(system, march.q, work, controls.dependent_part)
     at_singular = work.least[0] < SINGULAR_PART
-    note_root(march, work)
+    note_root(system, march, work)
     perhaps_near = work.least[0] < NEAR_PART * march.clock[WIDEST] and march.counts[PREPARED] >= 0
     march.counts[NEAR], march.counts[HELD_END] = 0, 0
     if perhaps_near and comes_near(h, march):

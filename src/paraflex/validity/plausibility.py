@@ -190,8 +190,8 @@ def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[F
         yield Finding(
             "energy-unbalanced", where.place,
             f"energy and work do not balance: {100.0 * solution.energy_balance_max / largest:.2g} % of the largest "
-            "energy is missing or too much, so that vibrations of stiff links, and stresses, are wrong",
-            "give a smaller tolerance, or another method (esdirk4, tr-bdf2); damping of the material helps",
+            "energy is missing or too much, and motion and stresses may be as far off",
+            "give a smaller tolerance; damping of the material helps where stiff links vibrate",
         )  # fmt: skip
 
 
