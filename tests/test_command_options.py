@@ -121,8 +121,8 @@ def test_every_option_of_a_run_is_in_the_command_that_repeats_it_or_shows_result
     run = {
         "set": {"a.b": 1.0}, "mechanism": "five_bar",
         "path": "line", "modes": ["++++"], "duration": 1.0, "samples": 3, "tolerance": 1e-6,
-        "method": "bdf2", "step": 0.1, "constraints": "baumgarte", "alpha": 1.0, "beta": 2.0, "segments": 3, "reduced": 4,
-        "reference": "free", "curvature": "shared", "after": "hold", "assembly": "start", "max_steps": 7,
+        "method": "bdf2", "step": 0.1, "constraints": "baumgarte", "alpha": 1.0, "beta": 2.0, "segments": 3,
+        "reduced": 4, "reference": "free", "curvature": "shared", "after": "hold", "assembly": "start", "max_steps": 7,
         "method_parameters": {"a": 1.0}, "rigid": True, "ked": True, "balanced": True, "stop_at": ["singular=0.1"],
     }  # fmt: skip
     lines = " ".join(

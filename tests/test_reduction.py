@@ -194,3 +194,13 @@ def test_what_cannot_be_reduced_is_said():
     lever = replace(lever, bodies=(*lever.bodies, carriage), joints=(*lever.joints, sliding), assemblies=pose)
     with pytest.raises(InputError, match=r"body\.beam\.reduction: something slides along it"):
         build_system(with_static_shapes(lever, 1))
+
+
+def test_runs_complain_too():
+    model = pf.load("spin_up")
+    reduced = replace(model, mechanism=model.mechanism.with_beams(reference=PINNED, modes=2))
+    with pytest.warns(pf.ResultWarning, match=r"body\.beam\.modes: 2 modes miss 24 % .*craig-bampton"):
+        run = pf.simulate_motion(reduced, 0.1, samples=11)
+    assert "modes-too-stiff" in [one.code for one in run.doubts]
+    sound = pf.simulate_motion(replace(model, mechanism=with_static_shapes(model.mechanism, 2)), 0.1, samples=11)
+    assert "modes-too-stiff" not in [one.code for one in sound.doubts]

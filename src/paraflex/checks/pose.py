@@ -17,7 +17,6 @@ from paraflex.dynamics import (
     System,
     build_system,
     closure_of,
-    missed_turns,
     mobility,
     natural_frequencies,
     reach,
@@ -29,6 +28,7 @@ from paraflex.findings import Finding
 from paraflex.limits import OUT_OF_PROPORTION
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.poses import approximate_poses
+from paraflex.validity import stiff_modes
 
 # A body that closing the loops turned further than this had another angle in mind, or another elbow [rad].
 FAR_TURN = 0.5
@@ -108,7 +108,7 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
         yield from _mobility(seen.mobility, seen.reach)
         if seen.reach.all_motors < seen.mobility.freedoms and seen.chosen is not None and seen.chosen.state is not None:
             yield from loose_points(seen.rigid, seen.chosen.state.q)
-    yield from _reduced(seen.system)
+    yield from stiff_modes(seen.system)
     if seen.chosen is not None and seen.chosen.state is not None:
         yield from axes_along_beams(seen.system.described, seen.rigid, seen.chosen.state.q)
     yield from _vibration(seen, at_rest)
@@ -154,17 +154,6 @@ def _mobility(free: Mobility, drives: Reach) -> Iterator[Finding]:
                 "mode-short", f"mode.{name}", f"it reaches {reached} of {drives.freedoms} degrees of freedom",
                 "add motors to the mode",
             )  # fmt: skip
-
-
-def _reduced(system: System) -> Iterator[Finding]:
-    """Bodies whose modes kept cannot carry the moments that come in."""
-    for one in missed_turns(system):
-        yield Finding(
-            "modes-too-stiff", f"body.{one.point.body}.modes",
-            f"{one.modes} modes miss {100.0 * one.part:.0f} % of its turn under a moment at {one.point.point}, which "
-            f"{one.cause} brings in: it is too stiff there",
-            'say reduction = "craig-bampton" beside modes, or leave modes out',
-        )  # fmt: skip
 
 
 def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:

@@ -41,12 +41,22 @@ class MissedTurn(NamedTuple):
 
 
 def missed_turns(system: System) -> list[MissedTurn]:
-    """Points at which reduced bodies rotate by five per cent too little under a moment there, body by body."""
+    """Points at which reduced bodies rotate by five per cent too little under a moment there, body by body.
+
+    Coordinates that were chosen for a motion are judged by their runs.
+    """
     found: dict[PointRef, MissedTurn] = {}
     for point, cause in _moments(system.mechanism):
         described = system.mechanism.body(point.body)
         body = system.body(point.body)
-        if isinstance(described, RigidBody) or not body.nf or body.nf == body.shape.integrals.nf or point in found:
+        chosen = body.name in system.mechanism.bases
+        if (
+            isinstance(described, RigidBody)
+            or chosen
+            or not body.nf
+            or body.nf == body.shape.integrals.nf
+            or point in found
+        ):
             continue
         part = _missed(body, system, point)
         if part > _MISSED:

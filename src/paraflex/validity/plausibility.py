@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System
+from paraflex.dynamics import System, missed_turns
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
@@ -87,6 +87,17 @@ class _Where(NamedTuple):
         return most_likely(doubtful_numbers(self.mechanism), bodies)
 
 
+def stiff_modes(system: System) -> Iterator[Finding]:
+    """Bodies whose modes kept cannot carry the moments that come in."""
+    for one in missed_turns(system):
+        yield Finding(
+            "modes-too-stiff", f"body.{one.point.body}.modes",
+            f"{one.modes} modes miss {100.0 * one.part:.0f} % of its turn under a moment at {one.point.point}, which "
+            f"{one.cause} brings in: it is too stiff there",
+            'say reduction = "craig-bampton" beside modes, or leave modes out',
+        )  # fmt: skip
+
+
 def doubtful_results(
     system: System, solution: Solution, driven: Driven | None = None, mechanism: Mechanism | None = None
 ) -> list[Finding]:
@@ -112,6 +123,7 @@ def doubtful_results(
     mechanism = mechanism or system.described
     where = _Where("" if driven is None else f"mode {driven.mode}", mechanism)
     found = [
+        *stiff_modes(system),
         *_large_slopes(where, system, solution),
         *_overstressed(where, system, solution),
         *_unbalanced(where, system, solution),
