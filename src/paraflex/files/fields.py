@@ -206,13 +206,26 @@ def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
     if len(place) < 3 or {"angle", "displacement"} & set(place):
         return None
     table, owner, key = place[:3]
-    of_motor = (table, owner) == ("study", "torques")
+    if table == "statics" and owner in ("loads", "moved"):
+        return _moves_straight(data, str(key))
+    of_motor = table in ("study", "statics") and owner == "torques"
     name = _below(_below(data, "motor"), key) if of_motor else _below(_below(_below(data, table), owner), "joint")
+    return _joint_slides(data, name)
+
+
+def _joint_slides(data: Mapping[str, Any], name: Any) -> bool | None:
+    """Whether a joint slides; None where there is none of that name."""
     joint = _below(_below(data, "joint"), name) if isinstance(name, str) else None
     if joint is None:
         return None
     kind = JOINT_KINDS.get(str(_below(joint, "type")))
     return kind is not None and kind.slides
+
+
+def _moves_straight(data: Mapping[str, Any], coordinate: str) -> bool | None:
+    """Whether a coordinate of a joint or point is a length; None of an unknown name."""
+    point, _, axis = coordinate.rpartition(".")
+    return {"x": True, "y": True, "angle": False}.get(axis) if point else _joint_slides(data, coordinate)
 
 
 def is_table(annotation: Any) -> bool:
