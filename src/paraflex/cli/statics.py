@@ -16,7 +16,7 @@ from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import asked_model, of_assembly
 from paraflex.cli.statics_tables import print_statics
 from paraflex.equilibria import Statics, StaticsDefaults, statics
-from paraflex.equilibria.equations import coordinate_named
+from paraflex.equilibria.given import coordinate_named
 from paraflex.errors import AssemblyError, EquilibriumError, InputError
 from paraflex.files import Model
 from paraflex.files.fields import number_in

@@ -8,8 +8,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
-from paraflex.equilibria import StaticsDefaults
-from paraflex.equilibria.statics import conditions
+from paraflex.equilibria.given import StaticsDefaults, conditions
 from paraflex.errors import InputError, suggestion
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names

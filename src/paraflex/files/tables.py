@@ -9,7 +9,7 @@ from itertools import count
 from numbers import Integral
 from typing import Any
 
-from paraflex.equilibria import StaticsDefaults
+from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import InputError
 from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS

@@ -4,26 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from paraflex.arguments import checked_arguments
 from paraflex.dynamics import State, build_system, pose_at_rest
 from paraflex.equilibria.branch import Branch, Point
-from paraflex.equilibria.defaults import ModelWithStatics, StaticsDefaults
-from paraflex.equilibria.equations import Conditions, Coordinate, Equations, coordinate_named
+from paraflex.equilibria.equations import Equations
+from paraflex.equilibria.given import ModelWithStatics, StaticsDefaults, conditions
 from paraflex.equilibria.result import Equilibrium, Statics
 from paraflex.equilibria.stability import buckling as buckling_about, stiffness as stiffness_at, vibrations
-from paraflex.errors import EquilibriumError, InputError, ResultWarning
+from paraflex.errors import EquilibriumError, ResultWarning
 from paraflex.findings import warn_of
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, Start
-from paraflex.mechanism.quantities import known
 from paraflex.validity import warn
-
-# More steps are a finer figure than anyone looks at.
-_MOST_STEPS = 10_000
-# Higher buckling modes than these say nothing.
-_MOST_FACTORS = 20
 
 
 @checked_arguments()
@@ -134,58 +126,3 @@ def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibri
         point, vibration, buckling_about(equations, point, vibration, buckling),
         stiffness_at(equations, point.at, found, equations.given.measured),
     )  # fmt: skip
-
-
-def conditions(mechanism: Mechanism, asked: StaticsDefaults) -> Conditions:
-    """What is given, by coordinates of a mechanism.
-
-    Raises
-    ------
-    InputError
-        Unknown names, a coordinate given twice, numbers that make no sense.
-    """
-    _counted(asked.steps, 1, _MOST_STEPS, "steps", "steps")
-    _counted(asked.buckling, 0, _MOST_FACTORS, "buckling", "factors")
-    efforts = _efforts(mechanism, asked)
-    travels = {coordinate_named(mechanism, name, f"moved.{name}"): value for name, value in asked.moved.items()}
-    for one, value in travels.items():
-        _finite(value, f"moved.{one.name}", one.unit)
-    held = asked.held
-    if held is None:
-        given = {one.name for one in (*efforts, *travels)}
-        driven = [motor.joint for motor in mechanism.motors if motor.name not in asked.torques]
-        held = tuple(joint for joint in driven if joint not in given)
-    kept = tuple(dict.fromkeys(coordinate_named(mechanism, name, "held") for name in held))
-    for field, first, second in (("loads", efforts, travels), ("held", kept, travels), ("held", kept, efforts)):
-        for one in first:
-            if one in second:
-                raise InputError("is given twice: loaded, moved and held exclude one another", field=field,
-                                 value=one.name, remedy="leave it out of all but one")  # fmt: skip
-    wanted = [*travels, *efforts] if asked.stiffness is None else [
-        coordinate_named(mechanism, name, "stiffness") for name in asked.stiffness
-    ]  # fmt: skip
-    return Conditions(kept, travels, efforts, tuple(dict.fromkeys(wanted)))
-
-
-def _efforts(mechanism: Mechanism, asked: StaticsDefaults) -> dict[Coordinate, float]:
-    """Forces and torques at coordinates; a motor's is at its joint, and several there add up."""
-    joints = {motor.name: motor.joint for motor in mechanism.motors}
-    efforts: dict[Coordinate, float] = {}
-    for field, values in (("loads", asked.loads), ("torques", asked.torques)):
-        for name, value in values.items():
-            if field == "torques":
-                known(name, list(joints), field, "motor")
-            one = coordinate_named(mechanism, joints[name] if field == "torques" else name, f"{field}.{name}")
-            _finite(value, f"{field}.{name}", one.effort_unit)
-            efforts[one] = efforts.get(one, 0.0) + value
-    return efforts
-
-
-def _counted(number: int, least: int, most: int, field: str, what: str) -> None:
-    if not least <= number <= most:
-        raise InputError(f"no such number of {what}", field=field, value=number, remedy=f"choose one up to {most}")
-
-
-def _finite(value: float, field: str, unit: str) -> None:
-    if not np.isfinite(value):
-        raise InputError("not a finite number", field=field, value=value, remedy=f"give it in {unit}")
