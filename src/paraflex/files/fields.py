@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
 from paraflex.files.expressions import ExpressionError, evaluate, names_in
 from paraflex.mechanism import JOINT_KINDS
-from paraflex.units import FIELD_UNITS, PLAIN, Dimension, quantities_in, spelt, unit_named
+from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, quantities_in, spelt, unit_named
 
 # A place in parsed TOML: keys of tables and indices of lists.
 Place = tuple[str | int, ...]
@@ -24,8 +24,6 @@ _IN_UNITS = re.compile(rf"\bin ({_SI}(?:(?:,|,? (?:or|and)) {_SI})*)(?=[\s,.)]|$
 _AND = re.compile(r" and |, (?!or\b)")
 # Tables of numbers by names of the user's, and of values whose fields are those of another file.
 _OF_ANY_UNIT = ("parameters", "set")
-# What a spring's stiffness, a rest, a torque or a speed at a joint is where the joint slides.
-WHERE_IT_SLIDES = {"N m/rad": "N/m", "N m s/rad": "N s/m", "N m": "N", "rad": "m", "rad/s": "m/s"}
 _WHERE_IT_TURNS = {slides: turns for turns, slides in WHERE_IT_SLIDES.items()}
 
 
