@@ -105,6 +105,11 @@ def metrics_of(
     """
     for name in names:
         check_metric(name)
+        if name not in METRICS:
+            raise InputError(
+                f"a metric of each {metric_of(name).each or 'run'} is kept of all", field="metrics", value=name,
+                remedy=f'say "{metric_of(name).name}"',
+            )  # fmt: skip
         if runs not in METRICS[name].runs:
             raise InputError(
                 f"a metric of {' or '.join(_OF_RUNS[each] for each in METRICS[name].runs)}, not of "
