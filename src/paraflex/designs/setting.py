@@ -348,7 +348,8 @@ def _check(setting: Setting, model: Model) -> None:
 
 
 def _check_columns(parameters: tuple[Varied, ...]) -> None:
-    taken = {*FIXED_COLUMNS, *METRICS}
+    # A metric of members has columns NAME.MEMBER, so that a parameter may have its name.
+    taken = {*FIXED_COLUMNS, *(metric.name for metric in METRICS.values() if not metric.each)}
     for parameter in parameters:
         if parameter.name in taken:
             raise InputError(
