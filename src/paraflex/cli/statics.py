@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -45,10 +45,16 @@ def statics_command(request: StaticsRequest) -> int:
         from paraflex.cli.writing import write_drawn, write_numbers
 
         write_numbers(data, statics_summary(data), folder, ("statics.nc", "statics.json"))
-        write_drawn(data, folder)
+        write_drawn(data, folder, _page(data) if request.report else None)
     if not request.json:
-        say_where(began, "numbers, figures", folder.path)
+        say_where(began, "numbers, figures", folder.path, report=request.report)
     return _code(data)
+
+
+def _page(data: xr.Dataset) -> Callable[[], Any]:
+    from paraflex.report.statics import statics_page
+
+    return lambda: statics_page(data)
 
 
 def _code(data: xr.Dataset) -> int:

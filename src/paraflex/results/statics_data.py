@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from importlib.metadata import version
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.equilibria import Statics
@@ -197,6 +198,46 @@ def step_kinds(data: xr.Dataset) -> list[str]:
     """In words, whether each step is "stable", "unstable" or a "limit point"."""
     limit, stable = data["limit_point"].values, data["stable"].values
     return ["limit point" if at else "stable" if holds else "unstable" for at, holds in zip(limit, stable, strict=True)]
+
+
+class BranchParts(NamedTuple):
+    """Masks (steps,) of a branch as it is drawn: a curve of stable steps, one of unstable ones, and limit points."""
+
+    stable: NDArray[np.bool_]
+    unstable: NDArray[np.bool_]
+    limit: NDArray[np.bool_]
+
+
+def branch_parts(data: xr.Dataset) -> BranchParts:
+    """Which steps belong to the curve of stable equilibria, which to that of unstable ones, and limit points.
+
+    The curves meet at limit points; where there is none between a stable step and an unstable one, the second curve
+    begins at the stable step.
+    """
+    kinds = np.array(step_kinds(data))
+    stable, unstable, limit = (kinds == kind for kind in ("stable", "unstable", "limit point"))
+    beside = np.zeros_like(stable)
+    beside[1:] |= unstable[:-1]
+    beside[:-1] |= unstable[1:]
+    return BranchParts(stable | limit, unstable | limit | (stable & beside) if unstable.any() else unstable, limit)
+
+
+def seen_buckling(data: xr.Dataset) -> tuple[int, list[int]] | None:
+    """The last stable equilibrium with a buckling shape, else the first, and which shapes it has; None without any."""
+    if "buckling_shape" not in data:
+        return None
+    known = np.isfinite(data["buckling_factor"].values)
+    steps = np.flatnonzero(known.any(axis=1))
+    if not steps.size:
+        return None
+    stable = [step for step in steps if data["stable"].values[step]]
+    step = int(stable[-1] if stable else steps[0])
+    return step, np.flatnonzero(known[step]).tolist()
+
+
+def as_samples(data: xr.Dataset) -> xr.Dataset:
+    """Equilibria as samples of a run, their numbers in place of times [s]."""
+    return data.rename(step="time").assign_coords(time=np.arange(float(data.sizes["step"])))
 
 
 @checked_arguments()

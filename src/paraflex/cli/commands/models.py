@@ -206,9 +206,10 @@ class StaticsRequest:
     assembly: AssemblyOption = None
     out: Annotated[
         str | None,
-        Option("--out", "--output", metavar="DIR", help="Folder for statics.nc, statics.json and figures."),
+        Option("--out", "--output", metavar="DIR", help="Folder for statics.nc, statics.json, figures and report."),
     ] = None
     force: ReplaceOption = False
+    report: ReportOption = True
     json: Json = False
 
 
