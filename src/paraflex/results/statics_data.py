@@ -17,7 +17,7 @@ from paraflex.findings import Finding
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.drawing import system_drawing
 from paraflex.results.kinds import check_kind
-from paraflex.results.labelled import label, link_coordinates, link_variables, with_totals
+from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.storage import SCHEMA
@@ -38,17 +38,22 @@ UNITS = {
     "fraction": ("fraction of all loads and travels that are given", "1"),
     "limit_point": ("whether the branch turns back here", "1"),
     "stable": ("whether no small motion grows, what is held and moved kept", "1"),
-    "place": ("value of a named coordinate", "m, rad"),
-    "travel": ("change of a named coordinate since the start", "m, rad"),
-    "effort": ("force or torque at a named coordinate: given, or what holds or moves it", "N, N m"),
+    "place": ("value of a named coordinate", ""),
+    "travel": ("change of a named coordinate since the start", ""),
+    "effort": ("force or torque at a named coordinate: given, or what holds or moves it", ""),
     "role": ("what is given of a named coordinate", "1"),
-    "stiffness": ("force for a unit displacement of a named coordinate", "N/m, N m/rad"),
-    "compliance": ("displacement by a unit force at a named coordinate", "m/N, rad/(N m)"),
+    "stiffness": ("force for a unit displacement of a named coordinate", ""),
+    "compliance": ("displacement by a unit force at a named coordinate", ""),
     "natural_frequency": ("undamped natural frequency about the equilibrium", "Hz"),
     "buckling_factor": ("fraction of all that is given at which the mechanism buckles", "1"),
     "buckling_shape": ("displacement of drawn points as it buckles, the largest is 1", "1"),
     "stress_step": ("step at which a beam's stress is largest", "1"),
 }
+# Units of named coordinates, of lengths and of angles.
+NAMED_UNITS = {
+    "place": ("m", "rad"), "travel": ("m", "rad"), "effort": ("N", "N m"), "stiffness": ("N/m", "N m/rad"),
+    "compliance": ("m/N", "rad/(N m)"),
+}  # fmt: skip
 _COMMENTS = {
     "effort": "on the mechanism along the coordinate: of a joint on its second body",
     "stiffness": "others are held and moved as they are, the coordinate itself set free; infinite where it cannot move",
@@ -96,6 +101,9 @@ def statics_dataset(
         if name in UNITS:
             meaning, unit = UNITS[name]
             out[name].attrs = {"long_name": meaning, "units": unit}
+        if name in NAMED_UNITS:
+            each = [NAMED_UNITS[name][one.unit == "rad"] for one in found.coordinates]
+            name_units(out[name], [unit for unit in NAMED_UNITS[name] if unit in each] or NAMED_UNITS[name], each)
         if name in _COMMENTS:
             out[name].attrs["comment"] = _COMMENTS[name]
     out.attrs = {

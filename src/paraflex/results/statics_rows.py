@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.results.statics_data import step_kinds
+from paraflex.results.statics_data import NAMED_UNITS, step_kinds
 from paraflex.units import DisplayUnit
 
 # Rows of the table of steps, and coordinates in it; statics.nc has all.
@@ -89,12 +89,7 @@ def is_wide(values: NDArray[np.float64]) -> bool:
 
 def unit_of(one: xr.Dataset, quantity: str) -> str:
     """SI unit of a quantity of a named coordinate."""
-    straight = one["unit"].item() == "m"
-    units = {
-        "travel": ("rad", "m"), "effort": ("N m", "N"), "stiffness": ("N m/rad", "N/m"),
-        "compliance": ("rad/(N m)", "m/N"),
-    }  # fmt: skip
-    return units[quantity][straight]
+    return NAMED_UNITS[quantity][one["unit"].item() == "rad"]
 
 
 def shown_unit(unit: str) -> DisplayUnit:
