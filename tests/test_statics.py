@@ -178,7 +178,7 @@ def test_a_guide_of_two_leaves_moves_as_the_exact_elastica(
         assert found.travel("stage.T.angle")[-1] == pytest.approx(turn, rel=angle)
     finer = pf.statics(guide(4, elements=2), loads=loads, stiffness=["stage.T.angle"], steps=2)
     coarse = pf.statics(guide(4), loads=loads, stiffness=["stage.T.angle"], steps=2)
-    assert finer.travel("stage.T.angle")[-1] == pytest.approx(coarse.travel("stage.T.angle")[-1], rel=1e-6)
+    assert finer.travel("stage.T.angle")[-1] == pytest.approx(coarse.travel("stage.T.angle")[-1], rel=5e-6)
 
 
 @pytest.mark.parametrize(
