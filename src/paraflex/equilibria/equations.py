@@ -243,6 +243,13 @@ class Equations:
         choose = independent_dense if entries <= _DENSE_ENTRIES else independent_sparse
         return choose(groups, np.ones(self.system.n)).groups
 
+    def dependent_travels(self, at: Unknowns) -> list[Coordinate]:
+        """Moved coordinates whose travel follows, at a point, from the constraints and from others held and moved."""
+        rows, moved = self.matrices(at).rows, list(self.given.moved)
+        kept = self.holding.size - len(moved)
+        free = self.independent(csr_matrix(rows[:kept]), csr_matrix(rows[kept:]))[1] if moved else ()
+        return [one for k, one in enumerate(moved) if k not in free]
+
     def gap(self, at: Unknowns) -> float:
         """The largest residual of rows [sizes of the mechanism, rad]."""
         phi = self.residual(at)[1]

@@ -92,6 +92,13 @@ class Conditions(NamedTuple):
         """All, each once."""
         return tuple(dict.fromkeys((*self.moved, *self.loads, *self.measured, *self.held)))
 
+    @property
+    def words(self) -> str:
+        """What is given with its numbers: "travel of stage.T.x by 0.01 m and -20 N at stage.T.y"."""
+        travels = [f"travel of {one.name} by {value:g} {one.unit}" for one, value in self.moved.items()]
+        loads = [f"{value:g} {one.effort_unit} at {one.name}" for one, value in self.loads.items()]
+        return " and ".join([*travels, *loads])
+
 
 @dataclass(frozen=True)
 class StaticsDefaults:

@@ -114,7 +114,7 @@ def _followed(
             for point in branch.follow(first, asked.steps):
                 found.append(_equilibrium(equations, point, asked.buckling))
     except EquilibriumError as error:
-        error.partial = Statics(equations, tuple(found), "failed", error.problem) if found else None
+        error.partial = Statics(equations, tuple(found), "failed", str(error)) if found else None
         raise
     return Statics(equations, tuple(found))
 

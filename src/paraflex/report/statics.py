@@ -26,6 +26,7 @@ from paraflex.results.statics_rows import (
     buckling_words,
     four_digits,
     given_coordinates,
+    is_stressed,
     last_rows,
     quantity_word,
     shown_unit,
@@ -41,8 +42,8 @@ Array = NDArray[np.float64]
 _DURATION = 5.0
 # Tiles of coordinates that are given, and of stiffnesses.
 _TILES = 2
-# Stresses that are none [Pa]. Forces are differences of what is so much larger: stiffnesses times lengths.
-_NO_STRESS, _PARTS = 1.0, 1e5
+# Forces are differences of what is so much larger: stiffnesses times lengths.
+_PARTS = 1e5
 
 
 @checked_arguments()
@@ -141,18 +142,13 @@ def _tiles(data: xr.Dataset, summary: dict[str, Any]) -> list[tuple[str, str, st
         tiles.append(("buckling", f"{factor} ×", f"of what{rest}"))
     if summary["limit_points"]:
         tiles.append(("first limit point", f"{summary['limit_points'][0]:.4g} ×", "of what is given"))
-    if _stressed(data):
+    if is_stressed(data):
         worst = data.isel(body=int(np.nanargmax(data["stress_max"].values)))
         safety = float(worst["safety_factor"])
         more = "" if np.isnan(safety) else f", safety factor {number(safety)}"
         where = f"{text_symbol(str(worst['body'].item()))} at {number(float(worst['stress_place']))} m{more}"
         tiles.append(("largest stress", f"{number(float(worst['stress_max']), STRESS.factor)} {STRESS.name}", where))
     return tiles
-
-
-def _stressed(data: xr.Dataset) -> bool:
-    """Whether beams have stresses that are more than rounding."""
-    return "stress_max" in data and peak(data["stress_max"].values) > _NO_STRESS
 
 
 def _shown(one: xr.Dataset, quantity: str, step: int) -> str:
@@ -189,7 +185,7 @@ def _step_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
 
 
 def _stress_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
-    if not _stressed(data):
+    if not is_stressed(data):
         return
     heads = [("beam", ""), ("stress", f"[{STRESS.name}]"), ("safety", "factor"), ("at", "[m]"), ("step", "")]
     rows = []

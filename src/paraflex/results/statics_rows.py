@@ -17,6 +17,8 @@ from paraflex.units import DisplayUnit
 _ROWS, _COLUMNS = 24, 2
 _SHOWN = {"m": DisplayUnit("mm", 1e3), "N/m": DisplayUnit("N/mm", 1e-3), "m/N": DisplayUnit("mm/N", 1e3)}
 GIVEN = ("moved", "loaded")
+# A stress that is none [Pa].
+_NO_STRESS = 1.0
 # Stiffnesses that differ by more are drawn on a logarithmic axis.
 _SPREAD = 30.0
 # Quantities of a coordinate, and the word of each in a table.
@@ -76,6 +78,11 @@ def buckling_words(data: xr.Dataset) -> str:
     return ", ".join(seen)
 
 
+def is_stressed(data: xr.Dataset) -> bool:
+    """Whether beams have stresses that are more than rounding."""
+    return "stress_max" in data and float(np.nanmax(data["stress_max"].values, initial=0.0)) > _NO_STRESS
+
+
 def given_coordinates(data: xr.Dataset) -> list[int]:
     """Numbers of the coordinates that are moved or loaded."""
     return [k for k, role in enumerate(data["role"].values) if role in GIVEN]
@@ -111,4 +118,6 @@ def four_digits(value: float) -> str:
 
 def _quantity(one: xr.Dataset, quantity: str) -> str:
     shown, value = shown_unit(unit_of(one, quantity)), float(one[quantity].item())
+    if math.isinf(value):
+        return "rigid" if quantity == "stiffness" else "free"
     return "" if math.isnan(value) else f"{four_digits(shown.factor * value)} {shown.name}"
