@@ -360,6 +360,11 @@ const player = (() => {
     if (!film) {
       byId("no-film").hidden = !byId("no-film").textContent;
       for (const name of ["tools", "canvas", "key-magnify"]) byId(name).hidden = true;
+      // Charts of nothing that moves need neither its place nor its clock.
+      if (byId("no-film").hidden && !report.row(page.time).length) {
+        for (const name of ["film", "dock"]) byId(name).hidden = true;
+        byId("moving").classList.add("still");
+      }
       return;
     }
     byId("has-trail").hidden = film.tips.every((tip) => tip === null);
