@@ -120,7 +120,9 @@ def metrics_of(
         return tuple(dict.fromkeys([*names, *ALWAYS[runs]]))
     motors = mechanism is None or mechanism.motors
     kept = [one.name for one in METRICS.values() if one.is_kept_of(runs) and (motors or not one.of_motors)]
-    first = [HEADLINE[as_enum(ErrorSpan, error, "error")]] if runs == PATH else []
+    # First what such runs are made for.
+    first = {PATH: [HEADLINE[as_enum(ErrorSpan, error, "error")]],
+             STATICS: [name for name in kept if METRICS[name].runs == (STATICS,)]}.get(runs, [])  # fmt: skip
     return tuple(dict.fromkeys([*first, *kept, *ALWAYS[runs]]))
 
 
