@@ -26,7 +26,7 @@ _FREQUENCIES, _MOST_CHOICES = 4, 60
 _SWING = 0.12
 
 
-class _Along(NamedTuple):
+class _Abscissa(NamedTuple):
     """What charts are drawn over: values (steps,) in the unit of a label."""
 
     values: Array
@@ -44,12 +44,12 @@ def statics_panels(data: xr.Dataset) -> list[Panel]:
     return [*panels, *([Panel("Buckling", shapes)] if shapes else [])] or [Panel("Shape", [_shape_chart(data)])]
 
 
-def _over(data: xr.Dataset) -> _Along | None:
+def _over(data: xr.Dataset) -> _Abscissa | None:
     if "given_travel" not in data:
         return None
     travel = data["given_travel"]
     unit = display_unit(travel.attrs["units"], travel.values)
-    return _Along(unit.factor * travel.values, f"travel of {text_symbol(travel.attrs['coordinate'])} [{unit.name}]")
+    return _Abscissa(unit.factor * travel.values, f"travel of {text_symbol(travel.attrs['coordinate'])} [{unit.name}]")
 
 
 def _branch(data: xr.Dataset, name: str, x: Array, y: Array, own: Look, choice: int | None = None) -> list[Curve]:
@@ -82,7 +82,7 @@ def _branch_note(data: xr.Dataset) -> str:
     return "Dotted: unstable equilibria; rings: limit points." if branch_parts(data).unstable.any() else ""
 
 
-def _stiffness_charts(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
+def _stiffness_charts(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
     for kind in ("m", "rad"):
         own = [k for k in range(data.sizes["named"])
                if data["unit"].values[k] == kind and np.isfinite(data["stiffness"].values[:, k]).any()]  # fmt: skip
@@ -100,7 +100,7 @@ def _stiffness_charts(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
         )  # fmt: skip
 
 
-def _travel_chart(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
+def _travel_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
     """Travel of coordinates that nothing is given of: what moves along."""
     free = [k for k, role in enumerate(data["role"].values) if role == "free"]
     curves, choices = [], []
@@ -119,7 +119,7 @@ def _travel_chart(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
                     choosing="coordinate")  # fmt: skip
 
 
-def _frequency_chart(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
+def _frequency_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
     values = data["natural_frequency"].values[:, :_FREQUENCIES]
     if values.size:
         curves = [curve for k in range(values.shape[1])
@@ -128,7 +128,7 @@ def _frequency_chart(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
                     note="What is held and moved stays.")  # fmt: skip
 
 
-def _stress_chart(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
+def _stress_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
     if "stress" not in data:
         return
     values = STRESS.factor * data["stress"].transpose("step", "body").values
@@ -141,7 +141,7 @@ def _stress_chart(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
                     note="Largest magnitude along a beam, bending and axial.")  # fmt: skip
 
 
-def _joint_chart(data: xr.Dataset, over: _Along) -> Iterator[Chart]:
+def _joint_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
     names = names_of(data, "joint")[:_MOST_CHOICES] if data.sizes.get("joint") else []
     if not names:
         return
