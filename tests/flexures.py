@@ -5,6 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
+
 import paraflex as pf
 
 E, WIDTH, THICKNESS, LENGTH = 2.1e11, 0.02, 0.0005, 0.1
@@ -145,3 +149,50 @@ def toggle(stiffness: float = 1000.0, bar: float = 0.5, angle: float = 0.4) -> p
         assemblies=(pf.Assembly("up", {"left": angle, "right": -angle}, {"left.P": (half, height)}),),
         gravity=(0.0, 0.0),
     )
+
+
+def exact_guide(sideways: float, upwards: float, apart: float = 0.05) -> tuple[float, float, float]:
+    """Travel of T along x and y [m] and turn of the stage [rad] of `guide` as extensible elastica, by shooting.
+
+    Each leaf is integrated from its root with a constant force; forces, root moments and the pose of the stage are such
+    that the tips are on the stage and it is in equilibrium. The load comes in steps, each solved from the one before.
+    """
+    area, size = E * WIDTH * THICKNESS, np.array([10.0, 100.0, 0.5, 10.0, 100.0, 0.5, 1e-2, 1e-3, 1e-3])
+
+    def tip(force: np.ndarray, moment: float) -> np.ndarray:
+        def slopes(_: float, at: np.ndarray) -> list[float]:
+            _, _, angle, bending = at
+            along = np.array([math.cos(angle), math.sin(angle)])
+            dx, dy = (1.0 + float(force @ along) / area) * along
+            return [dx, dy, bending / EI, dy * force[0] - dx * force[1]]
+
+        start = [0.0, 0.0, 0.5 * math.pi, moment]
+        return solve_ivp(slopes, (0.0, LENGTH), start, method="DOP853", rtol=1e-12, atol=1e-16).y[:, -1]
+
+    def pose(unknown: np.ndarray) -> np.ndarray:
+        x, y, turn = unknown[6:]
+        half = 0.5 * apart * np.array([math.cos(turn), math.sin(turn)])
+        return np.array([x + half[0] - 0.5 * apart, y + half[1], turn])
+
+    def residual(scaled: np.ndarray, share: float) -> np.ndarray:
+        unknown = scaled * size
+        left, right, (x, y, turn) = unknown[:3], unknown[3:6], unknown[6:]
+        across = apart * np.array([math.cos(turn), math.sin(turn)])
+        load = share * np.array([sideways, upwards])
+        ends = [tip(each[:2], each[2]) for each in (left, right)]
+        places = [ends[0][:2] - [x, LENGTH + y], ends[1][:2] + [apart, 0.0] - [x, LENGTH + y] - across]
+        turns = [end[2] - 0.5 * math.pi - turn for end in ends]
+        moment = 0.5 * _cross(across, load) - ends[0][3] - ends[1][3] - _cross(across, right[:2])
+        return np.concatenate([1e3 * np.ravel(places), 1e3 * np.array(turns), (load - left[:2] - right[:2]) / 10.0,
+                               [10.0 * moment]])  # fmt: skip
+
+    found = np.array([0.5, 0.0, 0.5, 0.5, 0.0, 0.5, 0.1, 0.0, 0.0])
+    for share in (0.2, 0.5, 0.8, 1.0):
+        found = root(residual, found, args=(share,), tol=1e-13).x
+    assert np.max(np.abs(residual(found, 1.0))) < 1e-10
+    x, y, turn = pose(found * size)
+    return float(x), float(y), float(turn)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])

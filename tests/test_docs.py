@@ -35,6 +35,7 @@ import documented  # noqa: E402
         ("linear-models.md", 3),
         ("reduction.md", 4),
         ("statics.md", 3),
+        ("flexures.md", 6),
     ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):

@@ -7,8 +7,8 @@ from typing import Any
 from paraflex.results.metrics import METRICS, Metric
 
 MARK = "<!-- metrics -->"
-# Of a motor, a prescribed motion and a joint.
-EXAMPLES = {"motor": "tau1", "drive": "drive", "joint": "O"}
+# Of a motor, a prescribed motion, a joint, and coordinates of equilibria.
+EXAMPLES = {"motor": "tau1", "drive": "drive", "joint": "O", "coordinate": "stage.T.x", "direction": "stage.T.x"}
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:

@@ -89,7 +89,7 @@ _DOUBTFUL = {
     "spring-idle": "A spring lies between points that joints hold together.",
     "spring-rest": "A linear spring has no free length in the file, which makes it zero.",
     "load-large": "A load is far beyond the weight of all bodies.",
-    "duration-missing": "The model has no path, and its study no duration.",
+    "duration-missing": "The model has no path, its study no duration, and it proposes no statics.",
     "duration-long": "The run goes on for very long after the path.",
     "samples-few": "Samples are too few to show the turns of a prescribed motion.",
     "samples-coarse": "Stresses, joint forces or torques of drives are larger between the samples that a run keeps.",

@@ -182,6 +182,11 @@ FIELD_UNITS = (
     "rad/s", "rad", "Pa", "Hz", "1/s", "m", "s", "N",
 )  # fmt: skip
 
+# What a travel, a torque, a stiffness or a speed at a joint is where the joint slides.
+WHERE_IT_SLIDES = {
+    "N m/rad": "N/m", "N m s/rad": "N s/m", "N m": "N", "rad": "m", "rad/s": "m/s", "rad/N/m": "m/N",
+}  # fmt: skip
+
 
 def spelt(dimension: Dimension) -> str:
     """The SI unit of a dimension."""

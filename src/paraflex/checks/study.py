@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from paraflex.actuation import actuation_condition
+from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import ActuationError, AssemblyError, InputError, NumericalError, UnreachablePathError
 from paraflex.files import Model
 from paraflex.findings import Finding
@@ -43,7 +44,7 @@ def study_findings(
 ) -> Iterator[Finding]:
     """What is wrong or doubtful about the study of a model; see `check` for the arguments."""
     if not model.paths and path is None:
-        if model.study.duration is None:
+        if model.study.duration is None and model.statics == StaticsDefaults():
             yield Finding("duration-missing", "study.duration", "no path and no duration", "give one, in s")
         yield from laws_cut_short(model.mechanism, model.study.duration)
         yield from _few_samples(model)

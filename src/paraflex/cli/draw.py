@@ -21,6 +21,7 @@ from paraflex.cli.commands.models import DrawRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.request import asked_model
 from paraflex.cli.tables import plain_console
+from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
@@ -110,7 +111,8 @@ def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, ou
         console.print(f"drawn as given, with open joints: {listed}", soft_wrap=True)
     console.print(f"drawn in {output}", soft_wrap=True)
     name = request.model.name
-    console.print(f"next: paraflex info {name}, paraflex run {name}", soft_wrap=True)
+    then = "run" if model.statics == StaticsDefaults() else "statics"
+    console.print(f"next: paraflex info {name}, paraflex {then} {name}", soft_wrap=True)
 
 
 def _few(names: Sequence[str]) -> str:

@@ -12,14 +12,12 @@ from rich.console import Console
 
 from paraflex.cli.tables import plain_table, print_titled
 from paraflex.results.linear_data import HOLDINGS
-from paraflex.results.reduction_data import FULL
+from paraflex.results.reduction_data import FULL, percent_off
 
 Array = NDArray[np.float64]
 
 # Outputs and frequencies in a row; reduced.json has all.
 _OUTPUTS, _FREQUENCIES = 8, 4
-# A smaller deviation is called none.
-_ROUNDING = 1e-7
 
 
 def print_reduction(out: Console, data: xr.Dataset) -> None:
@@ -64,14 +62,9 @@ def _frequency_rows(data: xr.Dataset) -> Iterator[list[str]]:
                 yield [shown, holding, "all" if name == FULL else name, *cells]
 
 
-def _percent(part: float) -> str:
-    """A deviation in percent; rounding is none."""
-    return "0 %" if abs(part) < _ROUNDING else f"{100.0 * part:+.2g} %"
-
-
 def _cells(values: Array, exact: Array, *, full: bool) -> list[str]:
     cells = []
     for value, right in zip(values[:_FREQUENCIES], exact, strict=False):
-        off = "" if full or math.isnan(right) else f"\n{_percent(value / right - 1.0)}"
+        off = "" if full or math.isnan(right) else f"\n{percent_off(value, right)}"
         cells.append("" if math.isnan(value) else f"{value:.4g}{off}")
     return cells

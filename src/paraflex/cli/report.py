@@ -12,7 +12,16 @@ from paraflex.cli.commands.results import ReportRequest
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
 from paraflex.folders import check_listed
-from paraflex.report import Page, linear_page, motion_page, save_page, tracking_page, verification_page
+from paraflex.report import (
+    Page,
+    linear_page,
+    motion_page,
+    reduction_page,
+    save_page,
+    statics_page,
+    tracking_page,
+    verification_page,
+)
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
 from paraflex.writing import read_json
@@ -59,8 +68,10 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
         return motion_page(data)
     if kind == "linear":
         return linear_page(data)
-    if kind in ("statics", "reduction"):
-        raise InputError("there is no report of these results", field=str(folder), remedy="paraflex plot draws them")
+    if kind == "statics":
+        return statics_page(data)
+    if kind == "reduction":
+        return reduction_page(data)
     summary = folder / "summary.json"
     modes = _beside(summary)["modes"] if summary.is_file() else {}
     # Modes that could not start are in the summary only.

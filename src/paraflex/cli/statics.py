@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,8 +15,8 @@ from paraflex.cli.ending import say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import asked_model, of_assembly
 from paraflex.cli.statics_tables import print_statics
-from paraflex.equilibria import Statics, statics
-from paraflex.equilibria.equations import coordinate_named
+from paraflex.equilibria import Statics, StaticsDefaults, statics
+from paraflex.equilibria.given import coordinate_named
 from paraflex.errors import AssemblyError, EquilibriumError, InputError
 from paraflex.files import Model
 from paraflex.files.fields import number_in
@@ -45,10 +45,16 @@ def statics_command(request: StaticsRequest) -> int:
         from paraflex.cli.writing import write_drawn, write_numbers
 
         write_numbers(data, statics_summary(data), folder, ("statics.nc", "statics.json"))
-        write_drawn(data, folder)
+        write_drawn(data, folder, _page(data) if request.report else None)
     if not request.json:
-        say_where(began, "numbers, figures", folder.path)
+        say_where(began, "numbers, figures", folder.path, report=request.report)
     return _code(data)
+
+
+def _page(data: xr.Dataset) -> Callable[[], Any]:
+    from paraflex.report.statics import statics_page
+
+    return lambda: statics_page(data)
 
 
 def _code(data: xr.Dataset) -> int:
@@ -60,28 +66,17 @@ def _tell(data: xr.Dataset, request: StaticsRequest) -> None:
 
 
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
-    return statics_dataset(_found(model, request), parameters=_parameters(model, request))
+    asked = _asked(model, request)
+    return statics_dataset(_found(model, asked, request), parameters=_parameters(model, asked, request))
 
 
-def _found(model: Model, request: StaticsRequest) -> Statics:
+def _found(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> Statics:
     """The equilibria, or those until one is not found."""
-    mechanism = model.mechanism
     with _flagged():
-        loads, moved = (
-            {name: _number(text, coordinate_named(mechanism, name, f"{field}.{name}"), field)
-             for name, text in _pairs(given, _FLAGS[field]).items()}
-            for field, given in (("loads", request.loads), ("moved", request.moved))
-        )  # fmt: skip
-        units = dict(zip([motor.name for motor in mechanism.motors], mechanism.motor_units(), strict=True))
-        torques = {
-            name: _in_unit(text, units.get(name, "N m"), f"--torque {name}")
-            for name, text in _pairs(request.torques, "--torque").items()
-        }
         try:
             return statics(
-                model, loads=loads, torques=torques, moved=moved, held=[] if request.held == [_NONE] else request.held,
-                steps=request.steps, stiffness=_directions(model, request), buckling=request.buckling,
-                assembly=request.assembly or (None if model.start is not None else model.study.assembly), warning=False,
+                model, **vars(asked), warning=False,
+                assembly=request.assembly or (None if model.start is not None else model.study.assembly),
             )  # fmt: skip
         except EquilibriumError as error:
             if error.partial is None:
@@ -91,12 +86,30 @@ def _found(model: Model, request: StaticsRequest) -> Statics:
             raise of_assembly(error, model) from error
 
 
-def _directions(model: Model, request: StaticsRequest) -> Sequence[str] | None:
-    """Coordinates with a stiffness; of nothing that is given those of the end-effector."""
-    effector = model.mechanism.end_effector
-    if request.stiffness is not None or request.loads or request.torques or request.moved or effector is None:
-        return request.stiffness
-    return [f"{effector.point}.{axis}" for axis in effector.coordinates]
+def _asked(model: Model, request: StaticsRequest) -> StaticsDefaults:
+    """What is given: of loads, torques and travel what options say, if any does; the rest as the model has it."""
+    mechanism = model.mechanism
+    units = dict(zip([motor.name for motor in mechanism.motors], mechanism.motor_units(), strict=True))
+    with _flagged():
+        loads, moved = (
+            {name: _number(text, coordinate_named(mechanism, name, f"{field}.{name}"), field)
+             for name, text in _pairs(given, _FLAGS[field]).items()}
+            for field, given in (("loads", request.loads), ("moved", request.moved))
+        )  # fmt: skip
+        torques = {
+            name: _in_unit(text, units.get(name, "N m"), f"--torque {name}")
+            for name, text in _pairs(request.torques, "--torque").items()
+        }
+        held = () if request.held == [_NONE] else request.held
+        asked = model.statics.filled(
+            loads=loads or None, torques=torques or None, moved=moved or None, held=held, steps=request.steps,
+            stiffness=request.stiffness, buckling=request.buckling,
+        )  # fmt: skip
+    effector = mechanism.end_effector
+    if asked.stiffness is not None or asked.loads or asked.torques or asked.moved or effector is None:
+        return asked
+    # Of nothing that is given the stiffness of the end-effector.
+    return asked.filled(stiffness=tuple(f"{effector.point}.{axis}" for axis in effector.coordinates))
 
 
 def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
@@ -134,12 +147,11 @@ def _flagged() -> Iterator[None]:
         raise (error if flag is None else error.at(flag)) from None
 
 
-def _parameters(model: Model, request: StaticsRequest) -> dict[str, Any]:
+def _parameters(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> dict[str, Any]:
     """What was asked for."""
-    asked = {name: getattr(request, name) for name in ("loads", "torques", "moved", "held", "steps", "stiffness",
-                                                        "assembly")}  # fmt: skip
-    run = {name: value for name, value in asked.items() if value not in (None, [])}
+    given = {name: value for name, value in (vars(asked) | {"assembly": request.assembly}).items()
+             if value is not None and value != {}}  # fmt: skip
     return {
         "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "set": dict(model.settings), "statics": True} | run,
+        "run": {"mechanism": model.source, "set": dict(model.settings), "statics": True} | given,
     }

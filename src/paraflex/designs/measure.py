@@ -8,17 +8,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.equilibria.given import Conditions
+from paraflex.equilibria.result import Statics
 from paraflex.errors import InputError, IntegrationError, Moment, as_enum, suggestion
 from paraflex.integrators.between import COARSE
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun
 from paraflex.results.following import HEADLINE, ErrorSpan
-from paraflex.results.metrics import DRIVE, JOINT, METRICS, MOTION, MOTOR, PATH, VALIDITY, Members, Metric
-from paraflex.results.run_traces import MotionTraces, RunTraces, run_traces
+from paraflex.results.metrics import (
+    ALWAYS,
+    COORDINATE,
+    DIRECTION,
+    DRIVE,
+    JOINT,
+    METRICS,
+    MOTION,
+    MOTOR,
+    PATH,
+    STATICS,
+    VALIDITY,
+    Members,
+    Metric,
+    sliding,
+)
+from paraflex.results.run_traces import MotionTraces, RunTraces, StaticsTraces, run_traces
 from paraflex.tracking import TrackingRun
 
-Runs = TrackingRun | MotionRun
-RunsTraces = RunTraces | MotionTraces
+Runs = TrackingRun | MotionRun | Statics
+RunsTraces = RunTraces | MotionTraces | StaticsTraces
+_OF_RUNS = {PATH: "runs along a path", MOTION: "runs without a path", STATICS: "statics"}
 
 # Metrics that short peaks between samples may be missing from.
 _LARGEST_LOADS = (
@@ -46,10 +64,23 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
         raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(known)))
 
 
-def members_of(mechanism: Mechanism) -> Members:
-    """What of a mechanism metrics have a column each of: names of motors, drives (prescribed motions) and joints."""
-    members = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
-    return {kind: tuple(one.name for one in each) for kind, each in members.items()}
+def members_of(mechanism: Mechanism, given: Conditions | None = None) -> Members:
+    """What of a mechanism metrics have a column each of, by name, and of these what slides.
+
+    Motors, drives (prescribed motions) and joints, or of equilibria what is given: named coordinates, and those with a
+    stiffness.
+    """
+    if given is not None:
+        straight = tuple(one.name for one in given.coordinates if one.unit == "m")
+        found = {COORDINATE: given.coordinates, DIRECTION: given.measured}
+        names = {kind: tuple(one.name for one in each) for kind, each in found.items()}
+        return names | {sliding(kind): straight for kind in names}
+    found = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
+    slides = {joint.name for joint in mechanism.joints if joint.slides}
+    return {kind: tuple(one.name for one in each) for kind, each in found.items()} | {
+        sliding(kind): tuple(one.name for one in each if getattr(one, "joint", one.name) in slides)
+        for kind, each in found.items()
+    }
 
 
 def metrics_of(
@@ -65,7 +96,7 @@ def metrics_of(
     mechanism : Mechanism, optional
         Of the runs: without motors no metrics of these are kept.
     runs : str
-        "path" or "motion".
+        "path", "motion" or "statics".
 
     Raises
     ------
@@ -74,26 +105,33 @@ def metrics_of(
     """
     for name in names:
         check_metric(name)
-        if runs == MOTION and METRICS[name].along_path:
+        if name not in METRICS:
             raise InputError(
-                "a metric of runs along a path, which the mechanism does not have", field="metrics", value=name,
-                remedy="choose from " + ", ".join(each.name for each in METRICS.values() if not each.along_path),
+                f"a metric of each {metric_of(name).each or 'run'} is kept of all", field="metrics", value=name,
+                remedy=f'say "{metric_of(name).name}"',
+            )  # fmt: skip
+        if runs not in METRICS[name].runs:
+            raise InputError(
+                f"a metric of {' or '.join(_OF_RUNS[each] for each in METRICS[name].runs)}, not of "
+                f"{_OF_RUNS[runs]}, which this study is of", field="metrics", value=name,
+                remedy="choose from " + ", ".join(each.name for each in METRICS.values() if runs in each.runs),
             )  # fmt: skip
     if names:
-        return tuple(dict.fromkeys([*names, VALIDITY]))
+        return tuple(dict.fromkeys([*names, *ALWAYS[runs]]))
     motors = mechanism is None or mechanism.motors
-    kept = [
-        one.name
-        for one in METRICS.values()
-        if runs in one.kept_of and not (runs == MOTION and one.along_path) and (motors or not one.of_motors)
-    ]
-    first = [HEADLINE[as_enum(ErrorSpan, error, "error")]] if runs == PATH else []
-    return tuple(dict.fromkeys([*first, *kept, VALIDITY]))
+    kept = [one.name for one in METRICS.values() if one.is_kept_of(runs) and (motors or not one.of_motors)]
+    # First what such runs are made for.
+    first = {PATH: [HEADLINE[as_enum(ErrorSpan, error, "error")]],
+             STATICS: [name for name in kept if METRICS[name].runs == (STATICS,)]}.get(runs, [])  # fmt: skip
+    return tuple(dict.fromkeys([*first, *kept, *ALWAYS[runs]]))
 
 
 def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
-    """Columns of the metrics by name, NAME.MEMBER for those of each motor, drive or joint."""
-    members = members_of(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
+    """Columns of the metrics by name, NAME.MEMBER for those of each motor, joint or other member."""
+    if isinstance(run, Statics):
+        members = members_of(run.system.described, run.equations.given)
+    else:
+        members = members_of(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
     return tuple(column for name in names for column in METRICS[name].columns(members))
 
 

@@ -151,6 +151,7 @@ def _setting(content: Mapping[str, Any], had: Mapping[str, str]) -> Setting:
         trajectories=False,
         versions=had,
         balanced=content.get("balanced", False),
+        statics=content.get("statics", False),
     )
 
 

@@ -13,13 +13,15 @@ from paraflex.campaign import Row
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import Runs, coarseness, measure
 from paraflex.designs.own_motion import OwnMotion, own_motion
+from paraflex.designs.own_statics import OwnStatics, own_statics
 from paraflex.designs.setting import Setting, digest, versions
+from paraflex.equilibria.result import Statics
 from paraflex.errors import InputError, NumericalError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.motion import MotionRun
 from paraflex.reduction import reduced_mechanism
-from paraflex.results import motion_dataset, tracking_dataset
+from paraflex.results import motion_dataset, statics_dataset, tracking_dataset
 from paraflex.results.metrics import METRICS, Members
 from paraflex.tracking import TrackingTask, simulate
 
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID = "complete", "failed", "invalid"
 STATUSES = (STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID)
 _ID_DIGITS = 16
+# What is ready to be run.
+Planned = TrackingTask | OwnMotion | OwnStatics
 
 
 class Task(NamedTuple):
@@ -95,7 +99,7 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
             row |= measure(run, setting.metrics) | {
                 "status": STATUS_COMPLETE,
                 "reason": coarseness(run, setting.metrics),
-                "time_reached": float(run.solution.t[-1]),
+                "time_reached": None if isinstance(run, Statics) else float(run.solution.t[-1]),
             }
         except Abandoned:
             raise
@@ -108,8 +112,8 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     return Outcome(task, rows, kept)
 
 
-def ready(setting: Setting, task: Task) -> tuple[TrackingTask | OwnMotion, IntegrationOptions]:
-    """What is to be simulated of a design, planned along its path or without one, and the integration options.
+def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
+    """What is to be found of a design, planned along its path or without one, or its statics; integration options.
 
     Raises
     ------
@@ -120,6 +124,8 @@ def ready(setting: Setting, task: Task) -> tuple[TrackingTask | OwnMotion, Integ
         return plan_task(setting, task)
     model, options = setting.design(task.values)
     _compile(model.mechanism)
+    if setting.statics:
+        return own_statics(model, setting.assembly), options
     motion = own_motion(model, setting.duration, setting.samples, setting.assembly, balanced=setting.balanced)
     return motion, options
 
@@ -153,10 +159,10 @@ def table_schema(setting: Setting, members: Members) -> pa.Schema:
     columns += [("status", text), ("reason", text)]
     fields = [pa.field(*column) for column in columns]
     fields.append(pa.field("time_reached", real, metadata={"unit": "s"}))
-    for name in setting.metrics:
-        metric = METRICS[name]
-        about = {"unit": metric.unit, "meaning": metric.meaning}
-        fields += [pa.field(each, whole if metric.whole else real, metadata=about) for each in metric.columns(members)]
+    for metric in map(METRICS.__getitem__, setting.metrics):
+        for column in metric.columns(members):
+            about = {"unit": metric.unit_of(column, members), "meaning": metric.meaning}
+            fields.append(pa.field(column, whole if metric.whole else real, metadata=about))
     return pa.schema(fields)
 
 
@@ -206,16 +212,16 @@ def _blank(setting: Setting, task: Task, mode: str) -> Row:
     }
 
 
-def run_mode(
-    planned: TrackingTask | OwnMotion, mode: str, options: IntegrationOptions, watch: Callable[[float], None] | None
-) -> Runs:
-    """Simulate what is ready, in a mode where it has a path.
+def run_mode(planned: Planned, mode: str, options: IntegrationOptions, watch: Callable[[float], None] | None) -> Runs:
+    """Simulate what is ready, in a mode where it has a path; or find its equilibria.
 
     Raises
     ------
     Abandoned
         See `run_task`.
     """
+    if isinstance(planned, OwnStatics):
+        return planned.found()
     if isinstance(planned, OwnMotion):
         run = planned.simulate(options, watch)
     else:
@@ -227,6 +233,8 @@ def run_mode(
 
 def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:
     """A run with all its samples."""
+    if isinstance(run, Statics):
+        return statics_dataset(run)
     if isinstance(run, MotionRun):
         return motion_dataset(run, options=options)
     return tracking_dataset([run], options=options)
@@ -235,7 +243,9 @@ def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:
 def _trajectory(run: Runs, options: IntegrationOptions, row: Row) -> xr.Dataset:
     data = dataset_of(run, options)
     # Of two runs of one design all must be equal.
-    return data.drop_vars("wall_time").assign_attrs({"run": row["run"], "id": row["id"], "design": row["design"]})
+    return data.drop_vars("wall_time", errors="ignore").assign_attrs(
+        {"run": row["run"], "id": row["id"], "design": row["design"]}
+    )
 
 
 def _check_versions(setting: Setting) -> None:

@@ -78,6 +78,11 @@ class SweepTable(Table):
     )
     metrics: list[Text] = Field(default=[], description="names of the metrics to keep, validity always; all by default")
     trajectories: Yes = Field(default=False, description="true to keep every run as a netCDF file")
+    statics: dict[str, Any] | None = Field(
+        default=None,
+        description="equilibria in place of runs: what is other than in [statics] of the mechanism's file, each in the "
+        "unit of its field there",
+    )
     sampling: SamplingTable = SamplingTable()
     integration: IntegrationTable = IntegrationTable()
     vary: dict[str, VaryTable] = Field(default={}, description="a [vary.NAME] table for each parameter")

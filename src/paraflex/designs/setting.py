@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib.metadata import version
 from pathlib import Path as FilePath
@@ -13,9 +13,11 @@ from typing import Any
 
 from paraflex.designs.measure import metrics_of
 from paraflex.designs.own_motion import own_duration
+from paraflex.designs.own_statics import check_of_statics
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, VaryTable
 from paraflex.designs.units import check_unit_of
+from paraflex.equilibria.given import chosen_over
 from paraflex.errors import InputError, suggestion
 from paraflex.files import Model, library_names, model_from
 from paraflex.files.expressions import ExpressionError, evaluate
@@ -30,7 +32,7 @@ from paraflex.limits import WHOLE, at_most, of_size
 from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
 from paraflex.results.following import Part
-from paraflex.results.metrics import METRICS, MOTION, PATH
+from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS
 from paraflex.validity import doubtful_numbers
 
 # Default limit of attempted steps: a single design with violent motion must not delay a study.
@@ -80,6 +82,8 @@ class Setting:
         The mechanism's file, for its comments.
     balanced : bool
         Whether runs without a path start in the deflections of steady running.
+    statics : bool
+        Whether equilibria are found, as the data's [statics] say, in place of runs.
     """
 
     data: Mapping[str, Any]
@@ -98,6 +102,7 @@ class Setting:
     versions: Mapping[str, str]
     text: str = field(default="", repr=False, compare=False)
     balanced: bool = False
+    statics: bool = False
 
     @property
     def has_path(self) -> bool:
@@ -108,7 +113,8 @@ class Setting:
     def identity(self) -> str:
         """Digest of the common settings of all runs, for their ids."""
         asked = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
-        return digest([dict(self.data), *asked, *(["balanced"] if self.balanced else [])])
+        more = [name for name in ("balanced", "statics") if getattr(self, name)]
+        return digest([dict(self.data), *asked, *more])
 
     def numbers(self, values: tuple[float, ...]) -> list[tuple[Place, float | int]]:
         """Every place that a design sets, and its value."""
@@ -145,7 +151,7 @@ class Setting:
         """Findings on the design that the file describes, and on paths for which runs are too short."""
         model = model_from(dict(self.data), self.source)
         parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
-        duration = None if self.has_path else own_duration(model, self.duration)
+        duration = None if self.has_path or self.statics else own_duration(model, self.duration)
         return Verdict([*doubtful_numbers(model.mechanism, duration), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
@@ -168,7 +174,14 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
         Anything that does not fit the mechanism, whatever designs are taken.
     """
     model = read_model(_mechanism(table.mechanism, folder), table.set)
-    data, paths = model.parameters, _paths(model, table.paths)
+    runs = STATICS
+    if table.statics is not None:
+        check_of_statics(table.model_fields_set)
+        model, paths = _with_statics(model, table.statics), (NO_PATH,)
+    else:
+        paths = _paths(model, table.paths)
+        runs = MOTION if paths == (NO_PATH,) else PATH
+    data = model.parameters
     parameters = tuple(_varied(name, entry, data) for name, entry in table.vary.items())
     setting = Setting(
         data=data,
@@ -182,14 +195,17 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
         samples=table.samples,
         assembly=table.assembly,
         integration=_integration(table),
-        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, MOTION if paths == (NO_PATH,) else PATH),
+        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, runs),
         trajectories=table.trajectories,
         versions=versions(),
         text=model.text,
         balanced=table.balanced,
+        statics=table.statics is not None,
     )
     _check(setting, model)
     _check_columns(parameters)
+    if setting.statics and any(place[0] == INTEGRATION for places in setting.places for place in places):
+        check_of_statics([INTEGRATION])
     return setting, parameters, model
 
 
@@ -202,6 +218,15 @@ def versions() -> Mapping[str, str]:
 def digest(content: Any) -> str:
     """SHA-256 of plain values, independent of the order of keys."""
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _with_statics(model: Model, said: Mapping[str, Any]) -> Model:
+    """The model with what a study says of its [statics], which it need not have."""
+    data = dict(model.parameters) | {"statics": chosen_over(model.parameters.get("statics", {}), said)}
+    try:
+        return replace(model_from(data, model.source, model.text), settings=model.settings)
+    except InputError as error:
+        raise error.in_file("") from None
 
 
 def _mechanism(name: str, folder: FilePath) -> str:
@@ -317,7 +342,7 @@ def _check(setting: Setting, model: Model) -> None:
         raise InputError(
             "runs along a path start on the planned motion", field="balanced", value=True, remedy="leave it out"
         )
-    if not setting.has_path:
+    if not (setting.has_path or setting.statics):
         own_duration(model, setting.duration)
         if model.study.reduced:
             raise InputError(
@@ -329,7 +354,8 @@ def _check(setting: Setting, model: Model) -> None:
 
 
 def _check_columns(parameters: tuple[Varied, ...]) -> None:
-    taken = {*FIXED_COLUMNS, *METRICS}
+    # A metric of members has columns NAME.MEMBER, so that a parameter may have its name.
+    taken = {*FIXED_COLUMNS, *(metric.name for metric in METRICS.values() if not metric.each)}
     for parameter in parameters:
         if parameter.name in taken:
             raise InputError(

@@ -37,6 +37,7 @@ from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, is_row_of, lost
 from paraflex.designs.samples import Varied, check_varied, designs
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
+from paraflex.equilibria.given import conditions
 from paraflex.errors import InputError
 from paraflex.files import Model, model_from
 from paraflex.results.metrics import VALIDITY, Members
@@ -135,7 +136,7 @@ class SweepStudy(Study["SweepResult"]):
         Of sampling.
     designs : (k, parameters) array
     members : mapping of str to tuple of str
-        Names of the mechanism's motors, drives and joints, of which metrics have a column each.
+        Names of the mechanism's motors, drives, joints or named coordinates, of which metrics have a column each.
     """
 
     name: str
@@ -164,7 +165,7 @@ class SweepStudy(Study["SweepResult"]):
             "duration": setting.duration,
             "samples": setting.samples,
             "assembly": setting.assembly,
-            **({"balanced": True} if setting.balanced else {}),
+            **{name: True for name in ("balanced", "statics") if getattr(setting, name)},
             "integration": dict(setting.integration),
             "metrics": list(setting.metrics),
             "trajectories": setting.trajectories,
@@ -249,7 +250,7 @@ def make_study(table: SweepTable, folder: Path) -> SweepStudy:
         parameters=parameters,
         kind=sampling.kind,
         designs=designs(parameters, sampling.kind, sampling.number, sampling.seed),
-        members=members_of(model.mechanism),
+        members=members_of(model.mechanism, conditions(model.mechanism, model.statics) if setting.statics else None),
     )
 
 

@@ -8,9 +8,9 @@ from typing import Any
 from pydantic import BaseModel
 
 from paraflex.designs.schema import SweepTable
-from paraflex.files.fields import WHERE_IT_SLIDES, Place, check_unit, field_at, units_at
+from paraflex.files.fields import Place, check_unit, field_at, units_at
 from paraflex.files.schema import ModelTable, NumberOfText
-from paraflex.results.metrics import METRICS
+from paraflex.results.metrics import Members, metric_unit
 
 
 def unit_of(data: Mapping[str, Any], place: Place) -> str:
@@ -31,7 +31,7 @@ def check_unit_of(data: Mapping[str, Any], place: Place, text: str, field: str) 
     check_unit(text, {}, units_at(schema, data, place), field, field_at(schema, data, place).description)
 
 
-def check_unit_of_metric(value: float, column: str, field: str) -> None:
+def check_unit_of_metric(value: float, column: str, members: Members, field: str) -> None:
     """Check the unit of an expression that a study gives for what a metric is to be.
 
     Raises
@@ -40,10 +40,8 @@ def check_unit_of_metric(value: float, column: str, field: str) -> None:
         See `files.fields.check_unit`.
     """
     if isinstance(value, NumberOfText):
-        metric = METRICS[column.partition(".")[0]]
-        # Motors may slide.
-        units = [metric.unit, *([WHERE_IT_SLIDES[metric.unit]] if metric.unit in WHERE_IT_SLIDES else [])]
-        check_unit(value.text, {}, tuple(unit for unit in units if unit != "1"), field, f"{column} in {metric.unit}")
+        unit = metric_unit(column, members)
+        check_unit(value.text, {}, (unit,) if unit != "1" else (), field, f"{column} in {unit}")
 
 
 def _schema(place: Place) -> type[BaseModel]:

@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array
 from paraflex.dynamics.sparse import solved
 from paraflex.equilibria.equations import Equations, Unknowns
-from paraflex.errors import EquilibriumError, LimitPointError, Moment
+from paraflex.errors import EquilibriumError, LimitPointError
 
 _MOST_ITERATIONS = 25
 # Newton's iteration of a step has converged when it moves less than the first [sizes of the mechanism, rad], or less
@@ -85,14 +85,13 @@ class Branch:
             None is found.
         """
         begin = self.equations.guess()
-        moment = Moment(self.equations.start.time, 0)
         try:
             found = self._solve(begin, self._only_s(begin), 0.0, longest=_LONGEST_MOVE)
             if self.equations.gap(found) > _GAP:
-                raise EquilibriumError("what is held contradicts the joints", moment, remedy="hold fewer coordinates")
+                raise EquilibriumError("what is held contradicts the joints", remedy="hold fewer coordinates")
             return Point(found, self._tangent(found, self._only_s(found)))
         except _Failed:
-            raise EquilibriumError("no static equilibrium is found near the start", moment, remedy=_LOOSE) from None
+            raise EquilibriumError("no static equilibrium is found near the start", remedy=_LOOSE) from None
 
     def follow(self, first: Point, steps: int) -> Iterator[Point]:
         """Points at multiples of a fraction of one, and limit points, in the order of the branch, until one.
@@ -114,9 +113,9 @@ class Branch:
         branch = replace(self, weight=self.weight / move**2) if move > 0.0 else self
         here = Point(first.at, branch._tangent(first.at, branch._only_s(first.at)))
         longest = _LONGEST * np.sqrt(2.0) / steps
-        step, turned, furthest, number = 0.5 * longest, False, 0.0, 0
-        for number in range(_MOST_STEPS):
-            there, step = branch._next(here, step, longest, number)
+        step, turned, furthest = 0.5 * longest, False, 0.0
+        for _ in range(_MOST_STEPS):
+            there, step = branch._next(here, step, longest)
             parts = [here, there]
             if here.tangent.s * there.tangent.s < 0.0:
                 parts.insert(1, branch._limit(here, there))
@@ -131,23 +130,37 @@ class Branch:
             if turned and branch._back(first, here, there):
                 break
             here = there
-        raise self._ended(turned, furthest, number)
+        raise self._ended(turned, furthest)
 
-    def _ended(self, turned: bool, furthest: float, step: int) -> EquilibriumError:
-        moment = Moment(self.equations.start.time, step)
+    def _ended(self, turned: bool, furthest: float) -> EquilibriumError:
+        given = self.equations.given.words
         if turned:
             cause = (
-                f"no equilibrium with more than {furthest:.6g} of what is given: the branch turns back there, at a "
-                "limit point, and does not come to more"
+                f"no equilibrium with more than {furthest:.6g} of what is given, {given}: the branch turns back there, "
+                "at a limit point, and does not come to more"
             )
-            return LimitPointError(cause, moment, remedy=f"give at most {furthest:.4g} of it")
+            return LimitPointError(cause, remedy=f"give at most {furthest:.4g} of it")
         return EquilibriumError(
             f"the branch of equilibria is followed for {_MOST_STEPS} steps and has come to {furthest:.6g} of what is "
-            "given only",
-            moment, remedy="give less, or more where it is next to nothing",
+            f"given only, {given}", remedy="give less, or more where it is next to nothing",
         )  # fmt: skip
 
-    def _next(self, here: Point, step: float, longest: float, number: int) -> tuple[Point, float]:
+    def _stopped(self, at: Unknowns) -> EquilibriumError:
+        """Why no equilibrium is found beyond a point: a travel that follows from others, or what is not known."""
+        stuck = self.equations.dependent_travels(at)
+        if stuck:
+            names = ", ".join(one.name for one in stuck)
+            return EquilibriumError(
+                f"no equilibrium beyond {at.s:.6g} of what is given: the travel of {names} follows from the joints and "
+                "from what else is held and moved",
+                remedy="leave it out, or hold and move less",
+            )
+        return EquilibriumError(
+            f"no equilibrium is found beyond {at.s:.6g} of what is given, {self.equations.given.words}",
+            remedy="joints may not allow more, or links touch what the model has not: give less",
+        )
+
+    def _next(self, here: Point, step: float, longest: float) -> tuple[Point, float]:
         """The point a step along, and the length of the next step."""
         shortest = _SHORTEST * longest
         while step > shortest:
@@ -162,11 +175,7 @@ class Branch:
                 step *= _SHRINK
                 continue
             return Point(found, tangent), min(longest, step * (_GROWTH if counted[0] <= _FEW else 1.0))
-        moment = Moment(self.equations.start.time, number)
-        raise EquilibriumError(
-            f"no equilibrium is found beyond {here.at.s:.6g} of what is given", moment,
-            remedy="joints may not allow more, or links touch what the model has not: give less",
-        )  # fmt: skip
+        raise self._stopped(here.at)
 
     def _between(self, a: Point, b: Point, steps: int) -> Iterator[Point]:
         """Points at multiples between two points, the second included, in the order of the branch."""

@@ -11,7 +11,7 @@ so that the force of a held or moved coordinate on the mechanism is -mu.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -29,88 +29,16 @@ from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffne
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
-from paraflex.errors import InputError, suggestion
+from paraflex.equilibria.given import Conditions, Coordinate
 from paraflex.kernel.packed import CONSTRAINT, Signals
 from paraflex.linear.coordinates import Coordinates, unit_in
 from paraflex.linear.independent import independent_dense, independent_sparse
-from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
+from paraflex.mechanism import GROUND, ConstantSpeed, PointRef, PrescribedAngle, RevoluteJoint
 from paraflex.mechanism.cut import Cut
 
 # A matrix of fewer entries has its independent rows found by a QR factorisation, others by elimination.
 _DENSE_ENTRIES = 400_000
 _ORIGIN = "origin of named coordinates"
-_AXES = ("x", "y", "angle")
-
-
-class Coordinate(NamedTuple):
-    """The angle or travel of a joint, or a place or the angle of a point, by its name.
-
-    Attributes
-    ----------
-    name : str
-        Of the joint, or "body.point.x", "body.point.y", "body.point.angle".
-    unit, effort_unit : str
-        "m" and "N", or "rad" and "N m".
-    point : PointRef, optional
-        None of a joint.
-    """
-
-    name: str
-    unit: str
-    effort_unit: str
-    point: PointRef | None = None
-
-    @property
-    def axis(self) -> str:
-        """The axis of a point's coordinate."""
-        return self.name.rpartition(".")[2]
-
-
-def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
-    """A coordinate by its name.
-
-    Raises
-    ------
-    InputError
-        There is no such joint or point, or the joint has no coordinate that could change.
-    """
-    joints = {joint.name: joint for joint in mechanism.joints}
-    if name in joints:
-        joint = joints[name]
-        if not joint.slides and "angle" in joint.holds:
-            raise InputError("holds its angle, so that it has no coordinate", field=field, value=name,
-                             remedy="name a joint that turns or slides, or a point")  # fmt: skip
-        return Coordinate(name, *(("m", "N") if joint.slides else ("rad", "N m")))
-    place, _, axis = name.rpartition(".")
-    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
-    if axis not in _AXES or place not in points:
-        known = [*joints, *(f"{point}.{each}" for point in points for each in _AXES)]
-        raise InputError("is neither a joint nor a coordinate of a point", field=field, value=name,
-                         remedy=f'{suggestion(name, known)}; of points it is "body.point.x", ".y" or ".angle"'
-                         )  # fmt: skip
-    return Coordinate(name, *(("rad", "N m") if axis == "angle" else ("m", "N")), PointRef.parse(place, field))
-
-
-class Conditions(NamedTuple):
-    """What is given: changes of coordinates, forces and torques at others, and coordinates that are only looked at.
-
-    Attributes
-    ----------
-    held : tuple of Coordinate
-    moved, loads : mapping of Coordinate to float
-        The change from the start [m, rad], and the force or torque [N, N m].
-    measured : tuple of Coordinate
-    """
-
-    held: tuple[Coordinate, ...]
-    moved: Mapping[Coordinate, float]
-    loads: Mapping[Coordinate, float]
-    measured: tuple[Coordinate, ...]
-
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        """All, each once."""
-        return tuple(dict.fromkeys((*self.moved, *self.loads, *self.measured, *self.held)))
 
 
 class Unknowns(NamedTuple):
@@ -314,6 +242,13 @@ class Equations:
         entries = sum(int(np.prod(group.shape or ())) for group in groups)
         choose = independent_dense if entries <= _DENSE_ENTRIES else independent_sparse
         return choose(groups, np.ones(self.system.n)).groups
+
+    def dependent_travels(self, at: Unknowns) -> list[Coordinate]:
+        """Moved coordinates whose travel follows, at a point, from the constraints and from others held and moved."""
+        rows, moved = self.matrices(at).rows, list(self.given.moved)
+        kept = self.holding.size - len(moved)
+        free = self.independent(csr_matrix(rows[:kept]), csr_matrix(rows[kept:]))[1] if moved else ()
+        return [one for k, one in enumerate(moved) if k not in free]
 
     def gap(self, at: Unknowns) -> float:
         """The largest residual of rows [sizes of the mechanism, rad]."""

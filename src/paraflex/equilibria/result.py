@@ -14,7 +14,8 @@ from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import System
 from paraflex.equilibria.branch import Point
-from paraflex.equilibria.equations import Coordinate, Equations
+from paraflex.equilibria.equations import Equations
+from paraflex.equilibria.given import Coordinate
 from paraflex.equilibria.solution import resting_solution
 from paraflex.equilibria.stability import Buckling, Vibrations
 from paraflex.errors import InputError, suggestion

@@ -14,7 +14,8 @@ from paraflex.arrays import Array
 from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, slowest, typical_square, undamped_modes
 from paraflex.dynamics.sparse import solved
 from paraflex.equilibria.branch import Point
-from paraflex.equilibria.equations import Coordinate, Equations, Matrices, Unknowns
+from paraflex.equilibria.equations import Equations, Matrices, Unknowns
+from paraflex.equilibria.given import Coordinate
 from paraflex.linear.independent import unit_rows
 
 Complex = NDArray[np.complex128]

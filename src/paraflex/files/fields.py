@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
 from paraflex.files.expressions import ExpressionError, evaluate, names_in
 from paraflex.mechanism import JOINT_KINDS
-from paraflex.units import FIELD_UNITS, PLAIN, Dimension, quantities_in, spelt, unit_named
+from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, quantities_in, spelt, unit_named
 
 # A place in parsed TOML: keys of tables and indices of lists.
 Place = tuple[str | int, ...]
@@ -24,8 +24,6 @@ _IN_UNITS = re.compile(rf"\bin ({_SI}(?:(?:,|,? (?:or|and)) {_SI})*)(?=[\s,.)]|$
 _AND = re.compile(r" and |, (?!or\b)")
 # Tables of numbers by names of the user's, and of values whose fields are those of another file.
 _OF_ANY_UNIT = ("parameters", "set")
-# What a spring's stiffness, a rest, a torque or a speed at a joint is where the joint slides.
-WHERE_IT_SLIDES = {"N m/rad": "N/m", "N m s/rad": "N s/m", "N m": "N", "rad": "m", "rad/s": "m/s"}
 _WHERE_IT_TURNS = {slides: turns for turns, slides in WHERE_IT_SLIDES.items()}
 
 
@@ -206,13 +204,26 @@ def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
     if len(place) < 3 or {"angle", "displacement"} & set(place):
         return None
     table, owner, key = place[:3]
-    of_motor = (table, owner) == ("study", "torques")
+    if table == "statics" and owner in ("loads", "moved"):
+        return _moves_straight(data, str(key))
+    of_motor = table in ("study", "statics") and owner == "torques"
     name = _below(_below(data, "motor"), key) if of_motor else _below(_below(_below(data, table), owner), "joint")
+    return _joint_slides(data, name)
+
+
+def _joint_slides(data: Mapping[str, Any], name: Any) -> bool | None:
+    """Whether a joint slides; None where there is none of that name."""
     joint = _below(_below(data, "joint"), name) if isinstance(name, str) else None
     if joint is None:
         return None
     kind = JOINT_KINDS.get(str(_below(joint, "type")))
     return kind is not None and kind.slides
+
+
+def _moves_straight(data: Mapping[str, Any], coordinate: str) -> bool | None:
+    """Whether a coordinate of a joint or point is a length; None of an unknown name."""
+    point, _, axis = coordinate.rpartition(".")
+    return {"x": True, "y": True, "angle": False}.get(axis) if point else _joint_slides(data, coordinate)
 
 
 def is_table(annotation: Any) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.equilibria.given import StaticsDefaults, conditions
 from paraflex.errors import InputError, suggestion
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
@@ -48,6 +49,8 @@ class Model(CheckedFields):
         The file's text, which `save` keeps the comments of.
     settings : mapping
         What `load` has set in place of what the file says, by field.
+    statics : StaticsDefaults
+        What `paraflex.statics` finds unless asked otherwise.
     """
 
     mechanism: Mechanism
@@ -58,6 +61,7 @@ class Model(CheckedFields):
     start: Start | None = None
     text: str = field(default="", repr=False, compare=False)
     settings: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    statics: StaticsDefaults = field(default_factory=StaticsDefaults)
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -369,7 +373,22 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
             remedy='name "angle" among the coordinates of [end_effector], or leave it out',
         )  # fmt: skip
     start = None if table.start is None else read_start(table.start, mechanism)
-    return Model(mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start, text=text)
+    return Model(
+        mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start, text=text,
+        statics=_statics(table, mechanism),
+    )  # fmt: skip
+
+
+def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
+    said = dict(table.statics)
+    for name in ("held", "stiffness"):
+        said[name] = None if said[name] is None else tuple(said[name])
+    found = StaticsDefaults(**said)
+    try:
+        conditions(mechanism, found)
+    except InputError as error:
+        raise error.within("statics") from None
+    return found
 
 
 def _data(model: Model) -> dict[str, Any]:
@@ -396,7 +415,7 @@ def _carrier(model: Model) -> tuple[Any, ...]:
 
 
 def _tables(model: Model, **options: Any) -> dict[str, Any]:
-    return model_tables(model.mechanism, model.paths, model.study, model.start, **options)
+    return model_tables(model.mechanism, model.paths, model.study, model.start, model.statics, **options)
 
 
 def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:

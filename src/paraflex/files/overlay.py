@@ -124,7 +124,7 @@ def _namesakes(data: Mapping[str, Any], name: str) -> str:
 
 def _in_full(data: Mapping[str, Any], field: str) -> list[str]:
     """The parts of a name, with the table that it leaves out."""
-    parts = _parts(field)
+    parts = _joined(data, _parts(field))
     if parts[0] in data or parts[0] in ModelTable.model_fields:
         return parts
     fits = [
@@ -138,6 +138,19 @@ def _in_full(data: Mapping[str, Any], field: str) -> list[str]:
         names = ", ".join(_spelt(tuple(each)) for each in whole or fits)
         raise InputError("the name of several", field=field, remedy=f"choose from {names}")
     return (whole or fits or [parts])[0]
+
+
+def _joined(data: Mapping[str, Any], parts: list[str]) -> list[str]:
+    """Parts with those that are a key with points of the data put together: "statics.moved.stage.T.x"."""
+    for start in range(1, len(parts)):
+        place = _followed(data, parts[:start])
+        if len(place) < start:
+            break
+        inside = _at(data, place)
+        for end in range(len(parts), start + 1, -1) if isinstance(inside, dict) else ():
+            if (key := ".".join(parts[start:end])) in inside:
+                return [*parts[:start], key, *parts[end:]]
+    return parts
 
 
 def _followed(data: Mapping[str, Any], parts: Sequence[str]) -> Place:

@@ -28,6 +28,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from paraflex.equilibria.given import FACTORS, STEPS
 from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
@@ -644,6 +645,37 @@ class StudyDefaultsTable(_Table):
     )
 
 
+def _quoted(value: Any) -> Any:
+    """Values by names of coordinates: a name without quotes would be tables within tables."""
+    for name, each in value.items() if isinstance(value, dict) else ():
+        if isinstance(each, dict):
+            raise _refused(f'"{name}" is a table: a name with points stands in quotes', 'write "body.point.x" = ...')
+    return value
+
+
+NumbersByName = Annotated[dict[str, Number], BeforeValidator(_quoted, json_schema_input_type=dict[str, float | str])]
+
+
+class StaticsTable(_Table):
+    """What `paraflex statics` finds unless asked otherwise."""
+
+    loads: NumbersByName = Field(
+        default={}, description='the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"'
+    )
+    torques: NumbersByName = Field(default={}, description="the torque of each motor in N m")
+    moved: NumbersByName = Field(
+        default={}, description='the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start'
+    )
+    held: list[Text] | None = Field(
+        default=None, description="coordinates that stay; by default the joints of motors without a torque"
+    )
+    steps: Count = Field(default=STEPS, description="how many equal steps of all that is given")
+    stiffness: list[Text] | None = Field(
+        default=None, description="coordinates with a stiffness; by default those loaded or moved"
+    )
+    buckling: Count = Field(default=FACTORS, description="how many factors of buckling about every equilibrium")
+
+
 class _Parts(_Table):
     name: Text = Field(description="a name for the mechanism")
     description: Text = Field(default="", description="a sentence or two")
@@ -692,6 +724,7 @@ class ModelTable(_WithGroups):
     path: dict[str, PathTable] = Field(default={})
     start: StartTable | None = None
     study: StudyDefaultsTable = StudyDefaultsTable()
+    statics: StaticsTable = StaticsTable()
 
 
 def model_schema() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The tables of a model file from the mechanism, the paths, the study and the start that it is to say."""
+"""The tables of a model file from the mechanism, the paths, the study, start and statics that it is to say."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from itertools import count
 from numbers import Integral
 from typing import Any
 
+from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import InputError
 from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
@@ -49,6 +50,7 @@ def model_tables(
     paths: Mapping[str, Path],
     study: StudyDefaults,
     start: Start | None,
+    statics: StaticsDefaults,
     *,
     file: Mapping[str, Any] | None = None,
     before: Mechanism | None = None,
@@ -58,7 +60,7 @@ def model_tables(
 
     Parameters
     ----------
-    mechanism, paths, study, start
+    mechanism, paths, study, start, statics
     file : mapping, optional
         Data of a file whose names for sections, materials and lumps are kept.
     before : Mechanism, optional
@@ -100,6 +102,7 @@ def model_tables(
         "path": {name: _path(path, name, paths) for name, path in paths.items()},
         "start": {} if start is None else _start(start),
         "study": _fields(study) | ({"torques": _torques(study)} if study.torques else {}),
+        "statics": _fields(statics),
     }
     return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
 

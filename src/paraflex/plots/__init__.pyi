@@ -32,6 +32,7 @@ from .linear import (
     poles_along_path as poles_along_path,
     singular_values as singular_values,
 )
+from .maps import response_map as response_map
 from .measured import sensors as sensors
 from .methods import work_precision as work_precision
 from .mode_shapes import mode_shapes as mode_shapes

@@ -116,6 +116,7 @@ _RUN = (
 )
 _DESIGNS = (
     CatalogueFigure("response_curves", "responses", "metrics over parameters", "designs"),
+    CatalogueFigure("response_map", "maps", "lines of equal metrics over two parameters", "designs"),
     CatalogueFigure("parallel_coordinates", "parallel", "all numbers of every design, as lines", "designs"),
     CatalogueFigure("pareto_front", "responses", "two metrics of every design, and the best compromises", "designs"),
 )

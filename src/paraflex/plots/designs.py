@@ -18,8 +18,9 @@ from paraflex.results.metrics import JOINT, METRICS, MOTOR
 
 Array = NDArray[np.float64]
 
-# Metrics by which designs are not chosen: of the solver, and that of which more is better.
-_NOT_JUDGED = (*(metric.name for metric in METRICS.values() if metric.of_solver), "safety_factor_min")
+# Metrics by which designs are not chosen: of the solver, and those of which more may be better.
+_NOT_JUDGED = tuple(metric.name for metric in METRICS.values() if metric.of_solver or not metric.judged)
+_OF_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
 _OF_MEMBERS = tuple(f"{metric.name}." for metric in METRICS.values() if metric.each in (MOTOR, JOINT))
 _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
 _FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
@@ -79,7 +80,7 @@ class DesignTable:
         return {pair: done.only((done.path == pair[0]) & (done.mode == pair[1])) for pair in pairs}
 
     def judged_by(self, names: Sequence[str] | None, most: int) -> list[str]:
-        """The metrics asked for; else the first that differ among runs and are not counts of the solver."""
+        """The metrics asked for; else the first that differ: those by which designs are chosen, or others."""
         for name in names or ():
             if name not in self.metrics:
                 raise InputError(
@@ -89,7 +90,8 @@ class DesignTable:
         if names:
             return list(names)
         # Metrics of single motors and joints only if there are no others.
-        varying = [name for name in self.metrics if self._varies(name) and name not in _NOT_JUDGED]
+        varying = [name for name in self.metrics if self._varies(name) and name.partition(".")[0] not in _OF_SOLVER]
+        varying = [name for name in varying if _is_judged(name)] or varying
         chosen = ([name for name in varying if not name.startswith(_OF_MEMBERS)] or varying)[:most]
         if not chosen:
             raise InputError("no metric varies", field="metric", remedy="run more designs, or wider ranges")
@@ -97,13 +99,15 @@ class DesignTable:
 
     @property
     def judged(self) -> list[str]:
-        """The metrics by which designs are chosen; none if no metric differs among runs."""
+        """The metrics by which designs are chosen, less being better; the first of them if none differs among runs."""
         if not self.complete.any():
             return []
         try:
-            return self.judged_by(None, len(self.metrics))
+            found = self.judged_by(None, len(self.metrics))
         except InputError:
-            return [name for name, values in self.metrics.items() if np.isfinite(values).any()][:1]
+            found = [name for name, values in self.metrics.items() if np.isfinite(values).any()]
+            return [name for name in found if _is_judged(name)][:1]
+        return [name for name in found if _is_judged(name)]
 
     def values(self, row: int) -> tuple[float, ...]:
         """The numbers of a row's design, in the order of the parameters."""
@@ -130,6 +134,10 @@ class DesignTable:
         values = self.metrics[name][self.complete]
         values = values[np.isfinite(values)]
         return values.size > 1 and float(np.ptp(values)) > _NOT_VARIED * float(np.max(np.abs(values)))
+
+
+def _is_judged(column: str) -> bool:
+    return column.partition(".")[0] not in _NOT_JUDGED
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:

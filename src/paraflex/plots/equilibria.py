@@ -21,14 +21,13 @@ from paraflex.plots.scene import Limits, common_limits, scene
 from paraflex.plots.style import ZERO, look_of
 from paraflex.plots.themes import Theme, theme
 from paraflex.results.kinds import check_kind
-from paraflex.results.statics_data import step_kinds
+from paraflex.results.statics_data import as_samples, branch_parts, seen_buckling
+from paraflex.results.statics_rows import given_coordinates, is_wide
 
 Array = NDArray[np.float64]
 
 # Natural frequencies drawn against travel.
 _FREQUENCIES = 4
-# Stiffnesses that differ by more are drawn on a logarithmic axis.
-_SPREAD = 30.0
 # The largest displacement of a buckling shape, as a part of the picture's size.
 _SWING = 0.12
 _TITLE = 5.0
@@ -72,8 +71,7 @@ def stiffness_travel(data: xr.Dataset) -> Figure:
         for number, k in enumerate(own):
             _branch(panel, data, x, values[:, number], symbol(str(data["named"].values[k])), look_of(number))
         panel.set_ylabel(f"stiffness [{name}]")
-        finite = values[np.isfinite(values)]
-        if finite.size and (finite > 0.0).all() and finite.max() > _SPREAD * finite.min():
+        if is_wide(values):
             panel.set_yscale("log")
             mark_powers(panel)
         panel.set_xlabel(label)
@@ -102,14 +100,12 @@ def deformed_shapes(data: xr.Dataset, theme_name: str = "light") -> Figure:
 def buckling_shapes(data: xr.Dataset, theme_name: str = "light") -> Figure:
     """How the mechanism buckles, as seen from the last stable equilibrium; displacements of one size, pale before."""
     check_kind(data, "statics")
-    if "buckling_shape" not in data:
+    seen = seen_buckling(data)
+    if seen is None:
         raise InputError("nothing buckles under what is given", field="data", remedy="load it, or ask for --buckling 1")
-    known = np.isfinite(data["buckling_factor"].values)
-    steps = np.flatnonzero(known.any(axis=1))
-    stable = [step for step in steps if data["stable"].values[step]]
-    step = int(stable[-1] if stable else steps[0])
+    step, numbers = seen
     pictures = []
-    for number in np.flatnonzero(known[step]):
+    for number in numbers:
         pair = data.isel(step=[step, step])
         shape = pair["shape"].values.astype(float)
         size = float(np.max(np.ptp(shape[0], axis=0)))
@@ -135,8 +131,8 @@ def _pictures(runs: list[tuple[xr.Dataset, str]], look: Theme) -> tuple[Figure, 
     """The last step of each, links of those before pale, side by side."""
     width = page_width(TWO_COLUMNS)
     columns = 1 if is_narrow() else min(len(runs), 3)
-    scenes = [scene(data.rename(step="time").assign_coords(time=np.arange(float(data.sizes["step"]))),
-                    np.arange(float(data.sizes["step"]))) for data, _ in runs]  # fmt: skip
+    samples = [as_samples(data) for data, _ in runs]
+    scenes = [scene(data, data["time"].values) for data in samples]
     limits = common_limits(scenes)
     aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), 0.35, 1.6))
     aspect = min(aspect, 0.6) if columns == 1 else aspect
@@ -164,7 +160,7 @@ def _pale(panel: Axes, bodies: list[Array], look: Theme) -> None:
 def _given(data: xr.Dataset) -> list[int]:
     """Numbers of the coordinates that are moved or loaded."""
     check_kind(data, "statics")
-    found = [k for k, role in enumerate(data["role"].values) if role in ("moved", "loaded")]
+    found = given_coordinates(data)
     if not found:
         raise InputError("nothing is loaded or moved in these equilibria", field="data",
                          remedy="give --load or --move")  # fmt: skip
@@ -173,20 +169,10 @@ def _given(data: xr.Dataset) -> list[int]:
 
 def _branch(panel: Axes, data: xr.Dataset, x: Array, y: Array, label: str, look: dict[str, Any]) -> None:
     """A curve over the branch, dashed where it is unstable, limit points as rings."""
-    kinds = np.array(step_kinds(data))
-    stable = kinds == "stable"
-    panel.plot(np.where(stable | _beside(stable), x, np.nan), y, label=label or None, color=look["color"],
-               linestyle="-" if stable.all() else look["linestyle"] if label else "-")  # fmt: skip
-    if not stable.all():
-        panel.plot(np.where(stable, np.nan, x), y, color=look["color"], linestyle=":")
-    limit = kinds == "limit point"
-    panel.plot(x[limit], y[limit], linestyle="", marker="o", markersize=4.0, markerfacecolor="white",
+    parts = branch_parts(data)
+    panel.plot(np.where(parts.stable, x, np.nan), y, label=label or None, color=look["color"],
+               linestyle=look["linestyle"] if label and parts.unstable.any() else "-")  # fmt: skip
+    if parts.unstable.any():
+        panel.plot(np.where(parts.unstable, x, np.nan), y, color=look["color"], linestyle=":")
+    panel.plot(x[parts.limit], y[parts.limit], linestyle="", marker="o", markersize=4.0, markerfacecolor="white",
                markeredgecolor=look["color"])  # fmt: skip
-
-
-def _beside(stable: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Limit points and others next to a stable step, to which its curve reaches."""
-    out = np.zeros_like(stable)
-    out[1:] |= stable[:-1]
-    out[:-1] |= stable[1:]
-    return out

@@ -98,13 +98,15 @@ _PREFIXES = {
     "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
     "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
     "Pa": (DisplayUnit("GPa", 1e-9), STRESS),
+    "N/m": (DisplayUnit("kN/mm", 1e-6), DisplayUnit("N/mm", 1e-3), DisplayUnit("N/m", 1.0)),
+    "m/N": (DisplayUnit("mm/N", 1e3), DisplayUnit("µm/N", 1e6), DisplayUnit("nm/N", 1e9)),
 }
 # The largest value of a unit is at least so many: stresses are in MPa, moduli in GPa.
 _LEAST, _LEAST_OF = 0.1, {"GPa": 2.0}
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """The unit in which the largest of lengths, angles or stresses has few digits: "m", "rad", "Pa"; others stay."""
+    """The unit in which the largest of lengths, angles, stresses or stiffnesses has few digits; others stay."""
     largest, choices = peak(values), display_units(unit)
     if largest == 0.0:
         return next(choice for choice in choices if choice.name not in _LEAST_OF)

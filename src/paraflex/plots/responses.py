@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,8 +13,9 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError
 from paraflex.plots.designs import DesignTable, in_conflict, undominated
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import peak, plain, power_of_ten
+from paraflex.plots.labels import plain
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
+from paraflex.plots.scales import round_scale, scaled_label
 from paraflex.plots.style import look_of
 
 Array = NDArray[np.float64]
@@ -46,12 +46,12 @@ def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) ->
     for row, metric in zip(axes, rows, strict=True):
         label, factor = table.labelled(metric)
         for panel, parameter in zip(row, columns, strict=True):
-            scale = _scale(table.parameters[parameter])
+            scale = round_scale(table.parameters[parameter])
             for k, (pair, runs) in enumerate(series.items()):
                 x, y = runs.parameters[parameter] / scale, factor * runs.metrics[metric]
                 _draw_response(panel, x, y, k, _series_name(pair, table), alone=len(table.varied) == 1)
             panel.margins(x=0.05)
-            panel.set_xlabel(plain(parameter) + (f" [{power_of_ten(scale)}]" if scale != 1.0 else ""))
+            panel.set_xlabel(scaled_label(parameter, scale))
             panel.locator_params(axis="x", nbins=5)
         row[0].set_ylabel(label)
     return lay_out(figure, axes, panel_height=42.0 if len(rows) > 1 else 52.0)
@@ -68,12 +68,6 @@ def _draw_response(panel: Axes, x: Array, y: Array, number: int, name: str, *, a
     panel.plot(x, y, linestyle="none", **mark, markersize=2.2, markeredgewidth=0.0, alpha=shade)
     middles = _medians(x[order], y[order])
     panel.plot(*middles, **look, linewidth=1.3, label=f"{name}, median")
-
-
-def _scale(values: Array) -> float:
-    """A power of a thousand that leaves few zeros in very large or small numbers; 1 for all others."""
-    size = peak(values)
-    return 1.0 if size == 0.0 or 1e-3 <= size < 1e5 else 1e3 ** math.floor(math.log10(size) / 3.0)
 
 
 def _medians(x: Array, y: Array) -> tuple[Array, Array]:

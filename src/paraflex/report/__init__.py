@@ -12,5 +12,7 @@ from paraflex.report.page import (
     render as render,
     save_page as save_page,
 )
+from paraflex.report.reduction import reduction_page as reduction_page
+from paraflex.report.statics import statics_page as statics_page
 from paraflex.report.tracking import tracking_page as tracking_page
 from paraflex.report.verification import verification_page as verification_page

@@ -57,6 +57,8 @@ class Animation:
         How many times deflections are drawn at first.
     periodic : bool
         Whether it is a turn of something that comes again and again: its time is shown as a phase.
+    moments : sequence of str
+        What is shown in place of the time of each frame, of frames that are no instants.
     """
 
     time: Array
@@ -68,6 +70,7 @@ class Animation:
     path: Array | None = None
     magnify: float = 1.0
     periodic: bool = False
+    moments: Sequence[str] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The animation in plain values for JSON."""
@@ -87,6 +90,7 @@ class Animation:
             "looks": LOOKS,
             "magnify": self.magnify,
             "periodic": self.periodic,
+            "moments": list(self.moments),
             "marks": [one and [_marks(still_marks(one, limits), 1), _marks(moving_marks(one, limits), self.time.size)]
                       for one in self.scenes],
             # How far the moving symbols are from where they were if nothing bent.

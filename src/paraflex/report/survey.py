@@ -13,7 +13,7 @@ from paraflex.report.curves import DOTTED, look
 from paraflex.report.page import Chart, Curve, DesignColumn, Designs, Look, Panel, Picker
 from paraflex.report.text import count
 
-LOWER = "Less is taken as better; a safety factor, of which more is better, chooses no design."
+LOWER = "Less is taken as better; a safety factor, a stiffness and others of which more may be better choose no design."
 
 
 class Step(NamedTuple):

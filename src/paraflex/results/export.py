@@ -31,8 +31,10 @@ if TYPE_CHECKING:
 EXPORT_FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
 TIME_SERIES, FIGURES_TABLE, SHAPES, SECTIONS = "time_series", "figures", "shapes", "sections"
-# Dimensions that rows of tables are of, outermost first.
-_ROW_DIMENSIONS = ("model", "mode", "time")
+# Dimensions that rows of tables are of, outermost first, before that along which results go.
+_ROW_DIMENSIONS = ("model", "mode")
+# The dimension along which results of a kind go, and its table; of others time.
+_ALONG = {"statics": ("step", "steps"), "reduction": ("frequency", "frequencies")}
 # MATLAB takes longer names apart.
 _LONGEST_NAME = 63
 
@@ -44,7 +46,7 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     Parameters
     ----------
     data : xarray.Dataset
-        Of a run, with a path or without, or of a verification.
+        Of a run, with a path or without, of a verification, of equilibria or of reduced models.
     shapes : bool
         Also the deformed shapes, and section forces along beams: many rows.
 
@@ -52,7 +54,8 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     -------
     dict of str to pandas.DataFrame
         `time_series`: a row a model (of a verification), mode and time; a variable of more dimensions makes a column
-        for each of their labels, `torque_tau1` or `joint_force_B1_x`. `figures`: a row a model and mode. `shapes`: a
+        for each of their labels, `torque_tau1` or `joint_force_B1_x`; of equilibria it is `steps`, of reduced models
+        `frequencies`. `figures`: a row a model and mode. `shapes`: a
         row a model, mode, time and drawn point; `sections`: a row a model, mode, time and place along a beam. Their
         `attrs` hold `units` and `meanings` of columns.
     """
@@ -63,18 +66,17 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
         )  # fmt: skip
     drawn = [name for name in data.data_vars if "station" in data[name].dims]
     forces = [name for name in data.data_vars if SECTION in data[name].dims]
-    over_time = [name for name in data.data_vars if "time" in data[name].dims and name not in (*drawn, *forces)]
-    single = [name for name in data.data_vars if name not in (*drawn, *forces, *over_time)]
-    tables = {
-        TIME_SERIES: _table(data, over_time, _ROW_DIMENSIONS),
-        FIGURES_TABLE: _table(data, single, _ROW_DIMENSIONS[:2]),
-    }
+    dim, first = _ALONG.get(kind_of(data), ("time", TIME_SERIES))
+    rows = (*_ROW_DIMENSIONS, dim)
+    along = [name for name in data.data_vars if dim in data[name].dims and name not in (*drawn, *forces)]
+    single = [name for name in data.data_vars if name not in (*drawn, *forces, *along)]
+    tables = {first: _table(data, along, rows), FIGURES_TABLE: _table(data, single, _ROW_DIMENSIONS)}
     if shapes and drawn:
         stations = data.assign_coords(station=np.arange(data.sizes["station"]))
-        tables[SHAPES] = _table(stations, ["station_body", *drawn], (*_ROW_DIMENSIONS, "station"))
+        tables[SHAPES] = _table(stations, ["station_body", *drawn], (*rows, "station"))
     if shapes and forces:
         stations = data.assign_coords({SECTION: np.arange(data.sizes[SECTION])})
-        tables[SECTIONS] = _table(stations, ["section_body", "section_place", *forces], (*_ROW_DIMENSIONS, SECTION))
+        tables[SECTIONS] = _table(stations, ["section_body", "section_place", *forces], (*rows, SECTION))
     return tables
 
 
@@ -153,7 +155,8 @@ def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = Fals
                 save_results(data, unfinished)
         return [file]
     tables = result_tables(data, shapes=shapes and not single)
-    files = {name: output if single else output / f"{name}{ending}" for name in ([TIME_SERIES] if single else tables)}
+    names = [next(iter(tables))] if single else tables
+    files = {name: output if single else output / f"{name}{ending}" for name in names}
     _refuse(list(files.values()), force)
     for name, file in files.items():
         with _added(file) as unfinished:
@@ -192,14 +195,15 @@ def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
 def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
     """Results as a struct for MATLAB.
 
-    A field a variable or coordinate. Time is the first dimension, so that `plot(results.time, results.torque(:, :, 1))`
-    draws the torques of the first mode; mode and model are the last. Labels are cells of text. `units`, `dims` and
-    `meaning` have the same fields: text, cells of names of dimensions, text. `attributes` says where results come from.
+    A field a variable or coordinate. Time, or the step of equilibria, is the first dimension, so that
+    `plot(results.time, results.torque(:, :, 1))` draws the torques of the first mode; mode and model are the last.
+    Labels are cells of text. `units`, `dims` and `meaning` have the same fields: text, cells of names of dimensions,
+    text. `attributes` says where results come from.
     """
     struct: dict[str, Any] = {"units": {}, "dims": {}, "meaning": {}}
     for name in (*data.coords, *data.data_vars):
         array, field = data[name], matlab_name(str(name))
-        first = [dim for dim in ("time",) if dim in array.dims]
+        first = [dim for dim in ("time", *(dim for dim, _ in _ALONG.values())) if dim in array.dims]
         last = [dim for dim in ("mode", "model") if dim in array.dims]
         array = array.transpose(*first, *(dim for dim in array.dims if dim not in (*first, *last)), *last)
         struct[field] = _matlab_value(array.values)

@@ -240,7 +240,7 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
     _name_efforts(data, mechanism.motor_units(), "motor_speed", _TORQUES)
     if READING in data:
         readings = list(mechanism.sensor_units())
-        _name_units(data[READING], list(dict.fromkeys(readings)), readings)
+        name_units(data[READING], list(dict.fromkeys(readings)), readings)
     _name_efforts(data, drives, "drive_speed", ("drive_torque",))
     for name, of_angle, of_travel in (("joint_coordinate", "rad", "m"), ("joint_speed", "rad/s", "m/s")):
         if name in data:
@@ -256,12 +256,12 @@ def _name_efforts(data: xr.Dataset, units: Iterable[str], speed: str, names: Ite
     if speed in data:
         data[speed].attrs["units"] = ", ".join(speeds[unit] for unit in units)
     for name in (each for each in names if each in data):
-        _name_units(data[name], units, each)
+        name_units(data[name], units, each)
         if units == ["N"]:
             data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")
 
 
-def _name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -> None:
+def name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -> None:
     """All units of a variable; where these are several `units_each`, those of its labels in their order."""
     array.attrs["units"] = ", ".join(units)
     if len(units) > 1:

@@ -15,11 +15,13 @@ import numpy as np
 
 from paraflex.results.formulas import drift_speed, integral, rms, vibration
 from paraflex.results.traces import Trace
+from paraflex.units import WHERE_IT_SLIDES
 
 # Kinds of runs.
-PATH, MOTION = "path", "motion"
-MOTOR, DRIVE, JOINT = "motor", "drive", "joint"
-# Names of a mechanism's motors, drives and joints by these words.
+PATH, MOTION, STATICS = "path", "motion", "statics"
+# Kinds of members, of which a metric has a number each: of equilibria named coordinates, and those with a stiffness.
+MOTOR, DRIVE, JOINT, COORDINATE, DIRECTION = "motor", "drive", "joint", "coordinate", "direction"
+# Names of a mechanism's members by these words, and of those that slide by `sliding`.
 Members = Mapping[str, Sequence[str]]
 # Of the traces of a run and those of the nominal one. What only some traces have (`RunTraces`) is asked for as well.
 Formula = Callable[[Any, Any], Any]
@@ -34,11 +36,11 @@ class Metric:
     name : str
     meaning, unit : str
     formula : callable
-        From `Traces`; a metric of each motor, drive or joint gives one number each.
+        From `Traces`; a metric of each motor, joint or other member gives one number each.
     label : str
         What it is called in print; its name by default.
     each : str
-        "motor", "drive" (prescribed motion) or "joint", of which it has a number each; empty for one of the whole run.
+        The kind of members, "motor" or another, of which it has a number each; empty for one of the whole run.
     smooth : bool
         Whether the formula has derivatives.
     kept : bool
@@ -47,12 +49,14 @@ class Metric:
         Whether it tells of the integration, and not of the design.
     whole : bool
         Whether it is a count.
-    along_path : bool
-        Whether only runs along a path have it.
+    runs : tuple of str
+        Kinds of runs that have it: along a "path", of a mechanism's own "motion", "statics".
     of_motors : bool
         Whether it is zero without motors.
-    kept_of : tuple of str
-        Kinds of runs, along a "path" or of a mechanism's own "motion", that it is kept of unless metrics are named.
+    kept_of : tuple of str, optional
+        Kinds of runs that it is kept of unless metrics are named; all that have it by default.
+    judged : bool
+        Whether less of it is better, so that designs may be chosen by it.
     """
 
     name: str
@@ -65,17 +69,37 @@ class Metric:
     kept: bool = False
     of_solver: bool = False
     whole: bool = False
-    along_path: bool = False
+    runs: tuple[str, ...] = (PATH, MOTION)
     of_motors: bool = False
-    kept_of: tuple[str, ...] = (PATH, MOTION)
+    kept_of: tuple[str, ...] | None = None
+    judged: bool = True
 
     def value(self, traces: Any) -> Any:
         """The metric of a run; an array for a metric of each motor, drive or joint."""
         return self.formula(traces, traces)
 
     def columns(self, members: Members) -> list[str]:
-        """Names of its columns: NAME, or NAME.MOTOR for each motor, NAME.DRIVE or NAME.JOINT."""
-        return [f"{self.name}.{member}" for member in members[self.each]] if self.each else [self.name]
+        """Names of its columns: NAME, or NAME.MOTOR for each motor, and so for other members."""
+        return [f"{self.name}.{member}" for member in members.get(self.each, ())] if self.each else [self.name]
+
+    def is_kept_of(self, runs: str) -> bool:
+        """Whether it is kept of a kind of runs unless metrics are named."""
+        return runs in (self.runs if self.kept_of is None else self.kept_of)
+
+    def unit_of(self, column: str, members: Members) -> str:
+        """Unit of one of its columns: of a member that slides that of a length."""
+        slides = column.partition(".")[2] in members.get(sliding(self.each), ())
+        return WHERE_IT_SLIDES.get(self.unit, self.unit) if slides else self.unit
+
+
+def sliding(each: str) -> str:
+    """The word in `Members` for those of a kind that slide."""
+    return f"sliding {each}"
+
+
+def metric_unit(column: str, members: Members) -> str:
+    """Unit of a column, of a mechanism with these members."""
+    return METRICS[column.partition(".")[0]].unit_of(column, members)
 
 
 def _as_it_is(formula: Callable[[Any], Any]) -> Formula:
@@ -166,30 +190,48 @@ def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = Fa
     return Metric(name, meaning, unit, formula, smooth=False, of_solver=True, whole=whole)
 
 
+def _of_statics(
+    name: str, meaning: str, unit: str, formula: Callable[[Any], Any], label: str = "", *, each: str = "",
+    whole: bool = False, judged: bool = False,
+) -> Metric:  # fmt: skip
+    """A metric of equilibria in steps, of which more may be as good as less."""
+    return Metric(name, meaning, unit, _as_it_is(formula), label, each=each, smooth=False, whole=whole,
+                  runs=(STATICS,), judged=judged)  # fmt: skip
+
+
+def _peaks(values: Trace) -> Trace:
+    """Largest magnitude of each column."""
+    return np.max(np.abs(values), axis=0)
+
+
 # Kept of every run: numbers of a model that does not hold are not to be taken for others.
 VALIDITY = "validity"
+# And of statics: those of equilibria that no mechanism stays in.
+UNSTABLE = "unstable_steps"
+ALWAYS = {PATH: (VALIDITY,), MOTION: (VALIDITY,), STATICS: (VALIDITY, UNSTABLE)}
+_ANY = (PATH, MOTION, STATICS)
 _AWAY = "distance of the end-effector from its desired place"
 
 # In this order they are columns of tables.
 _ALL = (
     Metric("tracking_rms_motion", f"root mean square {_AWAY} during the motion", "m",
-           _as_it_is(lambda x: rms(x.distance[x.moving])), "RMS error in the motion", kept=True, along_path=True),
+           _as_it_is(lambda x: rms(x.distance[x.moving])), "RMS error in the motion", kept=True, runs=(PATH,)),
     Metric("tracking_max_motion", f"largest {_AWAY} during the motion", "m",
-           _largest(lambda x: x.distance[x.moving]), "largest error in the motion", kept=True, along_path=True),
+           _largest(lambda x: x.distance[x.moving]), "largest error in the motion", kept=True, runs=(PATH,)),
     Metric("tracking_rms_after", f"root mean square {_AWAY} after the motion", "m",
-           _as_it_is(lambda x: rms(x.distance[~x.moving])), "RMS error after the motion", kept=True, along_path=True),
+           _as_it_is(lambda x: rms(x.distance[~x.moving])), "RMS error after the motion", kept=True, runs=(PATH,)),
     Metric("tracking_max_after", f"largest {_AWAY} after the motion", "m",
-           _largest(lambda x: x.distance[~x.moving]), "largest error after the motion", kept=True, along_path=True),
+           _largest(lambda x: x.distance[~x.moving]), "largest error after the motion", kept=True, runs=(PATH,)),
     Metric("tracking_rms", f"root mean square {_AWAY} over the whole run, dwell included", "m",
-           _as_it_is(lambda x: rms(x.distance)), "RMS tracking error", kept=True, along_path=True),
+           _as_it_is(lambda x: rms(x.distance)), "RMS tracking error", kept=True, runs=(PATH,)),
     Metric("tracking_max", f"largest {_AWAY} over the whole run", "m",
-           _largest(lambda x: x.distance), "largest tracking error", kept=True, along_path=True),
+           _largest(lambda x: x.distance), "largest tracking error", kept=True, runs=(PATH,)),
     Metric("residual_vibration", "root mean square distance of the end-effector from its drift after the motion", "m",
-           _as_it_is(lambda x: vibration(*x.after)), "residual vibration", kept=True, along_path=True),
+           _as_it_is(lambda x: vibration(*x.after)), "residual vibration", kept=True, runs=(PATH,)),
     Metric("drift_speed", "mean speed of the end-effector's drift after the motion", "m/s",
-           _as_it_is(lambda x: drift_speed(*x.after)), "drift after the motion", kept=True, along_path=True),
+           _as_it_is(lambda x: drift_speed(*x.after)), "drift after the motion", kept=True, runs=(PATH,)),
     Metric("deflection_max", "largest deflection of any body from its chord, the line between its ends", "m",
-           _largest_magnitude(lambda x: x.deflection), "largest deflection"),
+           _largest_magnitude(lambda x: x.deflection), "largest deflection", runs=_ANY),
     Metric("peak_torque_max", "largest magnitude of any motor's torque", "N m",
            _largest_magnitude(lambda x: x.torque), "peak torque", of_motors=True),
     Metric("rms_torque_norm", "root mean square of the torques' Euclidean norm", "N m",
@@ -210,30 +252,56 @@ _ALL = (
     Metric("drive_power_max", "largest magnitude of the power of each prescribed motion", "W",
            _largest_of_each(lambda x: x.drive_power), "largest power", each=DRIVE),
     Metric("joint_force_max", "largest force in any joint", "N",
-           _largest(lambda x: x.joint_force), "largest joint force", kept_of=(MOTION,)),
+           _largest(lambda x: x.joint_force), "largest joint force", runs=_ANY, kept_of=(MOTION, STATICS)),
     Metric("joint_speed_max", "largest magnitude of the rate of each joint's angle or travel", "rad/s",
            _largest_of_each(lambda x: x.joint_speed), "largest speed", each=JOINT, kept_of=()),
     Metric("strain_energy_max", "largest strain energy", "J",
-           _largest(lambda x: x.solution.strain_energy), "largest strain energy"),
+           _largest(lambda x: x.solution.strain_energy), "largest strain energy", runs=_ANY),
     Metric("kinetic_energy_max", "largest kinetic energy", "J",
            _largest(lambda x: x.solution.kinetic_energy), "largest kinetic energy"),
     Metric("stress_max", "largest magnitude of the stress in any beam, bending and axial; sections need outer_fibre",
-           "Pa", _stress, "largest stress"),
+           "Pa", _stress, "largest stress", runs=_ANY),
     Metric("safety_factor_min", "least strength over stress of any beam; materials need strength", "1",
-           _safety_factor, "least safety factor"),
+           _safety_factor, "least safety factor", runs=_ANY, judged=False),
     Metric("section_moment_max", "largest magnitude of the bending moment in any beam", "N m",
-           _section_moment, "largest bending moment"),
+           _section_moment, "largest bending moment", runs=_ANY),
     Metric("total_mass", "mass of all bodies", "kg",
-           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.system.bodies])), "mass"),
+           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.system.bodies])), "mass", runs=_ANY),
     Metric("actuation_condition_max", "largest condition number of the actuation matrix", "1",
-           _largest(lambda x: x.condition), "largest condition number", along_path=True),
+           _largest(lambda x: x.condition), "largest condition number", runs=(PATH,)),
     _of_the_solver("constraint_position_max", "largest constraint violation in position", "m"),
     _of_the_solver("energy_balance_max", "largest imbalance of energy and work", "J"),
     Metric(VALIDITY, "what the model leaves out, over its limit: it holds up to 1, and 0 where nothing bends", "1",
-           _as_it_is(lambda x: 0.0 if x.validity is None else x.validity.ratio), smooth=False),
+           _as_it_is(lambda x: 0.0 if x.validity is None else x.validity.ratio), smooth=False, runs=_ANY),
     _of_the_solver("steps", "accepted steps", whole=True),
     _of_the_solver("rejected", "rejected steps", whole=True),
     _of_the_solver("newton_iterations", "Newton iterations", whole=True),
+    _of_statics("travel", "change of each named coordinate from the start to the last step", "rad",
+                lambda x: x.travel[-1], each=COORDINATE),
+    _of_statics("travel_max", "largest magnitude of each named coordinate's change in all steps", "rad",
+                lambda x: _peaks(x.travel), "largest travel", each=COORDINATE, judged=True),
+    _of_statics("effort", "force or torque at each named coordinate at the last step: given, or what holds or moves it",
+                "N m", lambda x: x.effort[-1], "force or torque", each=COORDINATE),
+    _of_statics("effort_max", "largest magnitude of the force or torque at each named coordinate", "N m",
+                lambda x: _peaks(x.effort), "largest force or torque", each=COORDINATE, judged=True),
+    _of_statics("stiffness", "stiffness of each coordinate asked for at the last step", "N m/rad",
+                lambda x: x.stiffness[-1], each=DIRECTION),
+    _of_statics("stiffness_min", "least stiffness of each coordinate asked for, of all steps", "N m/rad",
+                lambda x: np.min(x.stiffness, axis=0), "least stiffness", each=DIRECTION),
+    _of_statics("compliance", "displacement by a unit force of each coordinate asked for at the last step", "rad/N/m",
+                lambda x: x.compliance[-1], each=DIRECTION, judged=True),
+    _of_statics("compliance_max", "largest compliance of each coordinate asked for, of all steps", "rad/N/m",
+                lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, judged=True),
+    _of_statics("frequency", "lowest natural frequency at the last step, what is held and moved kept", "Hz",
+                lambda x: x.frequency[-1], "lowest natural frequency at the last step"),
+    _of_statics("frequency_min", "lowest natural frequency of all steps; zero where a motion grows", "Hz",
+                lambda x: np.min(x.frequency), "lowest natural frequency"),
+    _of_statics("buckling_factor", "fraction of what is given at which it buckles, seen from the start; NaN for none",
+                "1", lambda x: x.buckling_factor),
+    _of_statics("limit_load", "fraction of all that is given at the first limit point; NaN for none", "1",
+                lambda x: x.limit_load),
+    _of_statics(UNSTABLE, "unstable equilibria among the steps", "1", lambda x: x.unstable_steps, whole=True,
+                judged=True),
 )  # fmt: skip
 
 METRICS: Mapping[str, Metric] = {metric.name: metric for metric in _ALL}

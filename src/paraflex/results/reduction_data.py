@@ -28,6 +28,8 @@ FULL = "full"
 _FREQUENCIES, _LOWEST, _BEYOND = 400, 1e-2, 2.5
 # Frequencies with motors free and held that are compared.
 _COMPARED = 6
+# A smaller deviation is called none.
+_ROUNDING = 1e-7
 UNITS = {
     "states": ("fewest states within the error up to the highest frequency; NaN where more than 80 are needed", "1"),
     "natural_frequency": ("undamped natural frequency above zero", "Hz"),
@@ -177,6 +179,12 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }  # fmt: skip
+
+
+def percent_off(value: float, exact: float) -> str:
+    """How far a number is off another one, in percent; rounding is none."""
+    part = value / exact - 1.0
+    return "0 %" if abs(part) < _ROUNDING else f"{100.0 * part:+.2g} %"
 
 
 def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:

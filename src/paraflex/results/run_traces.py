@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, TypeVar, overload
@@ -11,6 +12,8 @@ import numpy as np
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import drive_torques, joint_parts, load_in
 from paraflex.dynamics.points import point_motion
+from paraflex.equilibria.given import Coordinate
+from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
 from paraflex.motion import MotionRun
 from paraflex.results.formulas import length
@@ -20,7 +23,7 @@ from paraflex.results.traces import Trace, Traces
 from paraflex.tracking import TrackingRun
 from paraflex.validity import Validity
 
-R = TypeVar("R", TrackingRun, MotionRun)
+R = TypeVar("R", TrackingRun, MotionRun, Statics)
 
 
 class SolutionTraces(Generic[R]):
@@ -139,12 +142,84 @@ class MotionTraces(SolutionTraces[MotionRun]):
         return self.run.system
 
 
+@dataclass(frozen=True)
+class StaticsTraces(SolutionTraces[Statics]):
+    """Traces of equilibria, at their k steps and limit points.
+
+    Attributes
+    ----------
+    run : Statics
+    """
+
+    run: Statics
+
+    @property
+    def system(self) -> System:
+        """With the rows of what holds, moves and loads it; see `SolutionTraces`."""
+        return self.run.equations.extended
+
+    @property
+    def torque(self) -> Trace:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Zero: torques of motors are forces at coordinates."""
+        return np.zeros((len(self.run.equilibria), len(self.system.described.motors)))
+
+    @cached_property
+    def travel(self) -> Trace:
+        """Change (k, coordinates) of every named coordinate since the start [m, rad]."""
+        return self._columns(self.run.travel, self.run.coordinates)
+
+    @cached_property
+    def effort(self) -> Trace:
+        """Force or torque (k, coordinates) at every named coordinate [N, N m]."""
+        return self._columns(self.run.effort, self.run.coordinates)
+
+    @cached_property
+    def stiffness(self) -> Trace:
+        """Stiffness (k, directions) of coordinates that it is asked of [N/m, N m/rad]."""
+        return self._columns(self.run.stiffness, self.run.directions)
+
+    @property
+    def compliance(self) -> Trace:
+        """Compliance (k, directions) [m/N, rad/(N m)]."""
+        with np.errstate(divide="ignore"):
+            return 1.0 / self.stiffness
+
+    @property
+    def frequency(self) -> Trace:
+        """Lowest natural frequency (k,) [Hz]; NaN where nothing can move."""
+        found = self.run.frequencies
+        return found[:, 0] / (2.0 * np.pi) if found.shape[1] else np.full(len(found), np.nan)
+
+    @property
+    def buckling_factor(self) -> float:
+        """The least as seen from the start; NaN where there is none."""
+        return float(self.run.buckling[0, 0]) if self.run.buckling.size else float("nan")
+
+    @property
+    def limit_load(self) -> float:
+        """Fraction of what is given at the first limit point; NaN where there is none."""
+        return float(next(iter(self.run.fraction[self.run.limit]), np.nan))
+
+    @property
+    def unstable_steps(self) -> int:
+        """How many steps are unstable; limit points are no steps."""
+        return int(np.sum(~self.run.stable & ~self.run.limit))
+
+    def _columns(self, quantity: Callable[[str], Trace], of: Sequence[Coordinate]) -> Trace:
+        columns = [quantity(one.name) for one in of]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self.run.equilibria), 0))
+
+
 @overload
 def run_traces(run: TrackingRun) -> RunTraces: ...
 @overload
 def run_traces(run: MotionRun) -> MotionTraces: ...
-def run_traces(run: TrackingRun | MotionRun) -> RunTraces | MotionTraces:
+@overload
+def run_traces(run: Statics) -> StaticsTraces: ...
+def run_traces(run: TrackingRun | MotionRun | Statics) -> RunTraces | MotionTraces | StaticsTraces:
     """Traces of a run, at the samples it reached."""
+    if isinstance(run, Statics):
+        return StaticsTraces(run)
     solution = run.solution
     if isinstance(run, MotionRun):
         return MotionTraces(solution.t, run.applied, run)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from importlib.metadata import version
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.equilibria import Statics
@@ -16,7 +17,7 @@ from paraflex.findings import Finding
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.drawing import system_drawing
 from paraflex.results.kinds import check_kind
-from paraflex.results.labelled import label, link_coordinates, link_variables, with_totals
+from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.storage import SCHEMA
@@ -37,17 +38,22 @@ UNITS = {
     "fraction": ("fraction of all loads and travels that are given", "1"),
     "limit_point": ("whether the branch turns back here", "1"),
     "stable": ("whether no small motion grows, what is held and moved kept", "1"),
-    "place": ("value of a named coordinate", "m, rad"),
-    "travel": ("change of a named coordinate since the start", "m, rad"),
-    "effort": ("force or torque at a named coordinate: given, or what holds or moves it", "N, N m"),
+    "place": ("value of a named coordinate", ""),
+    "travel": ("change of a named coordinate since the start", ""),
+    "effort": ("force or torque at a named coordinate: given, or what holds or moves it", ""),
     "role": ("what is given of a named coordinate", "1"),
-    "stiffness": ("force for a unit displacement of a named coordinate", "N/m, N m/rad"),
-    "compliance": ("displacement by a unit force at a named coordinate", "m/N, rad/(N m)"),
+    "stiffness": ("force for a unit displacement of a named coordinate", ""),
+    "compliance": ("displacement by a unit force at a named coordinate", ""),
     "natural_frequency": ("undamped natural frequency about the equilibrium", "Hz"),
     "buckling_factor": ("fraction of all that is given at which the mechanism buckles", "1"),
     "buckling_shape": ("displacement of drawn points as it buckles, the largest is 1", "1"),
     "stress_step": ("step at which a beam's stress is largest", "1"),
 }
+# Units of named coordinates, of lengths and of angles.
+NAMED_UNITS = {
+    "place": ("m", "rad"), "travel": ("m", "rad"), "effort": ("N", "N m"), "stiffness": ("N/m", "N m/rad"),
+    "compliance": ("m/N", "rad/(N m)"),
+}  # fmt: skip
 _COMMENTS = {
     "effort": "on the mechanism along the coordinate: of a joint on its second body",
     "stiffness": "others are held and moved as they are, the coordinate itself set free; infinite where it cannot move",
@@ -95,6 +101,9 @@ def statics_dataset(
         if name in UNITS:
             meaning, unit = UNITS[name]
             out[name].attrs = {"long_name": meaning, "units": unit}
+        if name in NAMED_UNITS:
+            each = [NAMED_UNITS[name][one.unit == "rad"] for one in found.coordinates]
+            name_units(out[name], [unit for unit in NAMED_UNITS[name] if unit in each] or NAMED_UNITS[name], each)
         if name in _COMMENTS:
             out[name].attrs["comment"] = _COMMENTS[name]
     out.attrs = {
@@ -197,6 +206,46 @@ def step_kinds(data: xr.Dataset) -> list[str]:
     """In words, whether each step is "stable", "unstable" or a "limit point"."""
     limit, stable = data["limit_point"].values, data["stable"].values
     return ["limit point" if at else "stable" if holds else "unstable" for at, holds in zip(limit, stable, strict=True)]
+
+
+class BranchParts(NamedTuple):
+    """Masks (steps,) of a branch as it is drawn: a curve of stable steps, one of unstable ones, and limit points."""
+
+    stable: NDArray[np.bool_]
+    unstable: NDArray[np.bool_]
+    limit: NDArray[np.bool_]
+
+
+def branch_parts(data: xr.Dataset) -> BranchParts:
+    """Which steps belong to the curve of stable equilibria, which to that of unstable ones, and limit points.
+
+    The curves meet at limit points; where there is none between a stable step and an unstable one, the second curve
+    begins at the stable step.
+    """
+    kinds = np.array(step_kinds(data))
+    stable, unstable, limit = (kinds == kind for kind in ("stable", "unstable", "limit point"))
+    beside = np.zeros_like(stable)
+    beside[1:] |= unstable[:-1]
+    beside[:-1] |= unstable[1:]
+    return BranchParts(stable | limit, unstable | limit | (stable & beside) if unstable.any() else unstable, limit)
+
+
+def seen_buckling(data: xr.Dataset) -> tuple[int, list[int]] | None:
+    """The last stable equilibrium with a buckling shape, else the first, and which shapes it has; None without any."""
+    if "buckling_shape" not in data:
+        return None
+    known = np.isfinite(data["buckling_factor"].values)
+    steps = np.flatnonzero(known.any(axis=1))
+    if not steps.size:
+        return None
+    stable = [step for step in steps if data["stable"].values[step]]
+    step = int(stable[-1] if stable else steps[0])
+    return step, np.flatnonzero(known[step]).tolist()
+
+
+def as_samples(data: xr.Dataset) -> xr.Dataset:
+    """Equilibria as samples of a run, their numbers in place of times [s]."""
+    return data.rename(step="time").assign_coords(time=np.arange(float(data.sizes["step"])))
 
 
 @checked_arguments()

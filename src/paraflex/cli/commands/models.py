@@ -161,7 +161,7 @@ class ReduceRequest(LinearRequest):
 
 @dataclass(frozen=True, kw_only=True)
 class StaticsRequest:
-    """What `paraflex statics` is asked for."""
+    """What `paraflex statics` is asked for; what is not is as the [statics] of the model's file has it."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     loads: Annotated[
@@ -191,7 +191,7 @@ class StaticsRequest:
             help="Joint or point's coordinate that stays; repeatable. Default: joints of motors without --torque.",
         ),
     ] = None
-    steps: Annotated[int, Option(metavar="N", help="Equal steps of all loads and travels.")] = 10
+    steps: Annotated[int | None, Option(metavar="N", help="Equal steps of all loads and travels. Default: 10.")] = None
     stiffness: Annotated[
         list[str] | None,
         Option(
@@ -200,13 +200,16 @@ class StaticsRequest:
             help="Coordinate with a stiffness; repeatable. Default: those loaded or moved, else the end-effector's.",
         ),
     ] = None
-    buckling: Annotated[int, Option(metavar="N", help="Factors of buckling about every equilibrium.")] = 1
+    buckling: Annotated[
+        int | None, Option(metavar="N", help="Factors of buckling about every equilibrium. Default: 1.")
+    ] = None
     assembly: AssemblyOption = None
     out: Annotated[
         str | None,
-        Option("--out", "--output", metavar="DIR", help="Folder for statics.nc, statics.json and figures."),
+        Option("--out", "--output", metavar="DIR", help="Folder for statics.nc, statics.json, figures and report."),
     ] = None
     force: ReplaceOption = False
+    report: ReportOption = True
     json: Json = False
 
 

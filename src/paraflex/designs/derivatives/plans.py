@@ -98,9 +98,10 @@ def check_has_path(setting: Setting) -> None:
         The mechanism has no path.
     """
     if not setting.has_path:
+        why = "not of statics" if setting.statics else "which the mechanism does not have"
         raise InputError(
-            "derivatives are of runs along a path, which the mechanism does not have", field="mechanism",
-            value=setting.source, remedy="take a sweep, or an optimisation with differences",
+            f"derivatives are of runs along a path, {why}", field="mechanism", value=setting.source,
+            remedy="take a sweep, or an optimisation with differences",
         )  # fmt: skip
 
 

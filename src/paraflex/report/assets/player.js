@@ -15,7 +15,13 @@ const player = (() => {
   const stands = new Map();
 
   const end = () => times[times.length - 1];
-  const secondsText = (time) => (film && film.periodic ? `${Math.round(360 * time / end())}°` : `${time.toFixed(end() < 20 ? 3 : 2)} s`);
+  const named = film && film.moments.length > 0;
+  // Frames that are no instants have names: that of the nearest one.
+  function momentName(time) {
+    const [before, share] = report.between(times, time);
+    return film.moments[Math.min(before + Math.round(share), film.moments.length - 1)];
+  }
+  const secondsText = (time) => (named ? momentName(time) : film && film.periodic ? `${Math.round(360 * time / end())}°` : `${time.toFixed(end() < 20 ? 3 : 2)} s`);
 
   function seek(time) {
     report.set("time", Math.min(Math.max(Number(time), times[0]), end()));
@@ -238,7 +244,7 @@ const player = (() => {
     pen.font = `13px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "top"; pen.fillStyle = colours.soft;
     const run = page.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
     const by = film.periodic ? `   displacements × ${state.magnify}` : state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
-    const caption = `${film.periodic ? "phase" : "t ="} ${secondsText(state.time)}${by}`;
+    const caption = `${named ? "" : film.periodic ? "phase " : "t = "}${secondsText(state.time)}${by}`;
     // On a narrow screen the buttons alone name the run.
     pen.fillText(pen.measureText(run + caption).width < width - 24 ? run + caption : caption, 12, 8);
     if (stopped !== null) { pen.fillStyle = colours.mark; pen.fillText(`this run ended at ${secondsText(stopped)}`, 12, 27); }
@@ -354,6 +360,11 @@ const player = (() => {
     if (!film) {
       byId("no-film").hidden = !byId("no-film").textContent;
       for (const name of ["tools", "canvas", "key-magnify"]) byId(name).hidden = true;
+      // Charts of nothing that moves need neither its place nor its clock.
+      if (byId("no-film").hidden && !report.row(page.time).length) {
+        for (const name of ["film", "dock"]) byId(name).hidden = true;
+        byId("moving").classList.add("still");
+      }
       return;
     }
     byId("has-trail").hidden = film.tips.every((tip) => tip === null);

@@ -151,7 +151,7 @@ def identify(
 
 def _target(entry: TargetTable, number: int, base: SweepStudy) -> Target:
     field, setting = f"target.{number}", base.setting
-    check_unit_of_metric(entry.value, entry.metric, f"{field}.value")
+    check_unit_of_metric(entry.value, entry.metric, base.members, f"{field}.value")
     path = _one(f"{field}.path", entry.path, setting.paths)
     mode = _one(f"{field}.mode", entry.mode, setting.modes)
     if entry.relative and entry.value == 0.0:

@@ -13,6 +13,7 @@ from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
+from paraflex.results.metrics import Members
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
 from paraflex.studies.optimisation.objective import Objective
@@ -121,7 +122,7 @@ def load_optimisation(file: str | Path) -> OptimisationStudy:
         columns = {f"objective.minimise.{name}": name for name in table.objective.minimise}
         columns |= {f"objective.at_most.{k}.metric": each.metric for k, each in enumerate(table.objective.at_most)}
         base = base_study(table, folder, columns)
-        objective = _objective(table.objective)
+        objective = _objective(table.objective, base.members)
         search = read_search(table.search)
         if search.difference is None:
             search = replace(search, difference=_DIFFERENCE_SHARE)
@@ -145,7 +146,7 @@ def optimise(
     return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
 
 
-def _objective(table: ObjectiveTable) -> Objective:
+def _objective(table: ObjectiveTable, members: Members) -> Objective:
     if not table.minimise:
         raise InputError("nothing to minimise", field="objective.minimise", remedy="say { tracking_rms = 1.0 }")
     for column, weight in table.minimise.items():
@@ -154,7 +155,7 @@ def _objective(table: ObjectiveTable) -> Objective:
                 "must be positive", field=f"objective.minimise.{column}", value=weight, remedy="leave the metric out"
             )
     for k, each in enumerate(table.at_most):
-        check_unit_of_metric(each.value, each.metric, f"objective.at_most.{k}.value")
+        check_unit_of_metric(each.value, each.metric, members, f"objective.at_most.{k}.value")
     limits = tuple((each.metric, float(each.value)) for each in table.at_most)
     return Objective(dict(table.minimise), table.over, table.relative, limits)
 

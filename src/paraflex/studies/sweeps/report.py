@@ -63,9 +63,10 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
     picked = best_runs(designs)
     if found:
         picked = _searched(designs, found, picked)
-    if on_progress is not None and picked:
-        on_progress(f"simulating {len(picked)} of the best designs again, to be seen in motion")
-    runs, failed, differ = _again(study, designs, picked)
+    again = [] if study.setting.statics else picked
+    if on_progress is not None and again:
+        on_progress(f"simulating {len(again)} of the best designs again, to be seen in motion")
+    runs, failed, differ = _again(study, designs, again)
     kind = str(found.get("kind", "sweep"))
     account = StudyAccount(
         kind=kind,

@@ -4,39 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from paraflex.arguments import checked_arguments
 from paraflex.dynamics import State, build_system, pose_at_rest
 from paraflex.equilibria.branch import Branch, Point
-from paraflex.equilibria.equations import Conditions, Coordinate, Equations, coordinate_named
+from paraflex.equilibria.equations import Equations
+from paraflex.equilibria.given import ModelWithStatics, StaticsDefaults, conditions
 from paraflex.equilibria.result import Equilibrium, Statics
 from paraflex.equilibria.stability import buckling as buckling_about, stiffness as stiffness_at, vibrations
-from paraflex.errors import EquilibriumError, InputError, ResultWarning
+from paraflex.errors import EquilibriumError, ResultWarning
 from paraflex.findings import warn_of
-from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, Start
-from paraflex.mechanism.quantities import known
 from paraflex.validity import warn
-
-# More steps are a finer figure than anyone looks at.
-_MOST_STEPS = 10_000
-# Higher buckling modes than these say nothing.
-_MOST_FACTORS = 20
 
 
 @checked_arguments()
 def statics(
-    source: Mechanism | ModelWithPaths,
+    source: Mechanism | ModelWithStatics,
     *,
     loads: Mapping[str, float] | None = None,
     torques: Mapping[str, float] | None = None,
     moved: Mapping[str, float] | None = None,
     held: Sequence[str] | None = None,
-    steps: int = 10,
+    steps: int | None = None,
     stiffness: Sequence[str] | None = None,
-    buckling: int = 1,
+    buckling: int | None = None,
     assembly: str | None = None,
     start: Start | State | None = None,
     warning: bool = True,
@@ -51,6 +43,7 @@ def statics(
     Parameters
     ----------
     source : Mechanism or Model
+        Of a model its [statics] says what is not given here; one of `loads`, `torques` and `moved` replaces all three.
     loads : mapping of str to float, optional
         Forces and torques at coordinates [N, N m]. They keep their direction.
     torques : mapping of str to float, optional
@@ -59,12 +52,12 @@ def statics(
         Changes of coordinates from the start [m, rad]; results tell the force this takes.
     held : sequence of str, optional
         Coordinates that stay; by default the joints of all motors without a torque. An empty one holds none.
-    steps : int
-        How many equal steps.
+    steps : int, optional
+        How many equal steps, 10 by default.
     stiffness : sequence of str, optional
         Coordinates whose stiffness is computed; by default those that are loaded or moved.
-    buckling : int
-        How many factors of buckling are computed about every equilibrium.
+    buckling : int, optional
+        How many factors of buckling are computed about every equilibrium, 1 by default.
     assembly : str, optional
         The first by default.
     start : Start or State, optional
@@ -93,15 +86,11 @@ def statics(
         More is given than any equilibrium of the branch carries; the same.
     """
     mechanism = Mechanism.made_of(source)
-    if not 1 <= steps <= _MOST_STEPS:
-        raise InputError("no such number of steps", field="steps", value=steps,
-                         remedy=f"choose one up to {_MOST_STEPS}")  # fmt: skip
-    if not 0 <= buckling <= _MOST_FACTORS:
-        raise InputError("no such number of factors", field="buckling", value=buckling,
-                         remedy=f"choose one up to {_MOST_FACTORS}")  # fmt: skip
-    given = _given(mechanism, loads or {}, torques or {}, moved or {}, held, stiffness)
-    begin = start if start is not None or isinstance(source, Mechanism) else source.start
-    result = _followed(mechanism, given, begin, assembly, steps, buckling)
+    own, begin = (StaticsDefaults(), None) if isinstance(source, Mechanism) else (source.statics, source.start)
+    asked = own.filled(
+        loads=loads, torques=torques, moved=moved, held=held, steps=steps, stiffness=stiffness, buckling=buckling
+    )
+    result = _followed(mechanism, asked, begin if start is None else start, assembly)
     if warning:
         warn(result.validity)
         warn_of(result.doubts, ResultWarning)
@@ -110,26 +99,22 @@ def statics(
 
 @solvable("equilibria")
 def _followed(
-    mechanism: Mechanism,
-    given: Conditions,
-    start: Start | State | None,
-    assembly: str | None,
-    steps: int,
-    buckling: int,
+    mechanism: Mechanism, asked: StaticsDefaults, start: Start | State | None, assembly: str | None
 ) -> Statics:
     """The equilibria; an error carries those until then."""
+    given = conditions(mechanism, asked)
     system = build_system(mechanism)
     equations = Equations(system, pose_at_rest(system, start, assembly), given)
     found: list[Equilibrium] = []
     try:
         branch = Branch(equations)
         first = branch.first()
-        found.append(_equilibrium(equations, first, buckling))
+        found.append(_equilibrium(equations, first, asked.buckling))
         if given.moved or given.loads:
-            for point in branch.follow(first, steps):
-                found.append(_equilibrium(equations, point, buckling))
+            for point in branch.follow(first, asked.steps):
+                found.append(_equilibrium(equations, point, asked.buckling))
     except EquilibriumError as error:
-        error.partial = Statics(equations, tuple(found), "failed", error.problem) if found else None
+        error.partial = Statics(equations, tuple(found), "failed", str(error)) if found else None
         raise
     return Statics(equations, tuple(found))
 
@@ -141,43 +126,3 @@ def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibri
         point, vibration, buckling_about(equations, point, vibration, buckling),
         stiffness_at(equations, point.at, found, equations.given.measured),
     )  # fmt: skip
-
-
-def _given(
-    mechanism: Mechanism,
-    loads: Mapping[str, float],
-    torques: Mapping[str, float],
-    moved: Mapping[str, float],
-    held: Sequence[str] | None,
-    stiffness: Sequence[str] | None,
-) -> Conditions:
-    joints = {motor.name: motor.joint for motor in mechanism.motors}
-    efforts: dict[Coordinate, float] = {}
-    for field, values in (("loads", loads), ("torques", torques)):
-        for name, value in values.items():
-            if field == "torques":
-                known(name, list(joints), field, "motor")
-            one = coordinate_named(mechanism, joints[name] if field == "torques" else name, f"{field}.{name}")
-            _finite(value, f"{field}.{name}", one.effort_unit)
-            efforts[one] = efforts.get(one, 0.0) + value
-    travels = {coordinate_named(mechanism, name, f"moved.{name}"): value for name, value in moved.items()}
-    for one, value in travels.items():
-        _finite(value, f"moved.{one.name}", one.unit)
-    if held is None:
-        driven = {joint: name for name, joint in joints.items() if name not in torques}
-        held = [joint for joint in driven if joint not in {one.name for one in (*efforts, *travels)}]
-    kept = tuple(dict.fromkeys(coordinate_named(mechanism, name, "held") for name in held))
-    for field, first, second in (("loads", efforts, travels), ("held", kept, travels), ("held", kept, efforts)):
-        for one in first:
-            if one in second:
-                raise InputError("is given twice: loaded, moved and held exclude one another", field=field,
-                                 value=one.name, remedy="leave it out of all but one")  # fmt: skip
-    wanted = [*travels, *efforts] if stiffness is None else [
-        coordinate_named(mechanism, name, "stiffness") for name in stiffness
-    ]  # fmt: skip
-    return Conditions(kept, travels, efforts, tuple(dict.fromkeys(wanted)))
-
-
-def _finite(value: float, field: str, unit: str) -> None:
-    if not np.isfinite(value):
-        raise InputError("not a finite number", field=field, value=value, remedy=f"give it in {unit}")

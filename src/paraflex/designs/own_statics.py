@@ -1,0 +1,53 @@
+"""A design whose equilibria are found in place of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from paraflex.equilibria import Statics, statics
+from paraflex.errors import InputError
+from paraflex.files import Model
+
+# Fields of a study that are of runs.
+_OF_RUNS = ("paths", "modes", "duration", "samples", "balanced", "integration")
+
+
+@dataclass(frozen=True)
+class OwnStatics:
+    """What `paraflex statics` finds of a model.
+
+    Attributes
+    ----------
+    model : Model
+    assembly : str, optional
+    """
+
+    model: Model
+    assembly: str | None
+
+    def found(self) -> Statics:
+        """The equilibria; see `equilibria.statics` for the errors."""
+        return statics(self.model, assembly=self.assembly, warning=False)
+
+
+def own_statics(model: Model, assembly: str | None) -> OwnStatics:
+    """The statics of a model, of an assembly, its study's or its own start by default."""
+    return OwnStatics(model, assembly or (None if model.start is not None else model.study.assembly))
+
+
+def check_of_statics(given: Collection[str]) -> None:
+    """None if a study of equilibria, of which these fields are given, says nothing about runs.
+
+    Raises
+    ------
+    InputError
+        It does, by field.
+    """
+    for name in _OF_RUNS:
+        if name in given:
+            raise InputError(
+                "equilibria have none: the study is of statics",
+                field=name,
+                remedy="leave it out, or the [statics] table",
+            )

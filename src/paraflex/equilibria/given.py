@@ -1,0 +1,197 @@
+"""What is given of equilibria: coordinates by name, and the loads, torques, travel and others that a model proposes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
+
+from paraflex.errors import InputError, suggestion
+from paraflex.kinematics import ModelWithPaths
+from paraflex.mechanism import Mechanism, PointRef
+from paraflex.mechanism.quantities import known
+
+_AXES = ("x", "y", "angle")
+# Fields that say what is given. Who chooses one of them chooses all.
+GIVEN = ("loads", "torques", "moved")
+STEPS, FACTORS = 10, 1
+# More steps are a finer figure than anyone looks at.
+_MOST_STEPS = 10_000
+# Higher buckling modes than these say nothing.
+_MOST_FACTORS = 20
+
+
+class Coordinate(NamedTuple):
+    """The angle or travel of a joint, or a place or the angle of a point, by its name.
+
+    Attributes
+    ----------
+    name : str
+        Of the joint, or "body.point.x", "body.point.y", "body.point.angle".
+    unit, effort_unit : str
+        "m" and "N", or "rad" and "N m".
+    point : PointRef, optional
+        None of a joint.
+    """
+
+    name: str
+    unit: str
+    effort_unit: str
+    point: PointRef | None = None
+
+    @property
+    def axis(self) -> str:
+        """The axis of a point's coordinate."""
+        return self.name.rpartition(".")[2]
+
+
+def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
+    """A coordinate by its name.
+
+    Raises
+    ------
+    InputError
+        There is no such joint or point, or the joint has no coordinate that could change.
+    """
+    joints = {joint.name: joint for joint in mechanism.joints}
+    if name in joints:
+        joint = joints[name]
+        if not joint.slides and "angle" in joint.holds:
+            raise InputError("holds its angle, so that it has no coordinate", field=field, value=name,
+                             remedy="name a joint that turns or slides, or a point")  # fmt: skip
+        return Coordinate(name, *(("m", "N") if joint.slides else ("rad", "N m")))
+    place, _, axis = name.rpartition(".")
+    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+    if axis not in _AXES or place not in points:
+        known = [*joints, *(f"{point}.{each}" for point in points for each in _AXES)]
+        raise InputError("is neither a joint nor a coordinate of a point", field=field, value=name,
+                         remedy=f'{suggestion(name, known)}; of points it is "body.point.x", ".y" or ".angle"'
+                         )  # fmt: skip
+    return Coordinate(name, *(("rad", "N m") if axis == "angle" else ("m", "N")), PointRef.parse(place, field))
+
+
+class Conditions(NamedTuple):
+    """What is given: changes of coordinates, forces and torques at others, and coordinates that are only looked at.
+
+    Attributes
+    ----------
+    held : tuple of Coordinate
+    moved, loads : mapping of Coordinate to float
+        The change from the start [m, rad], and the force or torque [N, N m].
+    measured : tuple of Coordinate
+    """
+
+    held: tuple[Coordinate, ...]
+    moved: Mapping[Coordinate, float]
+    loads: Mapping[Coordinate, float]
+    measured: tuple[Coordinate, ...]
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """All, each once."""
+        return tuple(dict.fromkeys((*self.moved, *self.loads, *self.measured, *self.held)))
+
+    @property
+    def words(self) -> str:
+        """What is given with its numbers: "travel of stage.T.x by 0.01 m and -20 N at stage.T.y"."""
+        travels = [f"travel of {one.name} by {value:g} {one.unit}" for one, value in self.moved.items()]
+        loads = [f"{value:g} {one.effort_unit} at {one.name}" for one, value in self.loads.items()]
+        return " and ".join([*travels, *loads])
+
+
+@dataclass(frozen=True)
+class StaticsDefaults:
+    """Arguments of `statics` that are not given, as a model has them; see there.
+
+    Attributes
+    ----------
+    loads, torques, moved : mapping of str to float
+    held : tuple of str, optional
+    steps : int
+    stiffness : tuple of str, optional
+    buckling : int
+    """
+
+    loads: Mapping[str, float] = field(default_factory=dict)
+    torques: Mapping[str, float] = field(default_factory=dict)
+    moved: Mapping[str, float] = field(default_factory=dict)
+    held: tuple[str, ...] | None = None
+    steps: int = STEPS
+    stiffness: tuple[str, ...] | None = None
+    buckling: int = FACTORS
+
+    def filled(self, **chosen: Any) -> StaticsDefaults:
+        """These with what a caller chooses that is not None; see `chosen_over` of loads, torques and travel."""
+        given = {name: value for name, value in chosen.items() if value is not None}
+        return StaticsDefaults(**chosen_over(vars(self), given))
+
+
+class ModelWithStatics(ModelWithPaths, Protocol):
+    """A model that proposes its statics: what `paraflex.load` reads."""
+
+    @property
+    def statics(self) -> StaticsDefaults:
+        """What is given unless asked otherwise."""
+        ...
+
+
+def chosen_over(own: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields by name with others in their place: a load, torque or travel that is chosen replaces all of these."""
+    replaced = GIVEN if any(name in chosen for name in GIVEN) else ()
+    return {name: value for name, value in own.items() if name not in replaced} | dict(chosen)
+
+
+def conditions(mechanism: Mechanism, asked: StaticsDefaults) -> Conditions:
+    """What is given, by coordinates of a mechanism.
+
+    Raises
+    ------
+    InputError
+        Unknown names, a coordinate given twice, numbers that make no sense.
+    """
+    _counted(asked.steps, 1, _MOST_STEPS, "steps", "steps")
+    _counted(asked.buckling, 0, _MOST_FACTORS, "buckling", "factors")
+    efforts = _efforts(mechanism, asked)
+    travels = {coordinate_named(mechanism, name, f"moved.{name}"): value for name, value in asked.moved.items()}
+    for one, value in travels.items():
+        _finite(value, f"moved.{one.name}", one.unit)
+    held = asked.held
+    if held is None:
+        given = {one.name for one in (*efforts, *travels)}
+        driven = [motor.joint for motor in mechanism.motors if motor.name not in asked.torques]
+        held = tuple(joint for joint in driven if joint not in given)
+    kept = tuple(dict.fromkeys(coordinate_named(mechanism, name, "held") for name in held))
+    for where, first, second in (("loads", efforts, travels), ("held", kept, travels), ("held", kept, efforts)):
+        for one in first:
+            if one in second:
+                raise InputError("is given twice: loaded, moved and held exclude one another", field=where,
+                                 value=one.name, remedy="leave it out of all but one")  # fmt: skip
+    wanted = [*travels, *efforts] if asked.stiffness is None else [
+        coordinate_named(mechanism, name, "stiffness") for name in asked.stiffness
+    ]  # fmt: skip
+    return Conditions(kept, travels, efforts, tuple(dict.fromkeys(wanted)))
+
+
+def _efforts(mechanism: Mechanism, asked: StaticsDefaults) -> dict[Coordinate, float]:
+    """Forces and torques at coordinates; a motor's is at its joint, and several there add up."""
+    joints = {motor.name: motor.joint for motor in mechanism.motors}
+    efforts: dict[Coordinate, float] = {}
+    for table, values in (("loads", asked.loads), ("torques", asked.torques)):
+        for name, value in values.items():
+            if table == "torques":
+                known(name, list(joints), table, "motor")
+            one = coordinate_named(mechanism, joints[name] if table == "torques" else name, f"{table}.{name}")
+            _finite(value, f"{table}.{name}", one.effort_unit)
+            efforts[one] = efforts.get(one, 0.0) + value
+    return efforts
+
+
+def _counted(number: int, least: int, most: int, field: str, what: str) -> None:
+    if not least <= number <= most:
+        raise InputError(f"no such number of {what}", field=field, value=number, remedy=f"choose one up to {most}")
+
+
+def _finite(value: float, field: str, unit: str) -> None:
+    if not math.isfinite(value):
+        raise InputError("not a finite number", field=field, value=value, remedy=f"give it in {unit}")

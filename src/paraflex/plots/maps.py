@@ -1,0 +1,94 @@
+"""Maps of designs: metrics over two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.tri import Triangulation
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.plots.designs import DesignTable
+from paraflex.plots.given import drawn
+from paraflex.plots.labels import logarithmic_number, peak
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
+from paraflex.plots.scales import round_scale, scaled_label
+
+Array = NDArray[np.float64]
+
+# Panels beside one another, lines of a panel about, and colours between two of them.
+_MOST_METRICS, _LINES, _BETWEEN = 3, 7, 4
+# A metric with a larger ratio of its values has lines at 1, 2 and 5 of each power of ten.
+_SPREAD = 20.0
+# Fewer runs span no area worth a map.
+_FEWEST = 4
+# Of the colour map, whose light end is too light for labels on it.
+_LIGHTEST = 0.9
+
+
+@drawn
+def response_map(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
+    """Lines of equal metrics over two parameters, on colours from dark, small, to light, large; dots are designs.
+
+    The two are the first that vary; between designs, which need not be a grid, a metric is linear. Runs are those of
+    the first path and mode.
+
+    Parameters
+    ----------
+    metrics : sequence of str, optional
+        At most three; by default the first that varies.
+    """
+    names = table.varied
+    series = list(table.series.values())
+    if len(names) < 2 or not series or series[0].run.size < _FEWEST:
+        raise InputError(
+            "a map is over two parameters that vary", field="table", value=", ".join(names) or None,
+            remedy="vary two of them, or draw response_curves",
+        )  # fmt: skip
+    chosen = table.judged_by(metrics, 1)[:_MOST_METRICS]
+    shape = (len(chosen), 1) if is_narrow() else (1, len(chosen))
+    figure, axes = panels(*shape, width=ONE_COLUMN if len(chosen) == 1 else TWO_COLUMNS)
+    for panel, metric in zip(axes.flat, chosen, strict=True):
+        label, factor = table.labelled(metric)
+        across, up = (series[0].parameters[name] for name in names[:2])
+        _draw_map(panel, across, up, factor * series[0].metrics[metric])
+        panel.set_title(label)
+        panel.set_xlabel(scaled_label(names[0], round_scale(across)))
+        panel.set_ylabel(scaled_label(names[1], round_scale(up)))
+    return lay_out(figure, axes, panel_height=58.0)
+
+
+def _draw_map(panel: Axes, x: Array, y: Array, values: Array) -> None:
+    known = np.isfinite(values)
+    x, y, values = x[known] / round_scale(x), y[known] / round_scale(y), values[known]
+    # Triangles are of sides alike, whatever the units.
+    unit = [(each - each.min()) / (float(np.ptp(each)) or 1.0) for each in (x, y)]
+    areas = Triangulation(x, y, Triangulation(*unit).triangles)
+    spread = values.min() > 0.0 and values.max() > _SPREAD * values.min()
+    norm = LogNorm(values.min(), values.max()) if spread else Normalize(values.min(), values.max())
+    locator = LogLocator(subs=(1.0, 2.0, 5.0)) if spread else MaxNLocator(_LINES)
+    lines = np.asarray(locator.tick_values(values.min(), values.max()))
+    lines = lines[(lines > values.min()) & (lines < values.max())]
+    ends = np.unique([values.min(), *lines, values.max()])
+    fine = np.interp(np.linspace(0.0, ends.size - 1.0, _BETWEEN * (ends.size - 1) + 1), np.arange(ends.size), ends)
+    shades = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, _LIGHTEST, 256)))
+    panel.tricontourf(areas, values, levels=fine, cmap=shades, norm=norm)
+    drawn_lines = panel.tricontour(areas, values, levels=lines, colors="white", linewidths=0.8)
+    most = peak(values)
+    panel.clabel(
+        drawn_lines, fmt=lambda value: logarithmic_number(value) if spread else _plain(value, most), fontsize=7.0
+    )
+    panel.plot(x, y, linestyle="", marker=".", markersize=2.0, color="white", alpha=0.8, clip_on=False)
+    panel.margins(0.0)
+    # A number at the right end would stand out of the page.
+    panel.xaxis.set_major_locator(MaxNLocator(5, prune="upper"))
+
+
+def _plain(value: float, most: float) -> str:
+    return "0" if abs(value) < 1e-12 * most else f"{value:g}"

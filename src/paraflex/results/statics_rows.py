@@ -1,0 +1,123 @@
+"""Equilibria as rows of texts, for tables of the command and of the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.results.statics_data import NAMED_UNITS, step_kinds
+from paraflex.units import DisplayUnit
+
+# Rows of the table of steps, and coordinates in it; statics.nc has all.
+_ROWS, _COLUMNS = 24, 2
+_SHOWN = {"m": DisplayUnit("mm", 1e3), "N/m": DisplayUnit("N/mm", 1e-3), "m/N": DisplayUnit("mm/N", 1e3)}
+GIVEN = ("moved", "loaded")
+# A stress that is none [Pa].
+_NO_STRESS = 1.0
+# Stiffnesses that differ by more are drawn on a logarithmic axis.
+_SPREAD = 30.0
+# Quantities of a coordinate, and the word of each in a table.
+_LAST = ("travel", "effort", "stiffness", "compliance")
+
+
+class StepTable(NamedTuple):
+    """Steps as texts: heads and units of columns, rows each with its kind first, and how many steps there are."""
+
+    heads: list[tuple[str, str]]
+    rows: list[list[str]]
+    steps: int
+
+    @property
+    def title(self) -> str:
+        """Heading of the table, which tells whether rows are left out."""
+        return "Steps" if len(self.rows) == self.steps else f"Steps ({len(self.rows)} of {self.steps})"
+
+
+def step_table(data: xr.Dataset) -> StepTable:
+    """A row for each step, of many for some; of the coordinates that are moved or loaded the first."""
+    heads, columns = [("given", "")], [[f"{x:.4g}" for x in data["fraction"].values]]
+    for k in given_coordinates(data)[:_COLUMNS]:
+        one = data.isel(named=k)
+        for quantity in _LAST[:3]:
+            shown, values = shown_unit(unit_of(one, quantity)), one[quantity].values
+            if np.isfinite(values).any():
+                name = str(one["named"].item()) if quantity == "travel" else quantity_word(one, quantity)
+                heads.append((name, shown.name))
+                columns.append([four_digits(shown.factor * x) for x in values])
+    if data.sizes["frequency_number"]:
+        heads.append(("lowest", "Hz"))
+        columns.append([four_digits(x) for x in data["natural_frequency"].values[:, 0]])
+    kinds = step_kinds(data)
+    steps = range(data.sizes["step"])
+    every = math.ceil(len(steps) / _ROWS)
+    kept = [k for k in steps if k % every == 0 or k == steps[-1] or kinds[k] == "limit point"]
+    return StepTable(heads, [[kinds[k], *(column[k] for column in columns)] for k in kept], len(steps))
+
+
+def last_rows(data: xr.Dataset) -> Iterator[list[str]]:
+    """Every named coordinate at the last step: its name, what is given of it, travel, effort, stiffness, compliance."""
+    last = data.isel(step=-1)
+    for name in last["named"].values:
+        one = last.sel(named=name)
+        yield [str(name), str(one["role"].item()), *(_quantity(one, quantity) for quantity in _LAST)]
+
+
+def buckling_words(data: xr.Dataset) -> str:
+    """At which fraction it buckles, as seen from the start and from the last step; empty if nothing is known of it."""
+    factors = data["buckling_factor"].values
+    if not (factors.size and np.isfinite(factors[0, 0]) and (data["role"] == "loaded").any()):
+        return ""
+    seen = [f"{factors[0, 0]:.4g} of what is given, as seen from the start"]
+    if data.sizes["step"] > 1 and np.isfinite(factors[-1, 0]):
+        seen.append(f"{factors[-1, 0]:.4g} as seen from the last step")
+    return ", ".join(seen)
+
+
+def is_stressed(data: xr.Dataset) -> bool:
+    """Whether beams have stresses that are more than rounding."""
+    return "stress_max" in data and float(np.nanmax(data["stress_max"].values, initial=0.0)) > _NO_STRESS
+
+
+def given_coordinates(data: xr.Dataset) -> list[int]:
+    """Numbers of the coordinates that are moved or loaded."""
+    return [k for k, role in enumerate(data["role"].values) if role in GIVEN]
+
+
+def is_wide(values: NDArray[np.float64]) -> bool:
+    """Whether stiffnesses are so different that an axis should be logarithmic."""
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.min() > 0.0 and known.max() > _SPREAD * known.min())
+
+
+def unit_of(one: xr.Dataset, quantity: str) -> str:
+    """SI unit of a quantity of a named coordinate."""
+    return NAMED_UNITS[quantity][one["unit"].item() == "rad"]
+
+
+def shown_unit(unit: str) -> DisplayUnit:
+    """The unit in which a table has it."""
+    return _SHOWN.get(unit, DisplayUnit(unit, 1.0))
+
+
+def quantity_word(one: xr.Dataset, quantity: str) -> str:
+    """Heading of a column."""
+    return quantity if quantity != "effort" else "force" if one["unit"].item() == "m" else "torque"
+
+
+def four_digits(value: float) -> str:
+    """Four digits, or all of a number below a million; rounding of what is none is zero."""
+    if math.isinf(value):
+        return "rigid"
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e6 else f"{0.0 if abs(value) < 1e-12 else value:.4g}"
+
+
+def _quantity(one: xr.Dataset, quantity: str) -> str:
+    shown, value = shown_unit(unit_of(one, quantity)), float(one[quantity].item())
+    if math.isinf(value):
+        return "rigid" if quantity == "stiffness" else "free"
+    return "" if math.isnan(value) else f"{four_digits(shown.factor * value)} {shown.name}"

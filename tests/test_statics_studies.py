@@ -1,0 +1,236 @@
+"""Studies of many designs whose equilibria are found: sweeps, searches and indices of statics."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+import paraflex as pf
+from flexures import LENGTH, WIDTH, E
+from paraflex.designs.sweep import load_sweep
+from paraflex.files import library_text
+from paraflex.results.metrics import METRICS, STATICS
+from shell import paraflex
+
+BASE = 'mechanism = "leaf_spring_guide"\n'
+GIVEN = """
+[statics]
+loads = { "stage.T.y" = "-20 N" }
+moved = { "stage.T.x" = "8 mm" }
+held = ["stage.T.angle"]
+stiffness = ["stage.T.x", "stage.T.y"]
+steps = 3
+"""
+VARIED = """
+[vary.thickness]
+fields = ["section.leaf.thickness"]
+values = ["0.4 mm", "0.6 mm"]
+
+[vary.weight]
+fields = ["statics.loads.stage.T.y"]
+values = [0.0, "-20 N"]
+"""
+RANGES = """
+[vary.thickness]
+fields = ["section.leaf.thickness"]
+low = "0.3 mm"
+high = "1 mm"
+
+[vary.length]
+fields = ["parameters.length"]
+low = "80 mm"
+high = "120 mm"
+"""
+
+
+def written(folder: Path, *parts: str) -> Path:
+    file = folder / "study.toml"
+    file.write_text("".join(parts), encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("statics")
+    ran = paraflex("sweep", written(folder, BASE, GIVEN, VARIED), "--output", folder / "out")
+    assert ran.returncode == 0, ran.stderr
+    return folder / "out"
+
+
+def test_rows_are_what_statics_of_each_design_say(swept):
+    table = pd.read_parquet(swept / "results.parquet")
+    assert list(table["status"]) == ["complete"] * 4
+    for _, row in table.iterrows():
+        guide = pf.load("leaf_spring_guide", set={"section.leaf.thickness": row["thickness"]})
+        found = pf.statics(
+            guide, loads={"stage.T.y": row["weight"]}, moved={"stage.T.x": 0.008}, held=["stage.T.angle"], steps=3,
+            stiffness=["stage.T.x", "stage.T.y"], warning=False,
+        )  # fmt: skip
+        data = pf.statics_dataset(found)
+        expected = {
+            "travel.stage.T.y": found.travel("stage.T.y")[-1],
+            "travel_max.stage.T.y": abs(found.travel("stage.T.y")).max(),
+            "effort.stage.T.x": found.effort("stage.T.x")[-1],
+            "effort_max.stage.T.angle": abs(found.effort("stage.T.angle")).max(),
+            "stiffness.stage.T.y": found.stiffness("stage.T.y")[-1],
+            "stiffness_min.stage.T.x": found.stiffness("stage.T.x").min(),
+            "compliance.stage.T.x": 1.0 / found.stiffness("stage.T.x")[-1],
+            "compliance_max.stage.T.y": 1.0 / found.stiffness("stage.T.y").min(),
+            "frequency": found.frequencies[-1, 0] / (2.0 * math.pi),
+            "frequency_min": found.frequencies[:, 0].min() / (2.0 * math.pi),
+            "buckling_factor": found.buckling[0, 0],
+            "stress_max": float(data["stress_max"].max()),
+            "safety_factor_min": float(data["safety_factor"].min()),
+            "joint_force_max": float(np.linalg.norm(data["joint_force"], axis=-1).max()),
+            "unstable_steps": 0,
+        }
+        for column, value in expected.items():
+            # Datasets keep section forces, from which stresses are, in single precision.
+            assert row[column] == pytest.approx(value, rel=1e-6 if column[:6] in ("stress", "safety") else 1e-9), column
+        assert math.isnan(row["limit_load"])
+    # Both numbers count.
+    assert table["effort.stage.T.x"].nunique() == 4
+    assert table["buckling_factor"].nunique() == 4
+
+
+def test_columns_have_the_unit_of_their_coordinate(swept):
+    schema = pq.read_schema(swept / "results.parquet")
+    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in schema}
+    assert [units[f"{name}.stage.T.x"] for name in ("travel", "effort", "stiffness", "compliance")] == [
+        "m", "N", "N/m", "m/N"
+    ]  # fmt: skip
+    assert [units[f"{name}.stage.T.angle"] for name in ("travel", "effort")] == ["rad", "N m"]
+    assert "stiffness.stage.T.angle" not in units
+
+
+def test_its_report_tells_what_varies_and_shows_no_motion(swept):
+    page = (swept / "report.html").read_text(encoding="utf-8")
+    assert "What was varied" in page
+    assert "largest stress" in page
+    assert "is not shown in motion" not in page
+    pf.plots.response_curves(swept, metrics=["stiffness.stage.T.y"])
+    pf.plots.response_curves(swept)
+
+
+def test_metrics_of_which_more_is_better_choose_no_design_and_are_drawn(tmp_path):
+    varied = VARIED.replace("statics.loads.stage.T.y", "statics.moved.stage.T.x").replace("-20 N", "5 mm")
+    file = written(tmp_path, 'metrics = ["stiffness"]\n', BASE, varied, GIVEN)
+    found = pf.sweep(file, tmp_path / "out")
+    assert found.complete
+    assert "Best designs" not in paraflex("report", tmp_path / "out").stderr
+    assert "Best designs" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8").partition("<script")[0]
+    assert pf.plots.response_curves(tmp_path / "out").axes
+
+
+def test_the_thinnest_leaves_of_a_given_stiffness_are_those_of_the_closed_form(tmp_path):
+    """Stress at a given travel falls with length, and thickness follows from k = 24 EI / L^3 = 2 E b (t / L)^3."""
+    limit = '[[objective.at_most]]\nmetric = "compliance_max.stage.T.x"\nvalue = "1 mm/N"\n'
+    objective = f"[objective]\nminimise = {{ stress_max = 1.0 }}\n{limit}"
+    file = written(tmp_path, 'metrics = ["stress_max"]\n', BASE, "[statics]\nsteps = 2\n", RANGES, objective)
+    found = pf.optimise(file, tmp_path / "out")
+    assert found.holds_limits
+    assert found.values["length"] == pytest.approx(0.12, rel=1e-6)
+    thickness = 0.12 * (1000.0 / (2.0 * E * WIDTH)) ** (1.0 / 3.0)
+    # As leaves stretch, the stage turns a little: the guide is 1e-4 softer than two beams whose ends do not.
+    assert found.values["thickness"] == pytest.approx(thickness, rel=1e-4)
+    best = pf.statics(pf.load(tmp_path / "out" / "best.toml"))
+    assert best.stiffness("stage.T.x")[0] == pytest.approx(1000.0, rel=1e-4)
+
+
+def test_a_thickness_is_identified_from_a_stiffness(tmp_path):
+    wanted = 2.0 * E * WIDTH * (0.0006 / LENGTH) ** 3
+    target = f'[[target]]\nmetric = "stiffness_min.stage.T.x"\nvalue = "{wanted / 1e3} N/mm"\n'
+    ranges = RANGES.partition("[vary.length]")[0]
+    found = pf.identify(written(tmp_path, BASE, "[statics]\nsteps = 1\n", ranges, target), tmp_path / "out")
+    assert found.values["thickness"] == pytest.approx(0.0006, rel=1e-4)
+
+
+def test_indices_tell_which_number_a_stiffness_depends_on(tmp_path):
+    # (t / L)^3: with the same relative ranges both explain as much.
+    ranges = RANGES.replace("0.3 mm", "0.45 mm").replace('"1 mm"', '"0.55 mm"').replace("80 mm", "90 mm")
+    ranges = ranges.replace("120 mm", "110 mm")
+    file = written(tmp_path, 'metrics = ["stiffness"]\n', BASE, "[statics]\nsteps = 1\n", ranges)
+    found = pf.indices(file, tmp_path / "out", metrics=["stiffness.stage.T.x"], samples=64, workers=1)
+    first, total = found.indices["first"].values[0], found.indices["total"].values[0]
+    assert first == pytest.approx([0.5, 0.5], abs=0.15)
+    assert total == pytest.approx([0.5, 0.5], abs=0.1)
+
+
+def test_designs_that_carry_less_than_what_is_given_fail_with_the_reason(tmp_path):
+    (tmp_path / "arm.toml").write_text(library_text("pendulum"), encoding="utf-8")
+    file = written(
+        tmp_path, 'mechanism = "arm.toml"\nmetrics = ["travel"]\n',
+        "[statics]\nloads = { pivot = 1.0 }\nheld = []\nsteps = 2\n",
+        '[vary.torque]\nfields = ["statics.loads.pivot"]\nvalues = ["0.5 N m", "3 N m"]\n',
+    )  # fmt: skip
+    found = pf.sweep(file, tmp_path / "out")
+    assert found.data["status"].values.tolist() == ["complete", "failed"]
+    assert "no equilibrium with more than" in found.data["reason"].values[1]
+
+
+def test_a_study_may_have_all_of_the_statics_and_a_mechanism_a_path(tmp_path):
+    file = written(
+        tmp_path, 'mechanism = "five_bar"\nmetrics = ["stiffness", "effort"]\n',
+        '[statics]\nloads = { "distal1.C.y" = "-5 N" }\nsteps = 1\n',
+        '[vary.load]\nfields = ["statics.loads.distal1.C.y"]\nvalues = [-5.0, -10.0]\n',
+    )  # fmt: skip
+    table = pf.sweep(file, tmp_path / "out").data.to_dataframe()
+    assert set(table["path"]) == set(table["mode"]) == {""}
+    found = pf.statics(pf.load("five_bar"), loads={"distal1.C.y": -10.0}, steps=1)
+    assert table["effort.A1"].iloc[1] == pytest.approx(found.effort("A1")[-1], rel=1e-9)
+
+
+def test_whole_equilibria_are_kept(tmp_path):
+    study = load_sweep(written(tmp_path, "trajectories = true\nmetrics = ['travel']\n", BASE, GIVEN, VARIED))
+    study.run(tmp_path / "out", limit=1)
+    (first,) = (tmp_path / "out" / "trajectories").iterdir()
+    assert pf.load_results(first).attrs["kind"] == "statics"
+
+
+@pytest.mark.parametrize(
+    ("more", "given", "field", "words"),
+    [
+        ('modes = ["++"]\n', GIVEN, "modes", "equilibria have none"),
+        ("duration = 1.0\n", GIVEN, "duration", "equilibria have none"),
+        ('metrics = ["tracking_rms"]\n', GIVEN, "metrics", "of runs along a path, not of statics"),
+        ('metrics = ["travel"]\n', "", "metrics", "of statics, not of runs without a path"),
+        ('metrics = ["travel.stage.T.x"]\n', GIVEN, "metrics", 'say "travel"'),
+        ("", GIVEN.replace("stage.T.x", "stage.T.q"), "statics.moved.stage.T.q", "is neither a joint"),
+        ("", GIVEN.replace("8 mm", "8 N"), "statics.moved.stage.T.x", "a quantity in N where one in m"),
+        ("", GIVEN.replace("steps", "step"), "statics.step", "unknown field"),
+        ("", "[statics]\nmoved = 3\n", "statics.moved", "should be a "),
+        ("", GIVEN + "[vary.tol]\nfields = ['integration.tolerance']\nvalues = [1e-4]\n", "integration", "have none"),
+    ],
+)
+def test_what_such_studies_do_not_have_is_refused(tmp_path, more, given, field, words):
+    file = written(tmp_path, more, BASE, given, VARIED if "vary" not in given else "")
+    if not given:
+        file.write_text(more + BASE + VARIED.partition("[vary.weight]")[0])
+    with pytest.raises(pf.InputError, match=words) as caught:
+        load_sweep(file)
+    assert caught.value.field == field
+    assert str(file) == caught.value.source
+
+
+def test_limits_of_metrics_are_in_the_unit_of_their_coordinate(tmp_path):
+    limit = '[[objective.at_most]]\nmetric = "compliance.stage.T.x"\nvalue = "1 rad/N/m"\n'
+    objective = f"[objective]\nminimise = {{ stress_max = 1.0 }}\n{limit}"
+    with pytest.raises(pf.InputError, match=r"compliance\.stage\.T\.x in m/N"):
+        pf.optimise(written(tmp_path, BASE, "[statics]\n", RANGES, objective), tmp_path / "out")
+
+
+def test_derivatives_of_statics_are_refused_by_name(tmp_path):
+    with pytest.raises(pf.InputError, match="not of statics"):
+        pf.sensitivities(written(tmp_path, BASE, "[statics]\n", "[vary.thickness]\nfields = ['leaf.thickness']\n"))
+
+
+def test_every_metric_of_statics_is_in_the_table(swept):
+    columns = set(pd.read_parquet(swept / "results.parquet").columns)
+    own = [metric for metric in METRICS.values() if STATICS in metric.runs]
+    assert len(own) > 15
+    assert {metric.name for metric in own} <= {column.partition(".")[0] for column in columns}
