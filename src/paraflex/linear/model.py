@@ -119,18 +119,12 @@ class LinearModel:
         whole[:, n : n + motors.size] += rows.torques.toarray()[:, motors]
         return whole[:, :n] + rows.q @ changes.q + rows.v @ changes.v, whole[:, n:][:, self.wanted[0]]
 
-    def acceleration_outputs(self, flexibility: Array) -> Array:
-        """What outputs (outputs, f) change with accelerations y'' that are not those of the equations.
-
-        Parameters
-        ----------
-        flexibility : (f, f) array
-            Of fast motions. Constraint forces, which follow from elastic forces, are those with these in balance.
-        """
-        rows, held = SensorRows(*(part[self.wanted[1]] for part in self.rows)), self.minimal.held_rows.number
-        f = len(self.states) // 2
-        reactions = rows.multipliers[:, held] @ self.minimal.changes.multipliers[held, :f]
-        return rows.a @ self.minimal.directions - reactions @ flexibility @ self._reduced[0]
+    @property
+    def place_outputs(self) -> Array:
+        """What outputs (outputs, f) are of the coordinates y, but for accelerations, constraint forces and torques."""
+        changes, f = self.minimal.changes, len(self.states) // 2
+        rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+        return rows.q @ changes.q[:, :f] + rows.v @ changes.v[:, :f]
 
     # --- Properties ---------------------------------------------------------------------------------------------------
 

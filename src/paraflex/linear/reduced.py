@@ -17,7 +17,7 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError, as_enum
 from paraflex.limits import solvable
 from paraflex.linear.balancing import balanced
-from paraflex.linear.bases import Basis, craig_bampton, independent_rows, kernel, lowest_modes
+from paraflex.linear.bases import Basis, craig_bampton, independent_rows, kernel, lowest_modes, rubin
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import SecondOrder, motions
@@ -34,6 +34,7 @@ class ReductionMethod(Enum):
     """How states are left out."""
 
     CRAIG_BAMPTON = "craig-bampton"
+    RUBIN = "rubin"
     MODAL = "modal"
     BALANCED = "balanced"
 
@@ -195,7 +196,11 @@ class ReducedModel:
 @checked_arguments()
 @solvable("a reduced model")
 def reduce(
-    model: LinearModel, states: int = 16, *, method: ReductionMethod | str = ReductionMethod.CRAIG_BAMPTON
+    model: LinearModel,
+    states: int = 16,
+    *,
+    method: ReductionMethod | str = ReductionMethod.CRAIG_BAMPTON,
+    feed_through: bool = True,
 ) -> ReducedModel:
     """A linear model of few states that stands for one of many.
 
@@ -207,8 +212,12 @@ def reduce(
         How many are kept; even but for balanced truncation.
     method : str
         "craig-bampton": static shapes of all motors' coordinates, whatever the mode, and vibrations with all motors
-        held. "modal": the lowest modes with motors free, and what the others do statically. "balanced": what inputs
-        move and outputs see most of the stable part, with a bound of the error.
+        held. "rubin": these static shapes, and shapes with which the lowest modes with motors free are exact. "modal":
+        these modes alone. "balanced": what inputs move and outputs see most of the stable part, with a bound of the
+        error.
+    feed_through : bool
+        What is left out bends as forces and inertia forces want it, so that torques have places, angles and strains
+        jump a little (`D`). Without, these are combinations of the states. Balanced states have no such part.
 
     Raises
     ------
@@ -237,9 +246,8 @@ def reduce(
         )
     basis, names = _basis(model, states // 2, method)
     rates = tuple(Variable(f"{one.name}_rate", f"{one.unit}/s") for one in names)
-    # What is left out bends as forces want it without being a state, except for static shapes, which bend so anyway.
-    residual = basis.flexibility if method is ReductionMethod.MODAL else np.zeros_like(basis.flexibility)
-    return ReducedModel(model, method, (*names, *rates), _projected(model, basis, residual), basis=basis.shapes)
+    space = _projected(model, basis, feed_through)
+    return ReducedModel(model, method, (*names, *rates), space, basis=basis.shapes)
 
 
 def _basis(model: LinearModel, count: int, method: ReductionMethod) -> tuple[Basis, tuple[Variable, ...]]:
@@ -260,26 +268,25 @@ def _basis(model: LinearModel, count: int, method: ReductionMethod) -> tuple[Bas
     mechanism = model.minimal.system.mechanism
     names = [Variable(joints[k], "m" if mechanism.joint(joints[k]).slides else "rad") for k in kept]
     names += [Variable(f"held_mode{k + 1}", "m kg^0.5") for k in range(count - len(kept))]
-    basis = craig_bampton(equations.mass, stiffness, rows[kept], count - len(kept), equations.typical)
-    return basis, tuple(names)
+    make = rubin if method is ReductionMethod.RUBIN else craig_bampton
+    return make(equations.mass, stiffness, rows[kept], count - len(kept), equations.typical), tuple(names)
 
 
-def _projected(model: LinearModel, basis: Basis, residual: Array) -> StateSpace:
-    """The equations in y = T z + R F u, F u the forces of inputs.
+def _projected(model: LinearModel, basis: Basis, feed_through: bool) -> StateSpace:
+    """The equations in y = T z; outputs see y = T z + G (F u - K T z - D T z' - M T z''), F u the forces of inputs.
 
-    Accelerations and constraint forces of the full model follow from all its forces, those of fast vibrations that are
-    left out among them. As those bend statically, their accelerations are not what outputs see: these see T z'', and
-    constraint forces in balance with that.
+    With the flexibility G vibrations that are left out bend as forces and inertia forces want it, without being states
+    (mode acceleration, Craig 1981): so bent, accelerations T z'' and constraint forces are in balance. Without
+    feed-through this is left out where outputs are places, angles and strains.
     """
-    T, f = basis.shapes, len(basis.shapes)
-    equations, forces = model.second_order, model.second_order.mass @ model.B[f:]
-    place, rate, moved = model.A[f:, :f], model.A[f:, f:], residual @ forces
-    mass = T.T @ equations.mass @ T
-    few = scipy.linalg.solve(mass, T.T @ equations.mass @ np.hstack([place @ T, rate @ T, place @ moved + model.B[f:]]))
-    k = T.shape[1]
+    T, f, k = basis.shapes, len(basis.shapes), basis.shapes.shape[1]
+    equations = model.second_order
+    full = np.hstack([model.A[f:, :f] @ T, model.A[f:, f:] @ T, model.B[f:]])
+    few = scipy.linalg.solve(T.T @ equations.mass @ T, T.T @ equations.mass @ full)
+    bent = basis.flexibility @ equations.mass @ (full - T @ few)
+    outputs = np.hstack([model.C[:, :f] @ T, model.C[:, f:] @ T, model.D]) + model.C[:, :f] @ bent
+    if not feed_through:
+        outputs -= model.place_outputs @ bent
     A = np.vstack([np.eye(k, 2 * k, k), few[:, : 2 * k]])
-    B = np.vstack([np.zeros((k, moved.shape[1])), few[:, 2 * k :]])
-    seen = model.acceleration_outputs(basis.flexibility)
-    missed = T @ few - np.hstack([place @ T, rate @ T, place @ moved + model.B[f:]])
-    outputs = np.hstack([model.C[:, :f] @ T, model.C[:, f:] @ T, model.C[:, :f] @ moved + model.D]) + seen @ missed
+    B = np.vstack([np.zeros((k, few.shape[1] - 2 * k)), few[:, 2 * k :]])
     return StateSpace(A, B, outputs[:, : 2 * k], outputs[:, 2 * k :])
