@@ -3,6 +3,7 @@
 from paraflex.linear.discrete import SampledModel as SampledModel
 from paraflex.linear.linearise import linearise as linearise
 from paraflex.linear.model import LinearModel as LinearModel
-from paraflex.linear.reduced import ReducedModel as ReducedModel, reduce as reduce
+from paraflex.linear.reduced import ReducedModel as ReducedModel
+from paraflex.linear.reduction import reduce as reduce
 from paraflex.linear.states_needed import states_needed as states_needed
 from paraflex.linear.varying import VaryingModel as VaryingModel, linearise_along as linearise_along

@@ -6,6 +6,7 @@ the lowest modes with a free interface are beside them (Rubin 1975, Craig and Ch
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -98,10 +99,45 @@ def rubin(mass: Array, stiffness: Array, rows: Array, count: int, typical: float
     return Basis(np.hstack([part.static, part.held @ found @ turn]), part.flexibility)
 
 
+def carried(mass: Array, stiffness: Array, rows: Array, shapes: Array, typical: float) -> Basis:
+    """Shapes (f, k) of another pose, whose first coordinates become those of an interface in this one.
+
+    Arguments are those of `craig_bampton`. The flexibility is that of this pose.
+    """
+    part = _interface(mass, stiffness, rows, typical)
+    left = rows @ shapes - np.eye(rows.shape[0], shapes.shape[1])
+    return Basis(shapes - part.turned @ left, part.flexibility)
+
+
+def interpolated(shapes: Sequence[Array], mass: Array, fixed: int, part: float) -> Array:
+    """Shapes (f, k) between those of several poses, on straight lines from each to the next.
+
+    Parameters
+    ----------
+    shapes : sequence of (f, k) arrays
+        Of poses one after the other.
+    mass : (f, f) array
+        Metric in which they are compared.
+    fixed : int
+        So many of their first columns stand for the same at every pose. The others span vibrations: they are turned
+        among themselves until they are nearest to those before (orthogonal Procrustes problem, Schoenemann 1966), so
+        that neither signs nor crossings of frequencies matter.
+    part : float
+        From 0, the first pose, to len(shapes) - 1, the last.
+    """
+    aligned = [shapes[0]]
+    for one in shapes[1:]:
+        U, _, V = scipy.linalg.svd(one[:, fixed:].T @ mass @ aligned[-1][:, fixed:])
+        aligned.append(np.hstack([one[:, :fixed], one[:, fixed:] @ (U @ V)]))
+    first = min(int(part), len(shapes) - 2)
+    return aligned[0] if first < 0 else aligned[first] + (part - first) * (aligned[first + 1] - aligned[first])
+
+
 class _Interface(NamedTuple):
-    """Static shapes (f, h) of an interface, and vibrations (f, f - h) with it held: squares, shapes, flexibility."""
+    """Static shapes (f, h) of an interface and any with its coordinates, and vibrations (f, f - h) with it held."""
 
     static: Array
+    turned: Array
     squares: Array
     held: Array
     flexibility: Array
@@ -114,7 +150,7 @@ def _interface(mass: Array, stiffness: Array, rows: Array, typical: float) -> _I
     held = free @ shapes
     flexibility = _flexibility(squares, held)
     turned = scale[:, None] * np.linalg.pinv(rows * scale)
-    return _Interface(turned - flexibility @ (stiffness @ turned), squares, held, flexibility)
+    return _Interface(turned - flexibility @ (stiffness @ turned), turned, squares, held, flexibility)
 
 
 def lowest_modes(mass: Array, stiffness: Array, count: int, typical: float) -> Basis:

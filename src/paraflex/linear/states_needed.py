@@ -11,7 +11,8 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError, as_enum
 from paraflex.linear.model import LinearModel
-from paraflex.linear.reduced import ReductionMethod, reduce
+from paraflex.linear.reduced import ReductionMethod
+from paraflex.linear.reduction import reduce
 
 if TYPE_CHECKING:
     import xarray as xr

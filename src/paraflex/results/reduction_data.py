@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.linear.model import LinearModel
-from paraflex.linear.reduced import ReducedModel, ReductionMethod, reduce
+from paraflex.linear.reduced import ReducedModel, ReductionMethod
+from paraflex.linear.reduction import reduce
 from paraflex.linear.states_needed import DAMPING, states_needed
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
