@@ -1,5 +1,6 @@
 """Linear models of mechanisms with named inputs and sensors: poles, zeros, frequency responses."""
 
+from paraflex.linear.along import PosesAlong as PosesAlong, poses_along as poses_along
 from paraflex.linear.discrete import SampledModel as SampledModel
 from paraflex.linear.linearise import linearise as linearise
 from paraflex.linear.model import LinearModel as LinearModel

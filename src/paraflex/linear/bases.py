@@ -99,14 +99,15 @@ def rubin(mass: Array, stiffness: Array, rows: Array, count: int, typical: float
     return Basis(np.hstack([part.static, part.held @ found @ turn]), part.flexibility)
 
 
-def carried(mass: Array, stiffness: Array, rows: Array, shapes: Array, typical: float) -> Basis:
+def carried(mass: Array, stiffness: Array, rows: Array, shapes: Array, typical: float, *, renewed: bool) -> Basis:
     """Shapes (f, k) of another pose, whose first coordinates become those of an interface in this one.
 
-    Arguments are those of `craig_bampton`. The flexibility is that of this pose.
+    Arguments are those of `craig_bampton`. The flexibility is that of this pose; so are static shapes, if renewed.
     """
     part = _interface(mass, stiffness, rows, typical)
-    left = rows @ shapes - np.eye(rows.shape[0], shapes.shape[1])
-    return Basis(shapes - part.turned @ left, part.flexibility)
+    h = len(rows)
+    own = shapes - part.static @ (rows @ shapes - np.eye(h, shapes.shape[1]))
+    return Basis(np.hstack([part.static if renewed else own[:, :h], own[:, h:]]), part.flexibility)
 
 
 def interpolated(shapes: Sequence[Array], mass: Array, fixed: int, part: float) -> Array:
@@ -134,10 +135,9 @@ def interpolated(shapes: Sequence[Array], mass: Array, fixed: int, part: float) 
 
 
 class _Interface(NamedTuple):
-    """Static shapes (f, h) of an interface and any with its coordinates, and vibrations (f, f - h) with it held."""
+    """Static shapes (f, h) of an interface, and vibrations (f, f - h) with it held: squares, shapes, flexibility."""
 
     static: Array
-    turned: Array
     squares: Array
     held: Array
     flexibility: Array
@@ -150,7 +150,7 @@ def _interface(mass: Array, stiffness: Array, rows: Array, typical: float) -> _I
     held = free @ shapes
     flexibility = _flexibility(squares, held)
     turned = scale[:, None] * np.linalg.pinv(rows * scale)
-    return _Interface(turned - flexibility @ (stiffness @ turned), turned, squares, held, flexibility)
+    return _Interface(turned - flexibility @ (stiffness @ turned), squares, held, flexibility)
 
 
 def lowest_modes(mass: Array, stiffness: Array, count: int, typical: float) -> Basis:

@@ -73,6 +73,14 @@ class LinearModel:
     rows: SensorRows
     wanted: tuple[NDArray[np.int64], NDArray[np.int64]]
 
+    def __repr__(self) -> str:
+        return f"LinearModel({self.title}: {len(self.states)} states)"
+
+    @property
+    def title(self) -> str:
+        """Which mechanism it is of, in which mode, and what it is about."""
+        return f"{self.mechanism}, mode {self.mode}, about {self.about}"
+
     @property
     def time(self) -> float:
         """Time of the point of the motion [s]."""

@@ -68,6 +68,10 @@ class ReducedModel:
     hankel: Array | None = None
     bound: float | None = None
 
+    def __repr__(self) -> str:
+        states = f"{len(self.states)} of {len(self.full.states)} states"
+        return f"ReducedModel({self.full.title}: {states}, {self.method.value})"
+
     @property
     def inputs(self) -> tuple[Variable, ...]:
         """Names and units, as of the full model."""

@@ -42,6 +42,7 @@ def reduce(
     method: ReductionMethod | str | None = None,
     basis: ReducedModel | Sequence[ReducedModel] | None = None,
     part: float | None = None,
+    renewed: bool = True,
     feed_through: bool = True,
     mode: str | ActuationMode | None = None,
     at: float | None = None,
@@ -67,6 +68,9 @@ def reduce(
         of several poses, between which the basis is interpolated. A mechanism is linearised in their coordinates.
     part : float, optional
         Of several bases: 0 for the first, 1 for the second, 1.5 for half the way from this to the third.
+    renewed : bool
+        Of a basis, only the vibrations are taken, beside static shapes of this pose: rigid motions and stiffness stay
+        exact. Without, the basis is that of the other pose altogether.
     feed_through : bool
         What is left out bends as forces and inertia forces want it, so that torques have places, angles and strains
         jump a little (`D`). Without, these are combinations of the states. Balanced states have no such part.
@@ -91,7 +95,7 @@ def reduce(
             remedy="give it flexible links",
         )  # fmt: skip
     if given:
-        return _carried(model, given, part or 0.0, feed_through)
+        return _carried(model, given, part or 0.0, renewed, feed_through)
     chosen = ReductionMethod.CRAIG_BAMPTON if method is None else as_enum(ReductionMethod, method, "method")
     return _reduced(model, _STATES if states is None else states, chosen, feed_through)
 
@@ -173,12 +177,14 @@ def _of_another(basis: ReducedModel, mechanism: str) -> InputError:
                       value=basis.full.mechanism, remedy="give one of the same mechanism in another pose")  # fmt: skip
 
 
-def _carried(model: LinearModel, given: Sequence[ReducedModel], part: float, feed_through: bool) -> ReducedModel:
+def _carried(
+    model: LinearModel, given: Sequence[ReducedModel], part: float, renewed: bool, feed_through: bool
+) -> ReducedModel:
     """The model in the basis of another pose, or between those of some."""
     first = given[0]
     shapes = interpolated([one.shapes for one in given], first.full.second_order.mass, first.interface, part)
     equations, rows = model.second_order, model.joint_rows([one.name for one in first.states[: first.interface]])
-    basis = carried(equations.mass, _symmetric(equations.stiffness), rows, shapes, equations.typical)
+    basis = carried(equations.mass, _symmetric(equations.stiffness), rows, shapes, equations.typical, renewed=renewed)
     space = _projected(model, basis, feed_through)
     return replace(first, full=model, state_space=space, basis=basis.shapes)
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
+from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
 from paraflex.linear.reduction import reduce
@@ -20,6 +21,7 @@ from paraflex.linear.states_needed import DAMPING, states_needed
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
 from paraflex.results.numbers import finite_or_none
+from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
 from paraflex.results.storage import SCHEMA
 
 Array = NDArray[np.float64]
@@ -48,6 +50,7 @@ def reduction_dataset(
     methods: Sequence[ReductionMethod | str] = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.MODAL),
     until: float = 40.0,
     error: float = 0.01,
+    along: Sequence[PosesAlong] = (),
     parameters: dict[str, Any] | None = None,
 ) -> xr.Dataset:
     """Reduced models of linear models of one mechanism, one for each actuation mode, beside the full ones.
@@ -64,6 +67,8 @@ def reduction_dataset(
         Highest frequency [Hz].
     error : float
         For which states needed are counted.
+    along : sequence of PosesAlong
+        Of the same modes: how far the basis of one pose holds along the path.
     parameters : dict, optional
         Kept as provenance: what was asked for.
 
@@ -71,7 +76,7 @@ def reduction_dataset(
     -------
     xarray.Dataset
         Dimensions mode, reduction, variant ("full", then each reduction), output, holding (motors free or held), order,
-        frequency.
+        frequency; with `along` basis and place as well.
 
     Raises
     ------
@@ -108,10 +113,25 @@ def reduction_dataset(
         "input_unit": ", ".join(units), "parameters": json.dumps(parameters or {}, sort_keys=True),
         "paraflex_version": version("paraflex"), "schema": SCHEMA,
     }  # fmt: skip
+    if along:
+        method = _carrying(names)
+        more = along_variables(along, states, method, until, error)
+        data |= more[0]
+        coordinates |= more[1]
+        attrs |= {"along_method": method.value, "place_unit": along[0].unit}
     out = xr.Dataset(data, coords=coordinates, attrs=attrs)
-    for name, (meaning, unit) in UNITS.items():
+    for name, (meaning, unit) in (UNITS | (UNITS_ALONG if along else {})).items():
         out[name].attrs = {"long_name": meaning, "units": unit}
     return out
+
+
+def _carrying(names: Sequence[str]) -> ReductionMethod:
+    """The first method whose bases can be taken over by other poses."""
+    for method in map(ReductionMethod, names):
+        if method in (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.RUBIN):
+            return method
+    raise InputError("have no basis that other poses could take over", field="methods", value=", ".join(names),
+                     remedy="add craig-bampton or rubin")  # fmt: skip
 
 
 def _responses(
@@ -123,9 +143,8 @@ def _responses(
     for model, reduced in zip(models, few, strict=True):
         full = model.frequency_response(s)
         found = [one.frequency_response(s) for one in reduced]
-        size = np.linalg.norm(full, axis=2)
         gains.append([np.linalg.norm(each, axis=2).T for each in (full, *found)])
-        errors.append([(np.linalg.norm(each - full, axis=2) / np.where(size > 0.0, size, np.inf)).T for each in found])
+        errors.append([output_errors(full, each).T for each in found])
     return np.array(gains), np.array(errors)
 
 
@@ -172,6 +191,7 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
                                                                                      holding=holding))
                        for holding in HOLDINGS},
                 **{str(name): of(mode, str(name)) for name in data["reduction"].values},
+                **({"along": along_summary(data, mode)} if "along_error" in data else {}),
             }
             for mode in modes
         },
