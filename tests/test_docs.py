@@ -33,7 +33,7 @@ import documented  # noqa: E402
         ("stresses.md", 2),
         ("quick-return.md", 4),
         ("linear-models.md", 3),
-        ("reduction.md", 4),
+        ("reduction.md", 5),
         ("statics.md", 3),
     ],
 )

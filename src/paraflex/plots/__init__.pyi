@@ -41,6 +41,7 @@ from .parallel import parallel_coordinates as parallel_coordinates
 from .phase import link_phases as link_phases, phase_diagrams as phase_diagrams
 from .reduction import (
     bases_along_path as bases_along_path,
+    held_frequency_by_states as held_frequency_by_states,
     reduced_responses as reduced_responses,
     reduction_errors as reduction_errors,
 )

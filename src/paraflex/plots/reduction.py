@@ -48,7 +48,7 @@ def reduced_responses(data: xr.Dataset, mode: str | None = None) -> Figure:
             }  # fmt: skip
             panel.plot(data["frequency"].values, gains.sel(variant=name).values, label=_label(data, name), **look)
         panel.set_title(f"to {symbol(output)}")
-        panel.set_ylabel(f"largest gain [{data['output_unit'].sel(output=output).item()}/({data.attrs['input_unit']})]")
+        panel.set_ylabel(f"gain [{data['output_unit'].sel(output=output).item()}/({data.attrs['input_unit']})]")
         _over_frequency(panel, data)
         top = float(np.nanmax(gains.values))
         low = float(np.nanmin(gains.values[gains.values > 0.0]))
@@ -78,6 +78,29 @@ def reduction_errors(data: xr.Dataset) -> Figure:
         panel.set_yscale("log")
         mark_powers(panel)
         _over_frequency(panel, data)
+    return lay_out(figure, axes, panel_height=62.0)
+
+
+@drawn
+def held_frequency_by_states(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Lowest frequency of a mode with its motors held, by method and number of states, and that of the full model."""
+    check_kind(data, "reduction")
+    mode = default_mode(data) if mode is None else mode
+    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    figure, axes = panels(1, 1)
+    panel = axes[0, 0]
+    for k, name in enumerate(names_of(data, "reduction")):
+        values = run["held_frequency"].sel(reduction=name).values
+        if np.isfinite(values).any():
+            panel.plot(data["kept"].values, values, label=name, marker="o", markersize=3.0,
+                       color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)])  # fmt: skip
+    exact = float(run["natural_frequency"].sel(variant=FULL, holding=HOLDINGS[1], order=1))
+    panel.axhline(exact, color=BLACK, linewidth=0.8, label=f"full model, {data.attrs['full_states']} states")
+    panel.set_xlabel("states")
+    panel.set_ylabel("lowest frequency [Hz]")
+    panel.set_title(f"motors of {plain(mode)} held")
+    panel.set_yscale("log")
+    mark_powers(panel)
     return lay_out(figure, axes, panel_height=62.0)
 
 

@@ -31,9 +31,12 @@ FULL = "full"
 _FREQUENCIES, _LOWEST, _BEYOND = 400, 1e-2, 2.5
 # Frequencies with motors free and held that are compared.
 _COMPARED = 6
+# Most states for which the lowest frequency with motors held is told.
+_MOST = 48
 UNITS = {
     "states": ("fewest states within the error up to the highest frequency; NaN where more than 80 are needed", "1"),
     "natural_frequency": ("undamped natural frequency above zero", "Hz"),
+    "held_frequency": ("lowest natural frequency above zero with motors held, by number of states", "Hz"),
     "gain": ("largest gain of all inputs to an output", "unit of the output, by that of the inputs"),
     "error": ("largest gain of the error to an output, over that of the full model", "1"),
     "largest_error": ("largest error up to the highest frequency", "1"),
@@ -76,7 +79,7 @@ def reduction_dataset(
     -------
     xarray.Dataset
         Dimensions mode, reduction, variant ("full", then each reduction), output, holding (motors free or held), order,
-        frequency; with `along` basis and place as well.
+        frequency, kept (states); with `along` basis and place as well.
 
     Raises
     ------
@@ -91,10 +94,11 @@ def reduction_dataset(
         raise InputError("have other outputs", field="models", remedy="give models of one mechanism")
     frequency = np.geomspace(_LOWEST * until, _BEYOND * until, _FREQUENCIES)
     gains, errors = _responses(models, few, frequency)
-    reached = frequency <= until
+    reached, counts = frequency <= until, np.arange(2, min(_MOST, len(models[0].states)) + 1, 2)
     data: dict[str, Any] = {
         "states": needed["states"],
         "natural_frequency": (("mode", "variant", "holding", "order"), _frequencies(models, few)),
+        "held_frequency": (("mode", "reduction", "kept"), _held(models, names, counts)),
         "gain": (("mode", "variant", "output", "frequency"), gains),
         "error": (("mode", "reduction", "output", "frequency"), errors),
         "largest_error": (("mode", "reduction", "output"), errors[..., reached].max(axis=-1)),
@@ -104,7 +108,7 @@ def reduction_dataset(
     coordinates = {
         "mode": [model.mode for model in models], "reduction": names, "variant": [FULL, *names], "output": outputs,
         "output_unit": ("output", [one.unit for one in models[0].outputs]), "holding": list(HOLDINGS),
-        "order": np.arange(1, _COMPARED + 1), "frequency": frequency,
+        "order": np.arange(1, _COMPARED + 1), "frequency": frequency, "kept": counts,
     }  # fmt: skip
     units = dict.fromkeys(one.unit for model in models for one in model.inputs)
     attrs = {
@@ -162,6 +166,23 @@ def _frequencies(models: Sequence[LinearModel], few: Sequence[Sequence[ReducedMo
     return out
 
 
+def _held(models: Sequence[LinearModel], names: Sequence[str], counts: Sequence[int]) -> Array:
+    """Lowest frequency above zero with motors held (mode, reduction, count) [Hz]; NaN without one."""
+
+    def lowest(model: LinearModel, states: int, name: str) -> float:
+        if name == ReductionMethod.BALANCED.value:
+            return np.nan
+        try:
+            found = reduce(model, states, method=name).held_frequencies(motors_of(model))
+        except InputError:
+            # Fewer than the coordinates of motors.
+            return np.nan
+        above = found[found > 0.0] / (2.0 * np.pi)
+        return above[0] if above.size else np.nan
+
+    return np.array([[[lowest(model, int(count), name) for count in counts] for name in names] for model in models])
+
+
 @checked_arguments()
 def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
     """Reduced models as plain numbers."""
@@ -174,6 +195,7 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
             "states_needed": _numbers(run["states"], "output"),
             "largest_error": _numbers(run["largest_error"], "output"),
             "bound": finite_or_none(float(run["bound"])),
+            "held_frequency_by_states": _numbers(run["held_frequency"], "kept"),
             **{f"frequencies_{holding}": _list(frequencies.sel(holding=holding)) for holding in HOLDINGS},
         }
 
