@@ -12,7 +12,7 @@ import paraflex as pf
 from paraflex.kinematics import Line
 from paraflex.linear import linearise, reduce, states_needed
 from paraflex.linear.bases import craig_bampton, rubin
-from paraflex.mechanism import AccelerationSensor, JointForceSensor, ModalDamping, StrainGauge
+from paraflex.mechanism import AccelerationSensor, FlexibleBeam, JointForceSensor, ModalDamping, StrainGauge
 from test_linear import HELD, hub_beam, joints_of
 
 # A hundredth to the right of the imaginary axis: as if all vibrations were damped by one per cent.
@@ -187,6 +187,44 @@ def test_the_bound_of_balanced_truncation_is_above_the_error(damped_hub, kept, a
     assert error == pytest.approx(actual, rel=1e-4)
     assert error <= few.bound < 3.0 * error
     assert np.abs(few.poles()[:2]).max() < 1e-6
+
+
+def randomly_damped(mechanism, seed):
+    """The mechanism with modal damping between a thousandth and a tenth of each flexible body."""
+    random = np.random.default_rng(seed)
+    ratios = {body.name: 10.0 ** random.uniform(-3.0, -1.0) for body in mechanism.bodies}
+    return mechanism.with_bodies(
+        replace(body, damping=ModalDamping((ratios[body.name],))) if isinstance(body, FlexibleBeam) else body
+        for body in mechanism.bodies
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "mode", "outputs", "moving"),
+    [
+        ("raparm_i", "+-+-", ("x", "y"), None), ("raparm_i", "++++", ("A1", "D2"), None),
+        ("five_bar", "++", ("x", "y"), None), ("five_bar", "++", ("A1", "A2"), 0.05), ("3prr", None, ("x", "y"), None),
+        ("3rrr", None, ("x", "y"), None), ("geared_five_bar", None, ("y",), None),
+    ],
+)  # fmt: skip
+def test_the_bound_is_nowhere_below_the_error(name, mode, outputs, moving):
+    """From below all frequencies to above them, and about the peaks: down to what rounding leaves of the bound."""
+    model = pf.load(name)
+    mechanism = randomly_damped(model.mechanism, seed=len(name))
+    source = mechanism if moving is None else pf.plan(mechanism, model.path(), samples=101)
+    full = linearise(source, mode=mode, at=moving).select(outputs=list(outputs))
+    poles = full.poles()
+    poles = poles[poles.imag > 1.0]
+    near = poles.imag[:, None] + np.outer(poles.real, np.linspace(-3.0, 3.0, 7))
+    omega = np.concatenate([np.geomspace(0.1, 1e6, 200), np.abs(near).ravel()])
+    exact = full.frequency_response(omega)
+    for states in (8, 13, 24, 60, 80):
+        few = reduce(full, states, method="balanced")
+        error = np.max(np.linalg.norm(few.frequency_response(omega) - exact, 2, axis=(1, 2)))
+        assert error <= few.bound
+        # Nor can any model of as many states err less than the first value left out.
+        left_out = few.hankel[states - (len(full.states) - few.hankel.size)]
+        assert error > 0.9 * left_out or left_out < 1e-7 * few.hankel[0]
 
 
 # --- How many states --------------------------------------------------------------------------------------------------

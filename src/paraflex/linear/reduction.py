@@ -208,10 +208,10 @@ def _reduced(model: LinearModel, states: int, method: ReductionMethod, feed_thro
 
 def _balanced(model: LinearModel, states: int) -> ReducedModel:
     """The model in balanced states."""
-    found = balanced_truncation(model.scaled, states, model.low_frequency)
-    there, back = model.modal_states
-    left, right = found.left @ there, back @ found.right
-    space = StateSpace(left @ model.A @ right, left @ model.B, model.C @ right, model.D)
+    full = model.scaled
+    found = balanced_truncation(full, states, model.low_frequency)
+    left, right = found.left, found.right
+    space = StateSpace(left @ full.A @ right, left @ full.B, full.C @ right, full.D)
     names = tuple(Variable(f"balanced{k + 1}", "1") for k in range(len(left)))
     return ReducedModel(model, ReductionMethod.BALANCED, names, space, hankel=found.hankel, bound=found.bound)
 
