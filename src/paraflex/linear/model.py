@@ -24,7 +24,7 @@ from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.motions import Motions, SecondOrder, modal_damping, motions
-from paraflex.linear.named import Names, control_model, labelled_model, numbers_of, places_in_s
+from paraflex.linear.named import Names, control_model, labelled_model, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
 if TYPE_CHECKING:
@@ -367,19 +367,26 @@ class LinearModel:
         ----------
         frequencies : (k,) array
             Angular frequencies omega, for s = i omega [rad/s]; complex numbers are taken as s.
+
+        Raises
+        ------
+        InputError
+            A pole, where the response is infinite.
         """
         points = places_in_s(frequencies)
         out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
         if self._is_large:
             rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
             for k, s in enumerate(points):
-                out[k] = response_at(self.minimal, rows, self.wanted[0], s)
+                with not_at_poles(s):
+                    out[k] = response_at(self.minimal, rows, self.wanted[0], s)
             return out
         A, B, C, D = self.scaled
         upper, basis = scipy.linalg.schur(A, output="complex")
         inputs, outputs, eye = basis.conj().T @ B, C @ basis, np.eye(len(A))
         for k, s in enumerate(points):
-            out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
+            with not_at_poles(s):
+                out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
         return out
 
     @property

@@ -19,7 +19,7 @@ from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import SecondOrder, motions
-from paraflex.linear.named import Names, control_model, labelled_model, numbers_of, places_in_s
+from paraflex.linear.named import Names, control_model, labelled_model, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, zeros
 
 if TYPE_CHECKING:
@@ -166,9 +166,11 @@ class ReducedModel:
     @checked_arguments()
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
         """Response C (s - A)^-1 B + D (k, outputs, inputs): see `LinearModel.frequency_response`."""
-        points = places_in_s(frequencies)
-        eye = np.eye(len(self.A))
-        return np.array([self.C @ np.linalg.solve(s * eye - self.A, self.B) + self.D for s in points])
+        return np.array([self._response(complex(s)) for s in places_in_s(frequencies)])
+
+    def _response(self, s: complex) -> Complex:
+        with not_at_poles(s):
+            return self.C @ np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B) + self.D
 
     @checked_arguments()
     def error(self, frequencies: ArrayLike, outputs: Sequence[str] | None = None) -> Array:
