@@ -219,7 +219,8 @@ def _at_rest(model: Model, pose: State, mode: ActuationMode, balanced: bool, por
         found = linearise(model.mechanism, mode=mode, start=pose, balanced=balanced, **ports)
     except AssemblyError as error:
         raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
-    free = int(np.sum(found.motions(motors_of(found)).frequencies == 0.0))
+    # What is driven moves as it is driven.
+    free = int(np.sum(found.motions(motors_of(found)).frequencies == 0.0)) - found.minimal.driven
     if free and found.unbalanced > BALANCED:
         remain = "one motion remains" if free == 1 else f"{free} motions remain"
         raise InputError(

@@ -23,7 +23,7 @@ from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
-from paraflex.linear.motions import Motions, SecondOrder, modal_damping, motions
+from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
 from paraflex.linear.named import Names, control_model, labelled_model, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
@@ -139,8 +139,10 @@ class LinearModel:
     @cached_property
     def _reduced(self) -> tuple[Array, Array, Array]:
         """Mass, damping and stiffness (f, f) in the minimal coordinates; of a motion without terms of its rates."""
-        Z, whole = self.minimal.directions, self.minimal.tangents.whole
-        return Z.T @ (whole.mass @ Z), Z.T @ (whole.damping @ Z), Z.T @ (whole.stiffness @ Z)
+        Z, whole, minimal = self.minimal.directions, self.minimal.tangents.whole, self.minimal
+        parts = Z.T @ (whole.mass @ Z), Z.T @ (whole.damping @ Z), Z.T @ (whole.stiffness @ Z)
+        last = minimal.chosen.joints.size
+        return driven_equations(*parts, np.arange(last - minimal.driven, last)) if minimal.driven else parts
 
     @cached_property
     def _typical(self) -> float:
@@ -310,19 +312,19 @@ class LinearModel:
 
     def _slow_poles(self, count: int) -> Complex:
         """The slowest poles by sparse matrices."""
-        whole = self.minimal.tangents.whole
+        whole, driven = self.minimal.tangents.whole, self.minimal.driven
         slow = slowest(
-            csr_matrix(0.5 * (whole.stiffness + whole.stiffness.T)), whole.mass, self.minimal.constraints.jacobian,
-            self._typical, count, self.minimal.chosen.freedoms,
+            csr_matrix(0.5 * (whole.stiffness + whole.stiffness.T)), whole.mass, self.minimal.held_rows.jacobian,
+            self._typical, count, self.minimal.chosen.freedoms - driven,
         )  # fmt: skip
         uneven = scipy.sparse.linalg.norm(whole.stiffness - whole.stiffness.T)
         vibrates = self.at_rest and uneven <= _SYMMETRIC * scipy.sparse.linalg.norm(whole.stiffness)
         if vibrates and not np.any(whole.damping.data):
             root = np.sqrt(-slow.squares.astype(complex))
-            return _by_size(np.concatenate([root, -root]))[:count]
+            return _by_size(np.concatenate([np.zeros(2 * driven), root, -root]))[:count]
         found = _by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
         free = (slow.squares == 0.0) & ~np.any(whole.damping @ slow.shapes, axis=0) & vibrates
-        found[: 2 * int(free.sum())] = 0.0
+        found[: 2 * (int(free.sum()) + (driven if vibrates else 0))] = 0.0
         return found[:count]
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:

@@ -29,6 +29,8 @@ from paraflex.tracking import TrackingRun, TrackingTask
 
 # States of reduced models, where no number is given.
 _STATES = 16
+# Methods whose bases can be taken over by other poses.
+CARRIED = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.RUBIN)
 
 Source = LinearModel | Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun
 
@@ -57,10 +59,10 @@ def reduce(
     source : LinearModel, Mechanism, Model, TrackingTask, TrackingRun or MotionRun
         As `linearise` makes it, or what it is made of.
     states : int, optional
-        How many are kept, 16 by default; even but for balanced truncation.
+        How many are kept, 16 by default, or all of fewer; even but for balanced truncation.
     method : str, optional
-        "craig-bampton" (default): static shapes of all motors' coordinates, whatever the mode, and vibrations with all
-        motors held. "rubin": these static shapes, and shapes with which the lowest modes with motors free are exact.
+        "craig-bampton" (default): static shapes of all motors' coordinates, whatever the mode, and of prescribed motions
+        that are inputs, and vibrations with all these held. "rubin": these static shapes, and shapes with which the lowest modes with motors free are exact.
         "modal": these modes alone. "balanced": what inputs move and outputs see most of the stable part, with a bound
         of the error.
     basis : ReducedModel or sequence of ReducedModel, optional
@@ -97,7 +99,7 @@ def reduce(
     if given:
         return _carried(model, given, part or 0.0, renewed, feed_through)
     chosen = ReductionMethod.CRAIG_BAMPTON if method is None else as_enum(ReductionMethod, method, "method")
-    return _reduced(model, _STATES if states is None else states, chosen, feed_through)
+    return _reduced(model, min(_STATES, len(model.states)) if states is None else states, chosen, feed_through)
 
 
 def _given(
@@ -118,7 +120,7 @@ def _given(
                              f"are those of the basis, {len(given[0].states)}",
                              field=name, value=str(value), remedy="leave it out")  # fmt: skip
     for one in given:
-        if not one.interface:
+        if one.method not in CARRIED:
             raise InputError(
                 "does not keep the motors' coordinates, by which bases of other poses are taken over", field="basis",
                 value=one.method.value, remedy="give one by craig-bampton or rubin",
@@ -227,12 +229,14 @@ def _basis(model: LinearModel, count: int, method: ReductionMethod) -> tuple[Bas
     if method is ReductionMethod.MODAL:
         basis = lowest_modes(equations.mass, stiffness, count, equations.typical)
         return basis, tuple(Variable(f"mode{k + 1}", "m kg^0.5") for k in range(count)), 0
+    driven = [one.name for one in model.states[: model.minimal.chosen.joints.size]][-model.minimal.driven :]
     joints = list(dict.fromkeys(motor.joint for motor in model.minimal.system.mechanism.motors))
+    joints += [joint for joint in driven if joint not in joints] if model.minimal.driven else []
     rows = model.joint_rows(joints)
     kept = independent_rows(rows, 1.0 / np.sqrt(np.diag(equations.mass)))
     if count < len(kept):
         raise InputError(
-            f"are fewer than the {2 * len(kept)} of the coordinates of {len(kept)} motors and their rates",
+            f"are fewer than the {2 * len(kept)} of the coordinates of {len(kept)} motors or drives and their rates",
             field="states", value=2 * count, remedy=f"keep at least {2 * len(kept)}, better {2 * len(kept) + 8}",
         )  # fmt: skip
     mechanism = model.minimal.system.mechanism

@@ -44,7 +44,7 @@ class _Errors(NamedTuple):
 
 
 def along_variables(
-    along: Sequence[PosesAlong], states: int, method: ReductionMethod, until: float, error: float
+    along: Sequence[PosesAlong], states: int | None, method: ReductionMethod, until: float, error: float
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables and coordinates of a dataset: errors along a path of reduced models with bases of several poses.
 
@@ -52,8 +52,8 @@ def along_variables(
     ----------
     along : sequence of PosesAlong
         One for each mode, in the same poses.
-    states : int
-        Of the reduced models.
+    states : int, optional
+        Of the reduced models: see `reduce`.
     method : ReductionMethod
     until : float
         Highest frequency [Hz].
@@ -109,7 +109,7 @@ def _bases(places: Array, *, closed: bool) -> Iterator[tuple[str, Take]]:
 class _Path:
     """Full models of a mode along a path, reduced ones with bases of their own, and the one whose basis is carried."""
 
-    def __init__(self, along: PosesAlong, states: int, method: ReductionMethod, until: float) -> None:
+    def __init__(self, along: PosesAlong, states: int | None, method: ReductionMethod, until: float) -> None:
         self.along: PosesAlong = along
         self.own: list[ReducedModel] = [reduce(model, states, method=method) for model in along.models]
         elsewhere = along.elsewhere

@@ -16,7 +16,7 @@ from paraflex.errors import InputError
 from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
-from paraflex.linear.reduction import reduce
+from paraflex.linear.reduction import CARRIED, reduce
 from paraflex.linear.states_needed import DAMPING, states_needed
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
@@ -48,7 +48,7 @@ UNITS = {
 @checked_arguments()
 def reduction_dataset(
     models: Sequence[LinearModel],
-    states: int = 16,
+    states: int | None = None,
     *,
     methods: Sequence[ReductionMethod | str] = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.MODAL),
     until: float = 40.0,
@@ -62,8 +62,8 @@ def reduction_dataset(
     ----------
     models : sequence of LinearModel
         Each of another mode, with the same outputs.
-    states : int
-        Of the reduced models.
+    states : int, optional
+        Of the reduced models: see `reduce`.
     methods : sequence of str
         Of `reduce`.
     until : float
@@ -112,7 +112,7 @@ def reduction_dataset(
     }  # fmt: skip
     units = dict.fromkeys(one.unit for model in models for one in model.inputs)
     attrs = {
-        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about, "kept_states": states,
+        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about, "kept_states": len(few[0][0].states),
         "full_states": len(models[0].states), "until": until, "accuracy": error, "damping_ratio": DAMPING,
         "input_unit": ", ".join(units), "parameters": json.dumps(parameters or {}, sort_keys=True),
         "paraflex_version": version("paraflex"), "schema": SCHEMA,
@@ -132,7 +132,7 @@ def reduction_dataset(
 def _carrying(names: Sequence[str]) -> ReductionMethod:
     """The first method whose bases can be taken over by other poses."""
     for method in map(ReductionMethod, names):
-        if method in (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.RUBIN):
+        if method in CARRIED:
             return method
     raise InputError("have no basis that other poses could take over", field="methods", value=", ".join(names),
                      remedy="add craig-bampton or rubin")  # fmt: skip

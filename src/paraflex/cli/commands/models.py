@@ -140,7 +140,9 @@ class LineariseRequest(LinearRequest):
 class ReduceRequest(LinearRequest):
     """What `paraflex reduce` is asked for."""
 
-    states: Annotated[int, Option(metavar="N", help="States of the reduced models.")] = 16
+    states: Annotated[
+        int | None, Option(metavar="N", help="States of the reduced models. Default: 16, or all of fewer.")
+    ] = None
     methods: Annotated[
         list[str],
         Option(
