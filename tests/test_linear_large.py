@@ -191,7 +191,7 @@ def test_the_sign_of_a_factor_is_that_of_the_determinant():
 @pytest.mark.parametrize("kind", ["column", "rows"])
 @pytest.mark.parametrize("seed", range(5))
 def test_a_matrix_without_pivots_never_reaches_superlu(kind, seed, monkeypatch):
-    """Which has BLAS refuse its arguments then, and writes beyond its memory: a column of zeros, two rows of one entry."""
+    """It has BLAS refuse arguments then, and writes beyond its memory: a column of zeros, two rows of one entry."""
     random = np.random.default_rng(seed)
     matrix = scipy.sparse.random(40, 40, 0.1, random_state=random).toarray() + np.eye(40)
     if kind == "column":
@@ -218,10 +218,9 @@ def test_responses_at_poles_are_refused(elements):
 
 
 def test_a_response_at_a_pole_of_a_reduced_model_is_refused():
-    few = pf.reduce(hub_model := linearise(hub_beam(0.1, 0.5, 0.0)), 2)
+    few = pf.reduce(linearise(hub_beam(0.1, 0.5, 0.0)), 2)
     with pytest.raises(pf.InputError, match="frequencies: is a pole of the model"):
         few.frequency_response([0.0])
-    assert np.isfinite(hub_model.frequency_response([0.1])).all()
 
 
 def test_accelerations_that_contradict_constraints_are_refused():

@@ -310,6 +310,11 @@ class LinearModel:
             stiffness, damping = -mass @ self.A[f:, :f], -mass @ self.A[f:, f:]
         return SecondOrder(mass, damping, stiffness, self._typical, self._is_vibrating)
 
+    @property
+    def frozen(self) -> SecondOrder:
+        """The equations of which `frequencies` are: of a motion without the terms of its rates."""
+        return SecondOrder(*self._reduced, self._typical, self._is_vibrating)
+
     def _slow_poles(self, count: int) -> Complex:
         """The slowest poles by sparse matrices."""
         whole, driven = self.minimal.tangents.whole, self.minimal.driven

@@ -60,8 +60,8 @@ def driven_equations(
 ) -> tuple[Array, Array, Array]:
     """Equations (f, f) in which some coordinates go on as they are driven, whatever the others do.
 
-    With y = psi y_d + x, psi the static shapes of the driven coordinates, x obeys M x'' + D x' + K x = -D psi y_d' where
-    y_d'' = 0; the two do not otherwise depend on each other, so that mass and stiffness stay symmetric.
+    With y = psi y_d + x, psi the static shapes of the driven coordinates, x obeys M x'' + D x' + K x = -D psi y_d'
+    where y_d'' = 0; the two do not otherwise depend on each other, so that mass and stiffness stay symmetric.
     """
     f = mass.shape[0]
     others = np.setdiff1d(np.arange(f), driven)

@@ -120,7 +120,7 @@ class ReducedModel:
 
     @cached_property
     def _second_order(self) -> SecondOrder:
-        return self.full.second_order.within(self.shapes)
+        return self.full.frozen.within(self.shapes)
 
     @property
     def frequencies(self) -> Array:

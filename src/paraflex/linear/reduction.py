@@ -61,10 +61,10 @@ def reduce(
     states : int, optional
         How many are kept, 16 by default, or all of fewer; even but for balanced truncation.
     method : str, optional
-        "craig-bampton" (default): static shapes of all motors' coordinates, whatever the mode, and of prescribed motions
-        that are inputs, and vibrations with all these held. "rubin": these static shapes, and shapes with which the lowest modes with motors free are exact.
-        "modal": these modes alone. "balanced": what inputs move and outputs see most of the stable part, with a bound
-        of the error.
+        "craig-bampton" (default): static shapes of all motors' coordinates, whatever the mode, and of prescribed
+        motions that are inputs, and vibrations with all these held. "rubin": the same static shapes, and shapes with
+        which the lowest modes with motors free are exact. "modal": these modes alone. "balanced": what inputs move and
+        outputs see most of the stable part, with a bound of the error.
     basis : ReducedModel or sequence of ReducedModel, optional
         By "craig-bampton" or "rubin", of the mechanism in another pose, whose states are kept in this one as well; or
         of several poses, between which the basis is interpolated. A mechanism is linearised in their coordinates.

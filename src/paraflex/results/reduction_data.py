@@ -112,10 +112,11 @@ def reduction_dataset(
     }  # fmt: skip
     units = dict.fromkeys(one.unit for model in models for one in model.inputs)
     attrs = {
-        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about, "kept_states": len(few[0][0].states),
-        "full_states": len(models[0].states), "until": until, "accuracy": error, "damping_ratio": DAMPING,
-        "input_unit": ", ".join(units), "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"), "schema": SCHEMA,
+        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about,
+        "kept_states": len(few[0][0].states), "full_states": len(models[0].states), "until": until, "accuracy": error,
+        "damping_ratio": DAMPING, "input_unit": ", ".join(units),
+        "parameters": json.dumps(parameters or {}, sort_keys=True), "paraflex_version": version("paraflex"),
+        "schema": SCHEMA,
     }  # fmt: skip
     if along:
         method = _carrying(names)
@@ -166,7 +167,7 @@ def _frequencies(models: Sequence[LinearModel], few: Sequence[Sequence[ReducedMo
     return out
 
 
-def _held(models: Sequence[LinearModel], names: Sequence[str], counts: Sequence[int]) -> Array:
+def _held(models: Sequence[LinearModel], names: Sequence[str], counts: NDArray[np.int64]) -> Array:
     """Lowest frequency above zero with motors held (mode, reduction, count) [Hz]; NaN without one."""
 
     def lowest(model: LinearModel, states: int, name: str) -> float:
