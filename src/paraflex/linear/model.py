@@ -326,7 +326,7 @@ class LinearModel:
         vibrates = self.at_rest and uneven <= _SYMMETRIC * scipy.sparse.linalg.norm(whole.stiffness)
         if vibrates and not np.any(whole.damping.data):
             root = np.sqrt(-slow.squares.astype(complex))
-            return _by_size(np.concatenate([np.zeros(2 * driven), root, -root]))[:count]
+            return _by_size(np.concatenate([np.zeros(2 * driven, dtype=complex), root, -root]))[:count]
         found = _by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
         free = (slow.squares == 0.0) & ~np.any(whole.damping @ slow.shapes, axis=0) & vibrates
         found[: 2 * (int(free.sum()) + (driven if vibrates else 0))] = 0.0
