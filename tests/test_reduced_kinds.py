@@ -20,6 +20,7 @@ from paraflex.mechanism import (
     PointRef,
     PositionSensor,
     Section,
+    TorsionalDamper,
 )
 from test_consistency import parallelogram
 
@@ -82,10 +83,13 @@ def test_what_is_driven_is_a_state_by_name():
     assert few.inputs == driven.inputs
 
 
-@pytest.mark.parametrize("damping", [None, ModalDamping((0.02,))])
-def test_a_drive_that_is_an_input_is_not_released(damping):
+@pytest.mark.parametrize(
+    ("damping", "dampers"),
+    [(None, ()), (ModalDamping((0.02,)), ()), (ModalDamping((0.02,)), (TorsionalDamper("oil", "A", 1e-3),))],
+)
+def test_a_drive_that_is_an_input_is_not_released(damping, dampers):
     """Vibrations are those with the crank held, beside its own uniform motion; responses those of A, B, C and D."""
-    mechanism = driven_four_bar(damping)
+    mechanism = replace(driven_four_bar(damping), dampers=dampers)
     full, system = linearise(mechanism, prescribed=["drive"], forces=["coupler.B"]), build_system(mechanism)
     exact = natural_frequencies(system, pose_at_rest(system, None, None)).frequencies
     assert full.frequencies[:6] == pytest.approx([0.0, *exact[:5]], rel=1e-9)
