@@ -12,6 +12,7 @@ import scipy
 import paraflex as pf
 from paraflex.dynamics import build_system, consistent_state, linearise as vibrations, natural_frequencies
 from paraflex.dynamics.sparse import Factor
+from paraflex.errors import SingularPositionError
 from paraflex.linear import linearise
 from paraflex.linear.descriptor import Descriptor, poles_near, response_at
 from paraflex.linear.independent import independent_dense, independent_sparse
@@ -182,3 +183,50 @@ def test_the_sign_of_a_factor_is_that_of_the_determinant():
         matrix = rng.normal(size=(7, 7)) * (rng.random((7, 7)) < 0.5) + np.diag(rng.normal(size=7))
         factor = Factor(scipy.sparse.csr_matrix(matrix), np.full(7, 0.5))
         assert factor.sign == np.sign(np.linalg.det(matrix))
+
+
+# --- Singular matrices ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["column", "rows"])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_matrix_without_pivots_never_reaches_superlu(kind, seed, monkeypatch):
+    """It has BLAS refuse arguments then, and writes beyond its memory: a column of zeros, two rows of one entry."""
+    random = np.random.default_rng(seed)
+    matrix = scipy.sparse.random(40, 40, 0.1, random_state=random).toarray() + np.eye(40)
+    if kind == "column":
+        matrix[:, random.integers(40)] = 0.0
+    else:
+        matrix[:2], matrix[0, 7], matrix[1, 7] = 0.0, 1.0, 2.0
+    monkeypatch.setattr(scipy.sparse.linalg, "splu", lambda _: pytest.fail("SuperLU got a matrix without pivots"))
+    for number in (1.0, 1.0j):
+        with pytest.raises(np.linalg.LinAlgError, match="structurally singular"):
+            Factor(scipy.sparse.csr_matrix(number * matrix), np.ones(40))
+
+
+def test_a_matrix_singular_by_its_numbers_is_refused():
+    matrix = scipy.sparse.csr_matrix(np.array([[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 1.0, 1.0]]))
+    with pytest.raises(np.linalg.LinAlgError, match="singular"):
+        Factor(matrix, np.ones(3))
+
+
+@pytest.mark.parametrize("elements", [3, 12])
+def test_responses_at_poles_are_refused(elements):
+    """Dense and sparse: constant torques of free motors never end to make the mechanism turn."""
+    with pytest.raises(pf.InputError, match="frequencies: is a pole of the model"):
+        linearise(pf.library.raparm_i().with_beams(elements=elements)).frequency_response([1.0, 0.0])
+
+
+def test_a_response_at_a_pole_of_a_reduced_model_is_refused():
+    few = pf.reduce(linearise(hub_beam(0.1, 0.5, 0.0)), 2)
+    with pytest.raises(pf.InputError, match="frequencies: is a pole of the model"):
+        few.frequency_response([0.0])
+
+
+def test_accelerations_that_contradict_constraints_are_refused():
+    """Rows that depend on one another, as at a pose where a mechanism loses a constraint."""
+    minimal = linearise(pf.load("five_bar")).minimal
+    twice, held = replace(minimal), minimal.held_rows
+    object.__setattr__(twice, "held_rows", held.with_rows(held.taken(np.array([0]))))
+    with pytest.raises(SingularPositionError, match="depend on one another"):
+        _ = twice.changes

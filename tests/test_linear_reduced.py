@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 import paraflex as pf
 from paraflex.kinematics import Line
 from paraflex.linear import linearise, reduce, states_needed
-from paraflex.linear.bases import craig_bampton
-from paraflex.mechanism import AccelerationSensor, JointForceSensor, ModalDamping, StrainGauge
+from paraflex.linear.bases import craig_bampton, rubin
+from paraflex.mechanism import AccelerationSensor, FlexibleBeam, JointForceSensor, ModalDamping, StrainGauge
 from test_linear import HELD, hub_beam, joints_of
 
 # A hundredth to the right of the imaginary axis: as if all vibrations were damped by one per cent.
@@ -51,19 +52,94 @@ def test_sixteen_states_of_raparm(raparm_at_q, mode):
     assert lowest == pytest.approx(full.held_frequencies()[:2], rel=1e-5)
 
 
-def test_responses_of_sixteen_states(raparm_at_q):
+BAND = 2.0 * np.pi * np.linspace(0.5, 40.0, 60) * DAMPED
+
+
+def test_responses_without_feed_through(raparm_at_q):
     """As an independent finite-element model has them, motors to C and to encoders until 40 Hz: 4.5e-4, 5.4e-4."""
-    full, s = raparm_at_q["++++"], 2.0 * np.pi * np.linspace(0.5, 40.0, 60) * DAMPED
+    full = raparm_at_q["++++"]
     encoders = joints_of(full)
-    errors = [[reduce(full, states).error(s, names).max() for names in (["x", "y"], encoders)]
-              for states in (12, 16, 24)]  # fmt: skip
+    models = [reduce(full, states, feed_through=False) for states in (12, 16, 24)]
+    errors = [[few.error(BAND, names).max() for names in (["x", "y"], encoders)] for few in models]
     assert errors[0] == pytest.approx([0.13, 0.18], rel=0.05)
     assert errors[1] == pytest.approx([4.5e-4, 5.4e-4], rel=0.15)
     assert np.max(errors[2]) < 2.1e-5
-    worst = {mode: reduce(model).error(s, ["x", "y"]).max() for mode, model in raparm_at_q.items()}
-    assert max(value for mode, value in worst.items() if mode != "+-+-") < 1e-3
-    # Its zeros to C are at 51 Hz, so that its own gain at 40 Hz is small.
-    assert worst["+-+-"] < 2e-3
+    assert not np.any(models[0].D)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.264), (0.05, 0.314)])
+def test_responses_of_sixteen_states_in_all_modes(place):
+    """Within a thousandth until 40 Hz: C and the encoders by Craig-Bampton, every single output by Rubin's shapes."""
+    mechanism = pf.library.raparm_i()
+    start = pf.plan(mechanism, Line(place, (place[0], place[1] - 0.004), max_acceleration=1.0), samples=2).start
+    for mode in mechanism.modes:
+        full = linearise(mechanism, mode=mode, start=start)
+        encoders = ["A1", "D1", "A2", "D2"]
+        few = {method: reduce(full, method=method) for method in ("craig-bampton", "rubin")}
+        own = few["craig-bampton"]
+        assert own.error(BAND, ["x", "y"]).max() < 6e-4
+        assert own.error(BAND, encoders).max() < 6.5e-4
+        assert max(own.error(BAND, [name]).max() for name in ("x", "y")) < 7e-4
+        assert max(few["rubin"].error(BAND, [one.name]).max() for one in full.outputs) < 6.5e-4
+        # Motors' encoders see no feed-through: control loops about them stay without algebraic ones.
+        assert not np.any(own.D[:4])
+        assert np.any(own.D[4:])
+        assert few["rubin"].frequencies[2:4] == pytest.approx(full.frequencies[2:4], rel=1e-9)
+        for motors in (None, [motor.name for motor in mechanism.motors]):
+            exact = full.held_frequencies(motors)[:4]
+            assert few["rubin"].held_frequencies(motors)[:4] == pytest.approx(exact, rel=5e-5)
+
+
+# Of the same independent model: compliance at C with the motors held [um/N], xx, xy and yy.
+COMPLIANCE = {
+    "++++": (75.255, 0.0, 110.034), "++-+": (116.513, -14.622, 115.216), "+-+-": (109.504, 0.0, 1862.67),
+    "-+-+": (240.668, 0.0, 116.938),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["craig-bampton", "rubin"])
+@pytest.mark.parametrize("mode", COMPLIANCE)
+def test_static_compliance_with_motors_held_by_their_inputs(mode, method):
+    """Of forces at C, where the basis has no interface: torques that bring the encoders back, at 0.02 Hz."""
+    mechanism = pf.library.raparm_i()
+    start = pf.plan(mechanism, Line((0.0, 0.264), (0.0, 0.26), max_acceleration=1.0), samples=2).start
+    full = linearise(mechanism, mode=mode, start=start, forces=[str(mechanism.end_effector.point)])
+    response = reduce(full, method=method).frequency_response(np.array([0.04 * np.pi + 0j]))[0].real
+    outputs, motors = [one.name for one in full.outputs], full.motor_joints()
+    angles, place = ([outputs.index(name) for name in names] for names in (motors, ("x", "y")))
+    turned, pushed = np.split(response, [len(motors)], axis=1)
+    compliance = pushed[place] - turned[place] @ np.linalg.solve(turned[angles], pushed[angles])
+    assert 1e6 * compliance[[0, 0, 1], [0, 1, 1]] == pytest.approx(COMPLIANCE[mode], rel=5e-5, abs=2e-3)
+
+
+def test_zeros_to_the_end_effector(raparm_at_q):
+    """51.352 and 51.381 Hz in +-+-, of which shapes without feed-through have 51.343 and 51.353."""
+    found = np.abs(reduce(raparm_at_q["+-+-"]).zeros(outputs=["x", "y"]))[:4:2] / (2.0 * np.pi)
+    assert found == pytest.approx([51.352, 51.381], abs=2e-3)
+
+
+@pytest.mark.parametrize("tied", [0.0, 1e-3])
+def test_rubins_shapes_are_completed_where_modes_bring_none(tied):
+    """A mass alone, free or on a soft spring, whose mode bends nothing, and a mass with a chain of three behind it.
+
+    In turned coordinates, so that what is nothing is rounding.
+    """
+    turn = scipy.linalg.qr(np.random.default_rng(1).standard_normal((5, 5)))[0]
+    stiffness = np.diag([tied, 0.0, 0.0, 0.0, 0.0])
+    for k in range(1, 4):
+        stiffness[k : k + 2, k : k + 2] += [[1.0, -1.0], [-1.0, 1.0]]
+    mass, stiffness = turn.T @ np.diag([2.0, 1.0, 0.5, 0.7, 0.9]) @ turn, turn.T @ stiffness @ turn
+
+    def spanned(shapes, one):
+        return np.linalg.norm(shapes @ np.linalg.lstsq(shapes, one, rcond=None)[0] - one) < 1e-9
+
+    # A motor at each: of the two lowest modes one brings a shape; the other shape is the chain's lowest vibration.
+    rows = np.eye(5)[:2] @ turn
+    shapes = rubin(mass, stiffness, rows, 2, 1.0).shapes
+    assert rows @ shapes == pytest.approx(np.eye(2, 4), abs=1e-12)
+    assert spanned(shapes, craig_bampton(mass, stiffness, rows, 1, 1.0).shapes[:, 2])
+    # A motor at the chain: the lowest motion with it held is that of the mass alone.
+    assert spanned(rubin(mass, stiffness, rows[1:], 1, 1.0).shapes, turn.T @ np.eye(5)[0]) or tied
 
 
 def test_truncated_modes_mislead_those_who_hold_motors(raparm_at_q):
@@ -76,7 +152,7 @@ def test_truncated_modes_mislead_those_who_hold_motors(raparm_at_q):
     assert reduce(full, 12).held_frequencies()[0] / (2.0 * np.pi) == pytest.approx(4.1046, rel=1e-4)
 
 
-@pytest.mark.parametrize("method", ["craig-bampton", "modal"])
+@pytest.mark.parametrize("method", ["craig-bampton", "rubin", "modal"])
 def test_outputs_with_feed_through(method):
     """Accelerations, strains and joint forces: what is left out bends statically."""
     bar = pf.load("five_bar").mechanism
@@ -121,6 +197,44 @@ def test_the_bound_of_balanced_truncation_is_above_the_error(damped_hub, kept, a
     assert error == pytest.approx(actual, rel=1e-4)
     assert error <= few.bound < 3.0 * error
     assert np.abs(few.poles()[:2]).max() < 1e-6
+
+
+def randomly_damped(mechanism, seed):
+    """The mechanism with modal damping between a thousandth and a tenth of each flexible body."""
+    random = np.random.default_rng(seed)
+    ratios = {body.name: 10.0 ** random.uniform(-3.0, -1.0) for body in mechanism.bodies}
+    return mechanism.with_bodies(
+        replace(body, damping=ModalDamping((ratios[body.name],))) if isinstance(body, FlexibleBeam) else body
+        for body in mechanism.bodies
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "mode", "outputs", "moving"),
+    [
+        ("raparm_i", "+-+-", ("x", "y"), None), ("raparm_i", "++++", ("A1", "D2"), None),
+        ("five_bar", "++", ("x", "y"), None), ("five_bar", "++", ("A1", "A2"), 0.05), ("3prr", None, ("x", "y"), None),
+        ("3rrr", None, ("x", "y"), None), ("geared_five_bar", None, ("y",), None),
+    ],
+)  # fmt: skip
+def test_the_bound_is_nowhere_below_the_error(name, mode, outputs, moving):
+    """From below all frequencies to above them, and about the peaks: down to what rounding leaves of the bound."""
+    model = pf.load(name)
+    mechanism = randomly_damped(model.mechanism, seed=len(name))
+    source = mechanism if moving is None else pf.plan(mechanism, model.path(), samples=101)
+    full = linearise(source, mode=mode, at=moving).select(outputs=list(outputs))
+    poles = full.poles()
+    poles = poles[poles.imag > 1.0]
+    near = poles.imag[:, None] + np.outer(poles.real, np.linspace(-3.0, 3.0, 7))
+    omega = np.concatenate([np.geomspace(0.1, 1e6, 200), np.abs(near).ravel()])
+    exact = full.frequency_response(omega)
+    for states in (8, 13, 24, 60, 80):
+        few = reduce(full, states, method="balanced")
+        error = np.max(np.linalg.norm(few.frequency_response(omega) - exact, 2, axis=(1, 2)))
+        assert error <= few.bound
+        # Nor can any model of as many states err less than the first value left out.
+        left_out = few.hankel[states - (len(full.states) - few.hankel.size)]
+        assert error > 0.9 * left_out or left_out < 1e-7 * few.hankel[0]
 
 
 # --- How many states --------------------------------------------------------------------------------------------------

@@ -111,7 +111,8 @@ def _runs(folder: Path) -> None:
     save_results(pf.statics_dataset(pushed), folder / "statics" / "statics.nc")
     (folder / "reduction").mkdir()
     models = [pf.linearise(model, mode=mode) for mode in ("++", None)]
-    save_results(pf.reduction_dataset(models, 16), folder / "reduction" / "reduced.nc")
+    along = [pf.poses_along(task, 4, mode=mode) for mode in ("++", None)]
+    save_results(pf.reduction_dataset(models, 16, along=along), folder / "reduction" / "reduced.nc")
     run = tracking_dataset([task.simulate("++")])
     # A second mode by name; the first is all that the motors can do.
     data = xr.concat([run, run.assign_coords(mode=["+-"])], "mode", combine_attrs="override")

@@ -30,9 +30,14 @@ def test_it_tells_what_python_finds(tmp_path):
     exact = numbers["modes"]["+-+-"]["full"]["frequencies_held"][0]
     assert own["frequencies_held"][0] == pytest.approx(exact, rel=1e-4)
     assert numbers["modes"]["+-+-"]["modal"]["frequencies_held"][0] > 1.2 * exact
+    by_states = data["held_frequency"].sel(mode="+-+-")
+    assert by_states.sel(reduction="modal", kept=16).item() == pytest.approx(
+        numbers["modes"]["+-+-"]["modal"]["frequencies_held"][0], rel=1e-9
+    )
+    assert math.isnan(by_states.sel(reduction="craig-bampton", kept=6).item())
     assert "States needed for 1 % up to 30 Hz" in done.stdout
     assert {file.stem for file in (tmp_path / "r" / "figures").glob("*.png")} == {
-        "reduced_responses", "reduction_errors"
+        "reduced_responses", "reduction_errors", "held_frequency_by_states"
     }  # fmt: skip
 
 

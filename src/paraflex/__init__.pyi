@@ -83,6 +83,8 @@ from .linear import (
     LinearModel as LinearModel,
     VaryingModel as VaryingModel,
     SampledModel as SampledModel,
+    poses_along as poses_along,
+    PosesAlong as PosesAlong,
     reduce as reduce,
     ReducedModel as ReducedModel,
     states_needed as states_needed,

@@ -26,6 +26,7 @@ from paraflex.motion import UNBALANCED, MotionRun, simulate_motion
 from paraflex.results.linear_data import motors_of
 from paraflex.tracking import TrackingRun, TrackingTask
 
+Motion = TrackingTask | TrackingRun | MotionRun
 ALL, START = "all", "start"
 # Most moments of a motion: each is an eigenvalue problem for every mode.
 _MOST_MOMENTS = 10_000
@@ -34,11 +35,14 @@ _SAMPLES = 1001
 
 
 class AskedModels(NamedTuple):
-    """Linear models, one for each mode, those along the motion, and what was asked for."""
+    """Linear models, one for each mode, the motions that they are about, if any, and what was asked for."""
 
     models: list[LinearModel]
-    along: list[list[LinearModel]]
+    motions: list[Motion]
+    modes: list[ActuationMode]
+    ports: dict[str, Any]
     parameters: dict[str, Any]
+    model: Model
 
 
 def asked_models(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
@@ -77,7 +81,7 @@ def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModel
         modes = [run.mode if isinstance(run, TrackingRun) else _everything(model.mechanism) for run in found]
         parameters = _parameters(model, modes, request, command)
         parameters["run"]["results"] = request.model.name
-        return _moving(found, modes, request, parameters)
+        return _moving(found, model, modes, request, parameters)
 
     return models
 
@@ -131,11 +135,11 @@ def _models(model: Model, modes: Sequence[ActuationMode], request: LinearRequest
     ports = _ports(request)
     with flagged(request):
         if request.at is None and request.along is None and request.path is None:
-            pose = _pose(model, request)
+            pose = pose_asked(model, request.pose, request.assembly, "--pose")
             models = [_at_rest(model, pose, mode, request.balanced, ports) for mode in modes]
-            return AskedModels(models, [], _parameters(model, modes, request, command))
+            return AskedModels(models, [], list(modes), ports, _parameters(model, modes, request, command), model)
         motion = _motion(model, request)
-        return _moving([motion] * len(modes), modes, request, _parameters(model, modes, request, command))
+        return _moving([motion] * len(modes), model, modes, request, _parameters(model, modes, request, command))
 
 
 def _ports(request: LinearRequest) -> dict[str, Any]:
@@ -144,34 +148,41 @@ def _ports(request: LinearRequest) -> dict[str, Any]:
 
 
 def _moving(
-    motions: Sequence[TrackingTask | TrackingRun | MotionRun],
+    motions: Sequence[Motion],
+    model: Model,
     modes: Sequence[ActuationMode],
     request: LinearRequest,
     parameters: dict[str, Any],
 ) -> AskedModels:
-    """Linear models about motions, one for each mode, and along them."""
+    """Linear models about motions, one for each mode."""
     ports = _ports(request)
     with flagged(request):
-        pairs = list(zip(motions, modes, strict=True))
+        pairs = zip(motions, modes, strict=True)
         about = [_in_motion(motion, mode, request.at or 0.0, ports) for motion, mode in pairs]
-        times = motions[0].motion.t if isinstance(motions[0], TrackingTask) else motions[0].solution.t
-        moments = [] if request.along is None else np.linspace(times[0], times[-1], request.along).tolist()
-        along = [[_in_motion(motion, mode, at, ports) for at in moments] for motion, mode in pairs]
-        return AskedModels(about, along if moments else [], parameters)
+        return AskedModels(about, list(motions), list(modes), ports, parameters, model)
 
 
-def _pose(model: Model, request: LinearRequest) -> State:
-    """The pose at rest that is asked for."""
-    mechanism, wanted = model.mechanism, request.pose
+def moments_along(found: AskedModels, count: int) -> list[list[LinearModel]]:
+    """Linear models at so many moments of the motions, for each mode."""
+    motion = found.motions[0]
+    times = motion.motion.t if isinstance(motion, TrackingTask) else motion.solution.t
+    moments = np.linspace(times[0], times[-1], count).tolist()
+    pairs = zip(found.motions, found.modes, strict=True)
+    return [[_in_motion(motion, mode, at, found.ports) for at in moments] for motion, mode in pairs]
+
+
+def pose_asked(model: Model, wanted: str | None, assembly: str | None, flag: str) -> State:
+    """The pose at rest that an option names; by default the model's start, or that of an assembly."""
+    mechanism = model.mechanism
     system = build_system(mechanism)
     try:
         if wanted is not None and "," in wanted:
-            return _at_place(model, wanted)
+            return _at_place(model, wanted, flag)
         if wanted in [one.name for one in mechanism.assemblies]:
             return pose_at_rest(system, None, wanted)
         if wanted is not None and (wanted != START or model.start is None):
-            raise InputError("no such pose", field="--pose", value=wanted, remedy=_poses(model))
-        return pose_at_rest(system, model.start, request.assembly or model.study.assembly)
+            raise InputError("no such pose", field=flag, value=wanted, remedy=_poses(model))
+        return pose_at_rest(system, model.start, assembly or model.study.assembly)
     except AssemblyError as error:
         raise of_assembly(error, model) from error
 
@@ -181,24 +192,22 @@ def _poses(model: Model) -> str:
     return f"choose from {', '.join(names)}; or give the end-effector's place, X,Y in m" if names else "leave it out"
 
 
-def _at_place(model: Model, text: str) -> State:
+def _at_place(model: Model, text: str, flag: str) -> State:
     """The pose with the end-effector at a place, undeformed."""
     parts = [part.strip() for part in text.split(",")]
     effector = model.mechanism.end_effector
     if effector is None or not {"x", "y"} <= set(effector.coordinates):
-        raise InputError("no end-effector with a place", field="--pose", value=text, remedy="name an assembly")
+        raise InputError("no end-effector with a place", field=flag, value=text, remedy="name an assembly")
     try:
         x, y = (number_in(part, "m") for part in parts)
     except (InputError, ValueError) as error:
-        raise InputError(
-            "not a place", field="--pose", value=text, remedy='say 0.05,0.314 or "50 mm, 314 mm"'
-        ) from error
+        raise InputError("not a place", field=flag, value=text, remedy='say 0.05,0.314 or "50 mm, 314 mm"') from error
     path = Line((x, y), (x, y + 1e-3), max_acceleration=1.0)
     try:
         motion = follow_path(model.mechanism, path, [0.0], assembly=model.study.assembly)
     except AssemblyError as error:
         raise InputError(
-            "the end-effector does not get there", field="--pose", value=text, remedy="choose a place within its reach"
+            "the end-effector does not get there", field=flag, value=text, remedy="choose a place within its reach"
         ) from error
     system, rigid = build_system(model.mechanism), build_system(model.mechanism.rigid())
     return undeformed(system, rigid, State(0.0, motion.q[0], np.zeros(rigid.n)))
@@ -210,7 +219,8 @@ def _at_rest(model: Model, pose: State, mode: ActuationMode, balanced: bool, por
         found = linearise(model.mechanism, mode=mode, start=pose, balanced=balanced, **ports)
     except AssemblyError as error:
         raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
-    free = int(np.sum(found.motions(motors_of(found)).frequencies == 0.0))
+    # What is driven moves as it is driven.
+    free = int(np.sum(found.motions(motors_of(found)).frequencies == 0.0)) - found.minimal.driven
     if free and found.unbalanced > BALANCED:
         remain = "one motion remains" if free == 1 else f"{free} motions remain"
         raise InputError(
@@ -253,9 +263,7 @@ def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
         raise at_fault(error, model) from None
 
 
-def _in_motion(
-    motion: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode, at: float, ports: dict[str, Any]
-) -> LinearModel:
+def _in_motion(motion: Motion, mode: ActuationMode, at: float, ports: dict[str, Any]) -> LinearModel:
     try:
         return linearise(motion, mode=mode, at=at, **ports)
     except ActuationError as error:

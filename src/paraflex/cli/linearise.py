@@ -11,9 +11,10 @@ import xarray as xr
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import LineariseRequest
 from paraflex.cli.ending import say_where, tell
-from paraflex.cli.linear_models import AskedModels, asked_models
+from paraflex.cli.linear_models import AskedModels, asked_models, moments_along
 from paraflex.cli.linearise_tables import print_linear
 from paraflex.cli.replacing import hold_results
+from paraflex.cli.request import flagged
 from paraflex.folders import LINEAR_MODELS, ResultsFolder
 from paraflex.results.linear_data import linear_dataset
 from paraflex.results.linear_summary import linear_summary
@@ -24,10 +25,10 @@ def linearise_command(request: LineariseRequest) -> int:
     began = time.perf_counter()
     make = asked_models(request, "linearise")
     if request.out is None:
-        _tell(_data(make()), request)
+        _tell(_data(make(), request), request)
         return COMPLETE
     with hold_results(request.out, LINEAR_MODELS, force=request.force) as folder:
-        data = _data(make())
+        data = _data(make(), request)
         _tell(data, request)
         _write(data, folder, request)
     if not request.json:
@@ -35,8 +36,10 @@ def linearise_command(request: LineariseRequest) -> int:
     return COMPLETE
 
 
-def _data(found: AskedModels) -> xr.Dataset:
-    return linear_dataset(found.models, along=found.along, parameters=found.parameters)
+def _data(found: AskedModels, request: LineariseRequest) -> xr.Dataset:
+    with flagged(request):
+        along = [] if request.along is None else moments_along(found, request.along)
+        return linear_dataset(found.models, along=along, parameters=found.parameters)
 
 
 def _tell(data: xr.Dataset, request: LineariseRequest) -> None:

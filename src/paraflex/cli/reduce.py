@@ -9,11 +9,13 @@ import xarray as xr
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import ReduceRequest
 from paraflex.cli.ending import say_where, tell
-from paraflex.cli.linear_models import AskedModels, asked_models
+from paraflex.cli.linear_models import AskedModels, asked_models, pose_asked
 from paraflex.cli.reduce_tables import print_reduction
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import flagged
+from paraflex.errors import InputError
 from paraflex.folders import REDUCED_MODELS
+from paraflex.linear import PosesAlong, poses_along
 from paraflex.linear.reduced import ReductionMethod
 from paraflex.results.reduction_data import reduction_dataset, reduction_summary
 
@@ -41,12 +43,28 @@ def reduce_command(request: ReduceRequest) -> int:
 
 def _data(found: AskedModels, request: ReduceRequest) -> xr.Dataset:
     asked = {name: getattr(request, name) for name in ("states", "methods", "until", "error")}
+    asked |= {} if request.basis is None else {"basis": request.basis}
     parameters = {**found.parameters, "run": found.parameters["run"] | asked}
     with flagged(request):
         return reduction_dataset(
             found.models, request.states, methods=request.methods or _METHODS, until=request.until, error=request.error,
-            parameters=parameters,
+            along=_along(found, request), parameters=parameters,
         )  # fmt: skip
+
+
+def _along(found: AskedModels, request: ReduceRequest) -> list[PosesAlong]:
+    """Poses along the path, for each mode; and the one whose basis is taken along."""
+    if request.along is None:
+        if request.basis is not None:
+            raise InputError("is the pose whose basis is taken along a path", field="--basis", value=request.basis,
+                             remedy="say how many poses: --along 21")  # fmt: skip
+        return []
+    pose = None if request.basis is None else pose_asked(found.model, request.basis, request.assembly, "--basis")
+    try:
+        return [poses_along(motion, request.along, mode=mode, pose=pose, **found.ports)
+                for motion, mode in zip(found.motions, found.modes, strict=True)]  # fmt: skip
+    except InputError as error:
+        raise (error.at("--along") if error.field == "count" else error) from None
 
 
 def _tell(data: xr.Dataset, request: ReduceRequest) -> None:

@@ -229,6 +229,9 @@ class Factor:
         scaled = scipy.sparse.csc_matrix(scipy.sparse.diags(self._rows) @ scaled)
         scaled.eliminate_zeros()
         self._matrix = scaled
+        # Where no pivots can be found whatever the numbers, SuperLU writes beyond its memory now and then.
+        if scipy.sparse.csgraph.structural_rank(scipy.sparse.csr_matrix(abs(scaled))) < units.size:
+            raise np.linalg.LinAlgError("structurally singular")
         try:
             self._factor = scipy.sparse.linalg.splu(scaled)
         except RuntimeError as error:
@@ -258,8 +261,6 @@ class Factor:
 
 def solved(matrix: scipy.sparse.csr_matrix, units: Array, right: Array) -> Array:
     """Solution (n,) of one right-hand side (n,) with a matrix that may be singular: dense where that is fast enough.
-
-    SuperLU, behind `Factor`, writes beyond its memory now and then where a matrix is exactly singular.
 
     Raises
     ------

@@ -115,26 +115,54 @@ def linearise(
     SingularPositionError
         A singular position, at which no coordinates describe the motion.
     """
+    return linear_model(
+        *sought_motion(
+            source, mode=mode, at=at, assembly=assembly, start=start, balanced=balanced, forces=forces,
+            prescribed=prescribed, coordinates=coordinates,
+        )
+    )  # fmt: skip
+
+
+class Sought(NamedTuple):
+    """What a linear model is made from, but for the choice of its coordinates: see `linear_model`."""
+
+    coordinates: Coordinates
+    point: MotionPoint
+    ports: Ports
+    about: str
+    unbalanced: float = 0.0
+
+
+def sought_motion(
+    source: Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun,
+    *,
+    mode: str | ActuationMode | None = None,
+    at: float | None = None,
+    assembly: str | None = None,
+    start: Start | State | None = None,
+    balanced: bool = False,
+    forces: Sequence[str] = (),
+    prescribed: Sequence[str] = (),
+    coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
+) -> Sought:
+    """The point of a motion that is linearised about: see `linearise`."""
     mechanism = source if isinstance(source, Mechanism) else mechanism_of(source)
     chosen = mode_of(source, mechanism, mode)
     ports = ports_of(mechanism, chosen, forces, prescribed)
     first = as_enum(FirstCoordinates, coordinates, "coordinates")
-    unbalanced = 0.0
     if isinstance(source, TrackingTask | TrackingRun | MotionRun):
         about, system, times, point_at = moving(source, chosen)
         point = point_at(0 if at is None else nearest_sample(times, at))
-        chart = coordinates_of(system, ports.prescribed, first)
-    else:
-        given = start if start is not None or isinstance(source, Mechanism) else source.start
-        system = build_system(mechanism)
-        state = pose_at_rest(system, given, assembly)
-        if balanced:
-            joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
-            state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
-        chart = coordinates_of(system, ports.prescribed, first)
-        point, unbalanced = resting_point(chart, state, chosen)
-        about = "static equilibrium" if balanced else "a pose at rest"
-    return linear_model(chart, point, ports, about, unbalanced=unbalanced)
+        return Sought(coordinates_of(system, ports.prescribed, first), point, ports, about)
+    given = start if start is not None or isinstance(source, Mechanism) else source.start
+    system = build_system(mechanism)
+    state = pose_at_rest(system, given, assembly)
+    if balanced:
+        joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
+        state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
+    chart = coordinates_of(system, ports.prescribed, first)
+    point, unbalanced = resting_point(chart, state, chosen)
+    return Sought(chart, point, ports, "static equilibrium" if balanced else "a pose at rest", unbalanced)
 
 
 def linear_model(
@@ -142,8 +170,8 @@ def linear_model(
     point: MotionPoint,
     ports: Ports,
     about: str,
-    *,
     unbalanced: float = 0.0,
+    *,
     chosen: Chosen | None = None,
 ) -> LinearModel:
     """The model about a point of a motion, in coordinates chosen there or before."""

@@ -103,16 +103,22 @@ class Minimal:
     def _factor(self) -> Factor:
         """Factor of `_matrix`."""
         cause = "the coordinates chosen for the linear model do not describe its motion"
-        singular = SingularPositionError(
+        factor = self._factored(self._matrix, self.scale[self._dependent], cause)
+        if not factor.condition < _SINGULAR:
+            raise self._singular(cause)
+        return factor
+
+    def _factored(self, matrix: csr_matrix, units: Array, cause: str) -> Factor:
+        """A factored matrix that is singular in singular positions only."""
+        try:
+            return Factor(matrix, units)
+        except np.linalg.LinAlgError as error:
+            raise self._singular(cause) from error
+
+    def _singular(self, cause: str) -> SingularPositionError:
+        return SingularPositionError(
             cause, Moment(self.point.time, 0), remedy="linearise away from this singular position"
         )
-        try:
-            factor = Factor(self._matrix, self.scale[self._dependent])
-        except np.linalg.LinAlgError as error:
-            raise singular from error
-        if not factor.condition < _SINGULAR:
-            raise singular
-        return factor
 
     @property
     def condition(self) -> float:
@@ -198,6 +204,9 @@ class Minimal:
         mass = self.tangents.whole.mass
         column = 1.0 / np.sqrt(mass.diagonal())
         size = 1.0 / scipy.sparse.linalg.norm(rows @ scipy.sparse.diags(column), axis=1)
-        factor = Factor(csr_matrix(scipy.sparse.bmat([[mass, rows.T], [rows, None]])), np.concatenate([column, size]))
+        factor = self._factored(
+            csr_matrix(scipy.sparse.bmat([[mass, rows.T], [rows, None]])), np.concatenate([column, size]),
+            "its constraints, or the accelerations that are given, depend on one another",
+        )  # fmt: skip
         found = factor.solve(np.vstack([forces, held]))
         return found[:n], found[n:]

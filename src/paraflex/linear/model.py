@@ -23,8 +23,8 @@ from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
-from paraflex.linear.motions import Motions, SecondOrder, modal_damping, motions
-from paraflex.linear.named import Names, control_model, labelled_model, numbers_of, places_in_s
+from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
+from paraflex.linear.named import Names, control_model, labelled_model, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
 
 if TYPE_CHECKING:
@@ -73,6 +73,14 @@ class LinearModel:
     rows: SensorRows
     wanted: tuple[NDArray[np.int64], NDArray[np.int64]]
 
+    def __repr__(self) -> str:
+        return f"LinearModel({self.title}: {len(self.states)} states)"
+
+    @property
+    def title(self) -> str:
+        """Which mechanism it is of, in which mode, and what it is about."""
+        return f"{self.mechanism}, mode {self.mode}, about {self.about}"
+
     @property
     def time(self) -> float:
         """Time of the point of the motion [s]."""
@@ -119,26 +127,22 @@ class LinearModel:
         whole[:, n : n + motors.size] += rows.torques.toarray()[:, motors]
         return whole[:, :n] + rows.q @ changes.q + rows.v @ changes.v, whole[:, n:][:, self.wanted[0]]
 
-    def acceleration_outputs(self, flexibility: Array) -> Array:
-        """What outputs (outputs, f) change with accelerations y'' that are not those of the equations.
-
-        Parameters
-        ----------
-        flexibility : (f, f) array
-            Of fast motions. Constraint forces, which follow from elastic forces, are those with these in balance.
-        """
-        rows, held = SensorRows(*(part[self.wanted[1]] for part in self.rows)), self.minimal.held_rows.number
-        f = len(self.states) // 2
-        reactions = rows.multipliers[:, held] @ self.minimal.changes.multipliers[held, :f]
-        return rows.a @ self.minimal.directions - reactions @ flexibility @ self._reduced[0]
+    @property
+    def place_outputs(self) -> Array:
+        """What outputs (outputs, f) are of the coordinates y, but for accelerations, constraint forces and torques."""
+        changes, f = self.minimal.changes, len(self.states) // 2
+        rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+        return rows.q @ changes.q[:, :f] + rows.v @ changes.v[:, :f]
 
     # --- Properties ---------------------------------------------------------------------------------------------------
 
     @cached_property
     def _reduced(self) -> tuple[Array, Array, Array]:
         """Mass, damping and stiffness (f, f) in the minimal coordinates; of a motion without terms of its rates."""
-        Z, whole = self.minimal.directions, self.minimal.tangents.whole
-        return Z.T @ (whole.mass @ Z), Z.T @ (whole.damping @ Z), Z.T @ (whole.stiffness @ Z)
+        Z, whole, minimal = self.minimal.directions, self.minimal.tangents.whole, self.minimal
+        parts = Z.T @ (whole.mass @ Z), Z.T @ (whole.damping @ Z), Z.T @ (whole.stiffness @ Z)
+        last = minimal.chosen.joints.size
+        return driven_equations(*parts, np.arange(last - minimal.driven, last)) if minimal.driven else parts
 
     @cached_property
     def _typical(self) -> float:
@@ -306,21 +310,26 @@ class LinearModel:
             stiffness, damping = -mass @ self.A[f:, :f], -mass @ self.A[f:, f:]
         return SecondOrder(mass, damping, stiffness, self._typical, self._is_vibrating)
 
+    @property
+    def frozen(self) -> SecondOrder:
+        """The equations of which `frequencies` are: of a motion without the terms of its rates."""
+        return SecondOrder(*self._reduced, self._typical, self._is_vibrating)
+
     def _slow_poles(self, count: int) -> Complex:
         """The slowest poles by sparse matrices."""
-        whole = self.minimal.tangents.whole
+        whole, driven = self.minimal.tangents.whole, self.minimal.driven
         slow = slowest(
-            csr_matrix(0.5 * (whole.stiffness + whole.stiffness.T)), whole.mass, self.minimal.constraints.jacobian,
-            self._typical, count, self.minimal.chosen.freedoms,
+            csr_matrix(0.5 * (whole.stiffness + whole.stiffness.T)), whole.mass, self.minimal.held_rows.jacobian,
+            self._typical, count, self.minimal.chosen.freedoms - driven,
         )  # fmt: skip
         uneven = scipy.sparse.linalg.norm(whole.stiffness - whole.stiffness.T)
         vibrates = self.at_rest and uneven <= _SYMMETRIC * scipy.sparse.linalg.norm(whole.stiffness)
         if vibrates and not np.any(whole.damping.data):
             root = np.sqrt(-slow.squares.astype(complex))
-            return _by_size(np.concatenate([root, -root]))[:count]
+            return _by_size(np.concatenate([np.zeros(2 * driven, dtype=complex), root, -root]))[:count]
         found = _by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
         free = (slow.squares == 0.0) & ~np.any(whole.damping @ slow.shapes, axis=0) & vibrates
-        found[: 2 * int(free.sum())] = 0.0
+        found[: 2 * (int(free.sum()) + (driven if vibrates else 0))] = 0.0
         return found[:count]
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
@@ -365,19 +374,26 @@ class LinearModel:
         ----------
         frequencies : (k,) array
             Angular frequencies omega, for s = i omega [rad/s]; complex numbers are taken as s.
+
+        Raises
+        ------
+        InputError
+            A pole, where the response is infinite.
         """
         points = places_in_s(frequencies)
         out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
         if self._is_large:
             rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
             for k, s in enumerate(points):
-                out[k] = response_at(self.minimal, rows, self.wanted[0], s)
+                with not_at_poles(s):
+                    out[k] = response_at(self.minimal, rows, self.wanted[0], s)
             return out
         A, B, C, D = self.scaled
         upper, basis = scipy.linalg.schur(A, output="complex")
         inputs, outputs, eye = basis.conj().T @ B, C @ basis, np.eye(len(A))
         for k, s in enumerate(points):
-            out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
+            with not_at_poles(s):
+                out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
         return out
 
     @property

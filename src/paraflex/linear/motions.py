@@ -55,6 +55,30 @@ class SecondOrder(NamedTuple):
         return SecondOrder(mass, damping, stiffness, self.typical, self.vibrating)
 
 
+def driven_equations(
+    mass: Array, damping: Array, stiffness: Array, driven: NDArray[np.int64]
+) -> tuple[Array, Array, Array]:
+    """Equations (f, f) in which some coordinates go on as they are driven, whatever the others do.
+
+    With y = psi y_d + x, psi the static shapes of the driven coordinates, x obeys M x'' + D x' + K x = -D psi y_d'
+    where y_d'' = 0; the two do not otherwise depend on each other, so that mass and stiffness stay symmetric.
+    """
+    f = mass.shape[0]
+    others = np.setdiff1d(np.arange(f), driven)
+    within = np.ix_(others, others)
+    static = np.eye(f)[:, driven]
+    static[others] = -scipy.linalg.lstsq(stiffness[within], stiffness[np.ix_(others, driven)])[0]
+    apart = np.eye(f)
+    apart[np.ix_(others, driven)] -= static[others]
+    few = np.zeros((3, f, f))
+    few[(0, *np.ix_(driven, driven))] = static.T @ mass @ static
+    for part, given in zip(few, (mass, damping, stiffness), strict=True):
+        part[within] = given[within]
+    few[(1, *np.ix_(others, driven))] = (damping @ static)[others]
+    found = [apart.T @ part @ apart for part in few]
+    return found[0], found[1], found[2]
+
+
 def modal_damping(damping: Array, shapes: Array) -> Array:
     """Damping (k, k) between modes of unit mass (f, k), zero where it is rounding."""
     found = shapes.T @ damping @ shapes

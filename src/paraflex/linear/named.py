@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -59,6 +60,23 @@ def places_in_s(frequencies: ArrayLike) -> NDArray[np.complex128]:
     """Points s = i omega of angular frequencies [rad/s]; complex numbers are points s themselves."""
     given = np.atleast_1d(np.asarray(frequencies))
     return np.asarray(given if np.iscomplexobj(given) else 1j * given, dtype=complex)
+
+
+@contextmanager
+def not_at_poles(s: complex) -> Iterator[None]:
+    """Name a point s where a response is infinite.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "is a pole of the model, where its response is infinite", field="frequencies",
+            value=float(s.imag) if s.real == 0.0 else complex(s), remedy="leave it out, or take one beside it",
+        ) from None  # fmt: skip
 
 
 def plain_name(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Linear models of few states: Craig-Bampton, modal and balanced reduction of a mechanism as a whole."""
+"""Linear models of few states, as `reduction` makes them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.errors import InputError, as_enum
-from paraflex.limits import solvable
-from paraflex.linear.balancing import balanced
-from paraflex.linear.bases import Basis, craig_bampton, independent_rows, kernel, lowest_modes
+from paraflex.errors import InputError
+from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import SecondOrder, motions
-from paraflex.linear.named import Names, control_model, labelled_model, numbers_of, places_in_s
+from paraflex.linear.named import Names, control_model, labelled_model, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, zeros
 
 if TYPE_CHECKING:
@@ -34,6 +32,7 @@ class ReductionMethod(Enum):
     """How states are left out."""
 
     CRAIG_BAMPTON = "craig-bampton"
+    RUBIN = "rubin"
     MODAL = "modal"
     BALANCED = "balanced"
 
@@ -52,6 +51,8 @@ class ReducedModel:
     state_space : StateSpace
     basis : (f, k) array, optional
         Coordinates of the full model with those of this one; none of balanced states.
+    interface : int
+        So many of the first states are coordinates of motors' joints.
     hankel : array, optional
         Hankel singular values of balanced truncation, in units of outputs over inputs.
     bound : float, optional
@@ -63,8 +64,13 @@ class ReducedModel:
     states: tuple[Variable, ...]
     state_space: StateSpace
     basis: Array | None = None
+    interface: int = 0
     hankel: Array | None = None
     bound: float | None = None
+
+    def __repr__(self) -> str:
+        states = f"{len(self.states)} of {len(self.full.states)} states"
+        return f"ReducedModel({self.full.title}: {states}, {self.method.value})"
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
@@ -96,15 +102,25 @@ class ReducedModel:
         """Feed-through (outputs, inputs)."""
         return self.state_space.D
 
-    @cached_property
-    def _second_order(self) -> tuple[SecondOrder, Array]:
-        """The equations and the basis."""
+    @property
+    def shapes(self) -> Array:
+        """The basis (f, k).
+
+        Raises
+        ------
+        InputError
+            A model of balanced states.
+        """
         if self.basis is None:
             raise InputError(
                 "has no coordinates whose rates are states too", field="method", value=self.method.value,
                 remedy=f"choose {ReductionMethod.CRAIG_BAMPTON.value} or {ReductionMethod.MODAL.value}",
             )  # fmt: skip
-        return self.full.second_order.within(self.basis), self.basis
+        return self.basis
+
+    @cached_property
+    def _second_order(self) -> SecondOrder:
+        return self.full.frozen.within(self.shapes)
 
     @property
     def frequencies(self) -> Array:
@@ -129,8 +145,8 @@ class ReducedModel:
         return self._frequencies(self.full.motor_joints(motors))
 
     def _frequencies(self, joints: Sequence[str]) -> Array:
-        equations, basis = self._second_order
-        rows = self.full.joint_rows(joints) @ basis
+        equations = self._second_order
+        rows = self.full.joint_rows(joints) @ self.shapes
         free = kernel(rows, 1.0 / np.sqrt(np.diag(equations.mass)))
         return motions(equations.within(free), free).frequencies
 
@@ -150,9 +166,11 @@ class ReducedModel:
     @checked_arguments()
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
         """Response C (s - A)^-1 B + D (k, outputs, inputs): see `LinearModel.frequency_response`."""
-        points = places_in_s(frequencies)
-        eye = np.eye(len(self.A))
-        return np.array([self.C @ np.linalg.solve(s * eye - self.A, self.B) + self.D for s in points])
+        return np.array([self._response(complex(s)) for s in places_in_s(frequencies)])
+
+    def _response(self, s: complex) -> Complex:
+        with not_at_poles(s):
+            return self.C @ np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B) + self.D
 
     @checked_arguments()
     def error(self, frequencies: ArrayLike, outputs: Sequence[str] | None = None) -> Array:
@@ -190,96 +208,3 @@ class ReducedModel:
     @property
     def _names(self) -> Names:
         return Names(self.states, self.inputs, self.outputs)
-
-
-@checked_arguments()
-@solvable("a reduced model")
-def reduce(
-    model: LinearModel, states: int = 16, *, method: ReductionMethod | str = ReductionMethod.CRAIG_BAMPTON
-) -> ReducedModel:
-    """A linear model of few states that stands for one of many.
-
-    Parameters
-    ----------
-    model : LinearModel
-        As `linearise` makes it.
-    states : int
-        How many are kept; even but for balanced truncation.
-    method : str
-        "craig-bampton": static shapes of all motors' coordinates, whatever the mode, and vibrations with all motors
-        held. "modal": the lowest modes with motors free, and what the others do statically. "balanced": what inputs
-        move and outputs see most of the stable part, with a bound of the error.
-
-    Raises
-    ------
-    InputError
-        Fewer states than motors, or more than the model has; a mechanism without flexible links; balanced truncation of
-        a mechanism without damping.
-    """
-    method, most = as_enum(ReductionMethod, method, "method"), len(model.states)
-    if not any(body.nf for body in model.minimal.system.bodies):
-        raise InputError(
-            "has rigid links only, so that no state can be left out", field="model", value=model.mechanism,
-            remedy="give it flexible links",
-        )  # fmt: skip
-    if not 1 <= states <= most:
-        raise InputError("no such number of states", field="states", value=states, remedy=f"choose one up to {most}")
-    if method is ReductionMethod.BALANCED:
-        found = balanced(model.scaled, states, model.low_frequency)
-        there, back = model.modal_states
-        left, right = found.left @ there, back @ found.right
-        space = StateSpace(left @ model.A @ right, left @ model.B, model.C @ right, model.D)
-        names = tuple(Variable(f"balanced{k + 1}", "1") for k in range(len(left)))
-        return ReducedModel(model, method, names, space, hankel=found.hankel, bound=found.bound)
-    if states % 2:
-        raise InputError(
-            "is odd, but every coordinate brings its rate", field="states", value=states, remedy=f"say {states + 1}"
-        )
-    basis, names = _basis(model, states // 2, method)
-    rates = tuple(Variable(f"{one.name}_rate", f"{one.unit}/s") for one in names)
-    # What is left out bends as forces want it without being a state, except for static shapes, which bend so anyway.
-    residual = basis.flexibility if method is ReductionMethod.MODAL else np.zeros_like(basis.flexibility)
-    return ReducedModel(model, method, (*names, *rates), _projected(model, basis, residual), basis=basis.shapes)
-
-
-def _basis(model: LinearModel, count: int, method: ReductionMethod) -> tuple[Basis, tuple[Variable, ...]]:
-    """So many coordinates, and their names."""
-    equations = model.second_order
-    stiffness = 0.5 * (equations.stiffness + equations.stiffness.T)
-    if method is ReductionMethod.MODAL:
-        basis = lowest_modes(equations.mass, stiffness, count, equations.typical)
-        return basis, tuple(Variable(f"mode{k + 1}", "m kg^0.5") for k in range(count))
-    joints = list(dict.fromkeys(motor.joint for motor in model.minimal.system.mechanism.motors))
-    rows = model.joint_rows(joints)
-    kept = independent_rows(rows, 1.0 / np.sqrt(np.diag(equations.mass)))
-    if count < len(kept):
-        raise InputError(
-            f"are fewer than the {2 * len(kept)} of the coordinates of {len(kept)} motors and their rates",
-            field="states", value=2 * count, remedy=f"keep at least {2 * len(kept)}, better {2 * len(kept) + 8}",
-        )  # fmt: skip
-    mechanism = model.minimal.system.mechanism
-    names = [Variable(joints[k], "m" if mechanism.joint(joints[k]).slides else "rad") for k in kept]
-    names += [Variable(f"held_mode{k + 1}", "m kg^0.5") for k in range(count - len(kept))]
-    basis = craig_bampton(equations.mass, stiffness, rows[kept], count - len(kept), equations.typical)
-    return basis, tuple(names)
-
-
-def _projected(model: LinearModel, basis: Basis, residual: Array) -> StateSpace:
-    """The equations in y = T z + R F u, F u the forces of inputs.
-
-    Accelerations and constraint forces of the full model follow from all its forces, those of fast vibrations that are
-    left out among them. As those bend statically, their accelerations are not what outputs see: these see T z'', and
-    constraint forces in balance with that.
-    """
-    T, f = basis.shapes, len(basis.shapes)
-    equations, forces = model.second_order, model.second_order.mass @ model.B[f:]
-    place, rate, moved = model.A[f:, :f], model.A[f:, f:], residual @ forces
-    mass = T.T @ equations.mass @ T
-    few = scipy.linalg.solve(mass, T.T @ equations.mass @ np.hstack([place @ T, rate @ T, place @ moved + model.B[f:]]))
-    k = T.shape[1]
-    A = np.vstack([np.eye(k, 2 * k, k), few[:, : 2 * k]])
-    B = np.vstack([np.zeros((k, moved.shape[1])), few[:, 2 * k :]])
-    seen = model.acceleration_outputs(basis.flexibility)
-    missed = T @ few - np.hstack([place @ T, rate @ T, place @ moved + model.B[f:]])
-    outputs = np.hstack([model.C[:, :f] @ T, model.C[:, f:] @ T, model.C[:, :f] @ moved + model.D]) + seen @ missed
-    return StateSpace(A, B, outputs[:, : 2 * k], outputs[:, 2 * k :])

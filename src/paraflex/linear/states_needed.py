@@ -11,7 +11,8 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError, as_enum
 from paraflex.linear.model import LinearModel
-from paraflex.linear.reduced import ReductionMethod, reduce
+from paraflex.linear.reduced import ReductionMethod
+from paraflex.linear.reduction import reduce
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,6 +64,9 @@ def states_needed(
             raise InputError("is not positive", field=name, value=value, remedy="give a positive one")
     if not models:
         raise InputError("names none", field="models", remedy="give linear models, as linearise makes them")
+    if not models[0].outputs:
+        raise InputError("has no outputs whose responses could be compared", field="outputs", value=models[0].mechanism,
+                         remedy="give it motors, an end-effector or sensors")  # fmt: skip
     chosen = [as_enum(ReductionMethod, method, "methods") for method in methods]
     s = np.geomspace(_LOWEST * until, until, _FREQUENCIES) * (1j + DAMPING)
     found = np.array([[_needed(model, method, s, error, most) for method in chosen] for model in models])

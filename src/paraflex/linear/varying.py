@@ -10,10 +10,10 @@ with the terms of Z' that `minimal` has at every sample.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -44,6 +44,8 @@ from paraflex.tracking import TrackingRun, TrackingTask
 
 if TYPE_CHECKING:
     import xarray as xr
+
+T = TypeVar("T")
 
 # Cubic splines pass through so many samples at least.
 _FEWEST = 4
@@ -237,36 +239,56 @@ def linearise_along(
 
 
 def _model(motion: Moving, points: Sequence[MotionPoint], coordinates: Coordinates, ports: Ports) -> VaryingModel:
-    """The model at points of a motion; coordinates are those chosen at the first, unless they are singular later."""
-    about, without = motion.about, []
-    chosen, tries = coordinates.choose(coordinates.at(points[0])), len(coordinates.measured) + _MORE
-    found = None
-    while not isinstance(found, tuple):
-        found = _matrices(linear_model(coordinates, point, ports, about, chosen=chosen) for point in points)
-        if isinstance(found, LinearModel):
-            without += _given_up(found.minimal, coordinates)
-            if not tries:
-                raise _singular(found.minimal, [one.name for one in coordinates.names(chosen)])
-            chosen, tries = coordinates.choose(found.minimal.tangents, without), tries - 1
-    first, (A, B, C, D) = found
+    """The model at points of a motion."""
+    about = motion.about
+    chosen, found = in_one_chart(points, coordinates, ports, about, lambda model: model.state_space)
+    first, (A, B, C, D) = linear_model(coordinates, points[0], ports, about, chosen=chosen), zip(*found, strict=True)
     return VaryingModel(
         mechanism=first.mechanism, mode=first.mode, about=about, states=first.states, inputs=first.inputs,
-        outputs=first.outputs, times=np.array([point.time for point in points]), A=A, B=B, C=C, D=D,
-        nominal=_along(points, coordinates, chosen, ports), coordinates=coordinates, chosen=chosen, ports=ports,
-        modal=first.modal_states,
+        outputs=first.outputs, times=np.array([point.time for point in points]), A=np.array(A), B=np.array(B),
+        C=np.array(C), D=np.array(D), nominal=_along(points, coordinates, chosen, ports), coordinates=coordinates,
+        chosen=chosen, ports=ports, modal=first.modal_states,
     )  # fmt: skip
 
 
-def _matrices(models: Iterable[LinearModel]) -> tuple[LinearModel, list[Array]] | LinearModel:
-    """The first model and A, B, C and D of all (k, ...); or only the first beyond or near a singular position."""
+def in_one_chart(
+    points: Sequence[MotionPoint], coordinates: Coordinates, ports: Ports, about: str, take: Callable[[LinearModel], T]
+) -> tuple[Chosen, list[T]]:
+    """What is taken of the linear models at points of a motion, in coordinates that are well chosen at all of them.
+
+    They are those chosen at the first, unless they are singular later.
+
+    Raises
+    ------
+    SingularPositionError
+        No coordinates describe the motion at all points.
+    """
+    without: list[int] = []
+    chosen, tries = coordinates.choose(coordinates.at(points[0])), len(coordinates.measured) + _MORE
+    while True:
+        found = _taken((linear_model(coordinates, point, ports, about, chosen=chosen) for point in points), take)
+        if not isinstance(found, LinearModel):
+            return chosen, found
+        without += _given_up(found.minimal, coordinates)
+        if not tries:
+            raise _singular(found.minimal, [one.name for one in coordinates.names(chosen)])
+        chosen, tries = coordinates.choose(found.minimal.tangents, without), tries - 1
+
+
+def _taken(models: Iterable[LinearModel], take: Callable[[LinearModel], T]) -> list[T] | LinearModel:
+    """What is taken of all models; or only the first of them beyond or near a singular position."""
     first, found = None, []
     for model in models:
         first = first or model
-        if model.minimal.condition > _WELL or model.minimal.orientation != first.minimal.orientation:
+        if not describes(model.minimal, first.minimal):
             return model
-        found.append((model.A, model.B, model.C, model.D))
-    assert first is not None
-    return first, [np.array(each) for each in zip(*found, strict=True)]
+        found.append(take(model))
+    return found
+
+
+def describes(minimal: Minimal, elsewhere: Minimal) -> bool:
+    """Whether coordinates describe the motion well at one point, and no singular position lies before another."""
+    return minimal.condition <= _WELL and minimal.orientation == elsewhere.orientation
 
 
 def _given_up(minimal: Minimal, coordinates: Coordinates) -> list[int]:

@@ -40,7 +40,12 @@ from .modes import motor_torques as motor_torques, tracking_errors as tracking_e
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
 from .parallel import parallel_coordinates as parallel_coordinates
 from .phase import link_phases as link_phases, phase_diagrams as phase_diagrams
-from .reduction import reduced_responses as reduced_responses, reduction_errors as reduction_errors
+from .reduction import (
+    bases_along_path as bases_along_path,
+    held_frequency_by_states as held_frequency_by_states,
+    reduced_responses as reduced_responses,
+    reduction_errors as reduction_errors,
+)
 from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
 from .spectra import numerical_damping as numerical_damping

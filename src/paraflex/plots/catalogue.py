@@ -187,6 +187,10 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
                         "reduced_responses"),
         CatalogueFigure("reduction_errors", "reduction", "errors of reduced models over frequency, all modes",
                         written_as="reduction_errors"),
+        CatalogueFigure("held_frequency_by_states", "reduction", "lowest frequency with motors held, by states",
+                        "mode", "held_frequency_by_states"),
+        CatalogueFigure("bases_along_path", "reduction", "errors along the path with bases of one pose and of several",
+                        "mode", "bases_along_path", variables=("along_error",)),
     ),
     "statics": (
         CatalogueFigure("force_travel", "equilibria", "force against travel of what is loaded and moved",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain, symbol
 from paraflex.plots.layout import is_narrow, lay_out, panels
@@ -14,10 +17,16 @@ from paraflex.plots.scales import mark_powers
 from paraflex.plots.selection import default_mode, names_of, place_of
 from paraflex.plots.style import BLACK, COLOURS, DASHES
 from paraflex.results.kinds import check_kind
+from paraflex.results.linear_data import HOLDINGS
+from paraflex.results.reduction_along import OWN, STATIC
 from paraflex.results.reduction_data import FULL
 
 # Decades of a gain that are shown below its largest.
 _DECADES = 7.0
+# Smaller errors along a path are drawn as this one.
+_LEAST = 1e-9
+# What places along a motion are measured in.
+AXES = {"m": "along the path [m]", "s": "along the motion [s]"}
 # Outputs with a panel.
 _PANELS = 6
 
@@ -39,7 +48,7 @@ def reduced_responses(data: xr.Dataset, mode: str | None = None) -> Figure:
             }  # fmt: skip
             panel.plot(data["frequency"].values, gains.sel(variant=name).values, label=_label(data, name), **look)
         panel.set_title(f"to {symbol(output)}")
-        panel.set_ylabel(f"largest gain [{data['output_unit'].sel(output=output).item()}/({data.attrs['input_unit']})]")
+        panel.set_ylabel(f"gain [{data['output_unit'].sel(output=output).item()}/({data.attrs['input_unit']})]")
         _over_frequency(panel, data)
         top = float(np.nanmax(gains.values))
         low = float(np.nanmin(gains.values[gains.values > 0.0]))
@@ -70,6 +79,68 @@ def reduction_errors(data: xr.Dataset) -> Figure:
         mark_powers(panel)
         _over_frequency(panel, data)
     return lay_out(figure, axes, panel_height=62.0)
+
+
+@drawn
+def held_frequency_by_states(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Lowest frequency of a mode with its motors held, by method and number of states, and that of the full model."""
+    check_kind(data, "reduction")
+    mode = default_mode(data) if mode is None else mode
+    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    figure, axes = panels(1, 1)
+    panel = axes[0, 0]
+    for k, name in enumerate(names_of(data, "reduction")):
+        values = run["held_frequency"].sel(reduction=name).values
+        if np.isfinite(values).any():
+            panel.plot(data["kept"].values, values, label=name, marker="o", markersize=3.0,
+                       color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)])  # fmt: skip
+    exact = float(run["natural_frequency"].sel(variant=FULL, holding=HOLDINGS[1], order=1))
+    panel.axhline(exact, color=BLACK, linewidth=0.8, label=f"full model, {data.attrs['full_states']} states")
+    panel.set_xlabel("states")
+    panel.set_ylabel("lowest frequency [Hz]")
+    panel.set_title(f"motors of {plain(mode)} held")
+    panel.set_yscale("log")
+    mark_powers(panel)
+    return lay_out(figure, axes, panel_height=62.0)
+
+
+@drawn
+def bases_along_path(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Errors along the path with bases of each pose, of one pose, and between some: responses and frequencies."""
+    check_kind(data, "reduction")
+    if "along_error" not in data:
+        raise InputError("these reduced models are of one pose", field="data", remedy="reduce along a path: --along 21")
+    mode = default_mode(data) if mode is None else mode
+    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    figure, axes = panels(3, 1) if is_narrow() else panels(1, 3)
+    quantities = [("responses", run["along_error"])]
+    quantities += [(f"frequencies, motors {name}", run["along_frequency_error"].sel(holding=name)) for name in HOLDINGS]
+    looks = _bases_looks(data)
+    for panel, (title, values) in zip(axes.flat, quantities, strict=True):
+        for (static, basis), look in looks.items():
+            line = values.sel(static=static, basis=basis).values
+            if np.isfinite(line).any():
+                panel.plot(data["place"].values, np.maximum(line, _LEAST), **look)
+        panel.set_title(title)
+        panel.set_xlabel(AXES[data.attrs["place_unit"]])
+        panel.set_ylabel("largest relative error")
+        panel.set_yscale("log")
+        mark_powers(panel)
+    axes.flat[0].axhline(float(data.attrs["accuracy"]), color="0.6", linewidth=0.6)
+    return lay_out(figure, axes, panel_height=62.0)
+
+
+def _bases_looks(data: xr.Dataset) -> dict[tuple[str, str], dict[str, Any]]:
+    """How the lines of bases look: a colour for each, dashed where static shapes are those of other poses too."""
+    looks: dict[tuple[str, str], dict[str, Any]] = {}
+    coloured = [colour for colour in COLOURS if colour != BLACK]
+    for k, name in enumerate(names_of(data, "basis")):
+        for static in STATIC[: 1 if name == OWN else None]:
+            own = static == STATIC[0]
+            kept = "" if name == OWN else "vibrations " if own else "all shapes "
+            colour = BLACK if name == OWN else coloured[(k - 1) % len(coloured)]
+            looks[static, name] = {"label": f"{kept}{name}", "color": colour, "linestyle": "-" if own else "--"}
+    return looks
 
 
 def _label(data: xr.Dataset, name: str) -> str:

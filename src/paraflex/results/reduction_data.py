@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
+from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
-from paraflex.linear.reduced import ReducedModel, ReductionMethod, reduce
+from paraflex.linear.reduced import ReducedModel, ReductionMethod
+from paraflex.linear.reduction import CARRIED, reduce
 from paraflex.linear.states_needed import DAMPING, states_needed
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
 from paraflex.results.numbers import finite_or_none
+from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
 from paraflex.results.storage import SCHEMA
 
 Array = NDArray[np.float64]
@@ -30,9 +33,12 @@ _FREQUENCIES, _LOWEST, _BEYOND = 400, 1e-2, 2.5
 _COMPARED = 6
 # A smaller deviation is called none.
 _ROUNDING = 1e-7
+# Most states for which the lowest frequency with motors held is told.
+_MOST = 48
 UNITS = {
     "states": ("fewest states within the error up to the highest frequency; NaN where more than 80 are needed", "1"),
     "natural_frequency": ("undamped natural frequency above zero", "Hz"),
+    "held_frequency": ("lowest natural frequency above zero with motors held, by number of states", "Hz"),
     "gain": ("largest gain of all inputs to an output", "unit of the output, by that of the inputs"),
     "error": ("largest gain of the error to an output, over that of the full model", "1"),
     "largest_error": ("largest error up to the highest frequency", "1"),
@@ -44,11 +50,12 @@ UNITS = {
 @checked_arguments()
 def reduction_dataset(
     models: Sequence[LinearModel],
-    states: int = 16,
+    states: int | None = None,
     *,
     methods: Sequence[ReductionMethod | str] = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.MODAL),
     until: float = 40.0,
     error: float = 0.01,
+    along: Sequence[PosesAlong] = (),
     parameters: dict[str, Any] | None = None,
 ) -> xr.Dataset:
     """Reduced models of linear models of one mechanism, one for each actuation mode, beside the full ones.
@@ -57,14 +64,16 @@ def reduction_dataset(
     ----------
     models : sequence of LinearModel
         Each of another mode, with the same outputs.
-    states : int
-        Of the reduced models.
+    states : int, optional
+        Of the reduced models: see `reduce`.
     methods : sequence of str
         Of `reduce`.
     until : float
         Highest frequency [Hz].
     error : float
         For which states needed are counted.
+    along : sequence of PosesAlong
+        Of the same modes: how far the basis of one pose holds along the path.
     parameters : dict, optional
         Kept as provenance: what was asked for.
 
@@ -72,7 +81,7 @@ def reduction_dataset(
     -------
     xarray.Dataset
         Dimensions mode, reduction, variant ("full", then each reduction), output, holding (motors free or held), order,
-        frequency.
+        frequency, kept (states); with `along` basis and place as well.
 
     Raises
     ------
@@ -87,10 +96,11 @@ def reduction_dataset(
         raise InputError("have other outputs", field="models", remedy="give models of one mechanism")
     frequency = np.geomspace(_LOWEST * until, _BEYOND * until, _FREQUENCIES)
     gains, errors = _responses(models, few, frequency)
-    reached = frequency <= until
+    reached, counts = frequency <= until, np.arange(2, min(_MOST, len(models[0].states)) + 1, 2)
     data: dict[str, Any] = {
         "states": needed["states"],
         "natural_frequency": (("mode", "variant", "holding", "order"), _frequencies(models, few)),
+        "held_frequency": (("mode", "reduction", "kept"), _held(models, names, counts)),
         "gain": (("mode", "variant", "output", "frequency"), gains),
         "error": (("mode", "reduction", "output", "frequency"), errors),
         "largest_error": (("mode", "reduction", "output"), errors[..., reached].max(axis=-1)),
@@ -100,19 +110,35 @@ def reduction_dataset(
     coordinates = {
         "mode": [model.mode for model in models], "reduction": names, "variant": [FULL, *names], "output": outputs,
         "output_unit": ("output", [one.unit for one in models[0].outputs]), "holding": list(HOLDINGS),
-        "order": np.arange(1, _COMPARED + 1), "frequency": frequency,
+        "order": np.arange(1, _COMPARED + 1), "frequency": frequency, "kept": counts,
     }  # fmt: skip
     units = dict.fromkeys(one.unit for model in models for one in model.inputs)
     attrs = {
-        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about, "kept_states": states,
-        "full_states": len(models[0].states), "until": until, "accuracy": error, "damping_ratio": DAMPING,
-        "input_unit": ", ".join(units), "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"), "schema": SCHEMA,
+        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about,
+        "kept_states": len(few[0][0].states), "full_states": len(models[0].states), "until": until, "accuracy": error,
+        "damping_ratio": DAMPING, "input_unit": ", ".join(units),
+        "parameters": json.dumps(parameters or {}, sort_keys=True), "paraflex_version": version("paraflex"),
+        "schema": SCHEMA,
     }  # fmt: skip
+    if along:
+        method = _carrying(names)
+        more = along_variables(along, states, method, until, error)
+        data |= more[0]
+        coordinates |= more[1]
+        attrs |= {"along_method": method.value, "place_unit": along[0].unit}
     out = xr.Dataset(data, coords=coordinates, attrs=attrs)
-    for name, (meaning, unit) in UNITS.items():
+    for name, (meaning, unit) in (UNITS | (UNITS_ALONG if along else {})).items():
         out[name].attrs = {"long_name": meaning, "units": unit}
     return out
+
+
+def _carrying(names: Sequence[str]) -> ReductionMethod:
+    """The first method whose bases can be taken over by other poses."""
+    for method in map(ReductionMethod, names):
+        if method in CARRIED:
+            return method
+    raise InputError("have no basis that other poses could take over", field="methods", value=", ".join(names),
+                     remedy="add craig-bampton or rubin")  # fmt: skip
 
 
 def _responses(
@@ -124,9 +150,8 @@ def _responses(
     for model, reduced in zip(models, few, strict=True):
         full = model.frequency_response(s)
         found = [one.frequency_response(s) for one in reduced]
-        size = np.linalg.norm(full, axis=2)
         gains.append([np.linalg.norm(each, axis=2).T for each in (full, *found)])
-        errors.append([(np.linalg.norm(each - full, axis=2) / np.where(size > 0.0, size, np.inf)).T for each in found])
+        errors.append([output_errors(full, each).T for each in found])
     return np.array(gains), np.array(errors)
 
 
@@ -144,6 +169,23 @@ def _frequencies(models: Sequence[LinearModel], few: Sequence[Sequence[ReducedMo
     return out
 
 
+def _held(models: Sequence[LinearModel], names: Sequence[str], counts: NDArray[np.int64]) -> Array:
+    """Lowest frequency above zero with motors held (mode, reduction, count) [Hz]; NaN without one."""
+
+    def lowest(model: LinearModel, states: int, name: str) -> float:
+        if name == ReductionMethod.BALANCED.value:
+            return np.nan
+        try:
+            found = reduce(model, states, method=name).held_frequencies(motors_of(model))
+        except InputError:
+            # Fewer than the coordinates of motors.
+            return np.nan
+        above = found[found > 0.0] / (2.0 * np.pi)
+        return above[0] if above.size else np.nan
+
+    return np.array([[[lowest(model, int(count), name) for count in counts] for name in names] for model in models])
+
+
 @checked_arguments()
 def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
     """Reduced models as plain numbers."""
@@ -156,6 +198,7 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
             "states_needed": _numbers(run["states"], "output"),
             "largest_error": _numbers(run["largest_error"], "output"),
             "bound": finite_or_none(float(run["bound"])),
+            "held_frequency_by_states": _numbers(run["held_frequency"], "kept"),
             **{f"frequencies_{holding}": _list(frequencies.sel(holding=holding)) for holding in HOLDINGS},
         }
 
@@ -173,6 +216,7 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
                                                                                      holding=holding))
                        for holding in HOLDINGS},
                 **{str(name): of(mode, str(name)) for name in data["reduction"].values},
+                **({"along": along_summary(data, mode)} if "along_error" in data else {}),
             }
             for mode in modes
         },

@@ -140,7 +140,9 @@ class LineariseRequest(LinearRequest):
 class ReduceRequest(LinearRequest):
     """What `paraflex reduce` is asked for."""
 
-    states: Annotated[int, Option(metavar="N", help="States of the reduced models.")] = 16
+    states: Annotated[
+        int | None, Option(metavar="N", help="States of the reduced models. Default: 16, or all of fewer.")
+    ] = None
     methods: Annotated[
         list[str],
         Option(
@@ -151,6 +153,14 @@ class ReduceRequest(LinearRequest):
     ] = field(default_factory=list)
     until: Annotated[float, Option(metavar="HZ", help="Highest frequency [Hz].")] = 40.0
     error: Annotated[float, Option(metavar="PART", help="Error that the states needed are counted for.")] = 0.01
+    along: Annotated[  # type: ignore[misc]
+        int | None,
+        Option(metavar="N", help="How far the basis of one pose holds at so many poses along the path, too."),
+    ] = None
+    basis: Annotated[
+        str | None,
+        Option(metavar="NAME|start|X,Y", help="The pose whose basis is taken along. Default: the first of the path."),
+    ] = None
     out: Annotated[
         str | None,
         Option("--out", "--output", metavar="DIR", help="Folder for reduced.nc, reduced.json and figures."),

@@ -1,0 +1,121 @@
+"""Linear models at rest in poses along a motion, in one choice of minimal coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.dynamics import State
+from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.errors import InputError, as_enum
+from paraflex.limits import solvable
+from paraflex.linear.coordinates import FirstCoordinates, coordinates_of
+from paraflex.linear.linearise import mechanism_of, mode_of, moving, ports_of
+from paraflex.linear.model import LinearModel
+from paraflex.linear.points import resting_point
+from paraflex.linear.varying import in_one_chart
+from paraflex.mechanism import ActuationMode
+from paraflex.motion import MotionRun
+from paraflex.tracking import TrackingRun, TrackingTask, undeformed_at
+
+
+@dataclass(frozen=True)
+class PosesAlong:
+    """Linear models at rest in poses along a motion.
+
+    Attributes
+    ----------
+    places : (k,) array
+        How far along: length of the end-effector's path from the start [m], or time where there is none [s].
+    unit : str
+        "m" or "s".
+    models : tuple of LinearModel
+        At the places, all with the same states.
+    elsewhere : LinearModel, optional
+        In a pose of its own, with the same states.
+    """
+
+    places: Array
+    unit: str
+    models: tuple[LinearModel, ...]
+    elsewhere: LinearModel | None = None
+
+
+@checked_arguments()
+@solvable("linear models along a motion")
+def poses_along(
+    source: TrackingTask | TrackingRun | MotionRun,
+    count: int,
+    *,
+    mode: str | ActuationMode | None = None,
+    pose: State | None = None,
+    forces: Sequence[str] = (),
+    prescribed: Sequence[str] = (),
+    coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
+) -> PosesAlong:
+    """Linear models at rest in poses evenly along a planned motion or a run, all in the same coordinates.
+
+    Parameters
+    ----------
+    source : TrackingTask, TrackingRun or MotionRun
+    count : int
+        Of poses; they are at samples of the motion.
+    mode, forces, prescribed, coordinates
+        See `linearise`.
+    pose : State, optional
+        One more pose, for `elsewhere`.
+
+    Raises
+    ------
+    InputError
+        See `linearise`; or fewer than two poses, or more than samples that lie apart.
+    SingularPositionError
+        No coordinates describe the motion in all poses.
+    """
+    mechanism = mechanism_of(source)
+    ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
+    motion = moving(source, ports.mode)
+    chart = coordinates_of(motion.system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
+    far, unit = _lengths(source)
+    samples = _evenly(far, count)
+    still = np.zeros(motion.system.n)
+    states = [State(float(motion.times[k]), _coordinates(source, k), still) for k in samples]
+    points = [resting_point(chart, state, ports.mode)[0] for state in [*states, *([] if pose is None else [pose])]]
+    models = in_one_chart(points, chart, ports, "a pose at rest", lambda model: model)[1]
+    return PosesAlong(far[samples], unit, tuple(models[:count]), None if pose is None else models[count])
+
+
+def _lengths(source: TrackingTask | TrackingRun | MotionRun) -> tuple[Array, str]:
+    """How far along its motion the mechanism is at all samples, and the unit of that."""
+    if isinstance(source, TrackingTask):
+        system, q, t = source.motion.system, source.motion.q, source.motion.t
+    else:
+        system = source.system if isinstance(source, MotionRun) else source.task.system
+        q, t = source.solution.q, source.solution.t
+    effector = system.mechanism.end_effector
+    if effector is None:
+        return t - t[0], "s"
+    places = marker_place(system, system.marker(effector.point), q)[0]
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))]), "m"
+
+
+def _coordinates(source: TrackingTask | TrackingRun | MotionRun, sample: int) -> Array:
+    if isinstance(source, TrackingTask):
+        return undeformed_at(source.system, source.motion, sample)[0]
+    return source.solution.q[sample]
+
+
+def _evenly(far: Array, count: int) -> list[int]:
+    """So many samples, evenly along the way from the first to the last."""
+    if count < 2:
+        raise InputError("too few poses", field="count", value=count, remedy="give at least 2")
+    samples = np.abs(far[:, None] - np.linspace(0.0, far[-1], count)).argmin(axis=0)
+    apart = np.unique(samples).size
+    if apart < count:
+        raise InputError("more poses than samples of the motion that lie apart", field="count", value=count,
+                         remedy=f"give at most {apart}, or plan the motion with more samples")  # fmt: skip
+    return samples.tolist()

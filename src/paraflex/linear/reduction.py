@@ -1,0 +1,267 @@
+"""Reduction of linear models: bases of their own, of other poses or between these, and balanced truncation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.dynamics import State
+from paraflex.errors import InputError, as_enum
+from paraflex.kinematics import ModelWithPaths
+from paraflex.limits import solvable
+from paraflex.linear.balancing import balanced as balanced_truncation
+from paraflex.linear.bases import Basis, carried, craig_bampton, independent_rows, interpolated, lowest_modes, rubin
+from paraflex.linear.coordinates import Variable
+from paraflex.linear.linearise import linear_model, linearise, sought_motion
+from paraflex.linear.model import LinearModel
+from paraflex.linear.reduced import ReducedModel, ReductionMethod
+from paraflex.linear.varying import describes
+from paraflex.linear.zeros import StateSpace
+from paraflex.mechanism import ActuationMode, Mechanism, Start
+from paraflex.motion import MotionRun
+from paraflex.tracking import TrackingRun, TrackingTask
+
+# States of reduced models, where no number is given.
+_STATES = 16
+# Methods whose bases can be taken over by other poses.
+CARRIED = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.RUBIN)
+
+Source = LinearModel | Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun
+
+
+@checked_arguments()
+@solvable("a reduced model")
+def reduce(
+    source: Source,
+    states: int | None = None,
+    *,
+    method: ReductionMethod | str | None = None,
+    basis: ReducedModel | Sequence[ReducedModel] | None = None,
+    part: float | None = None,
+    renewed: bool = True,
+    feed_through: bool = True,
+    mode: str | ActuationMode | None = None,
+    at: float | None = None,
+    assembly: str | None = None,
+    start: Start | State | None = None,
+    balanced: bool = False,
+) -> ReducedModel:
+    """A linear model of few states that stands for one of many.
+
+    Parameters
+    ----------
+    source : LinearModel, Mechanism, Model, TrackingTask, TrackingRun or MotionRun
+        As `linearise` makes it, or what it is made of.
+    states : int, optional
+        How many are kept, 16 by default, or all of fewer; even but for balanced truncation.
+    method : str, optional
+        "craig-bampton" (default): static shapes of all motors' coordinates, whatever the mode, and of prescribed
+        motions that are inputs, and vibrations with all these held. "rubin": the same static shapes, and shapes with
+        which the lowest modes with motors free are exact. "modal": these modes alone. "balanced": what inputs move and
+        outputs see most of the stable part, with a bound of the error.
+    basis : ReducedModel or sequence of ReducedModel, optional
+        By "craig-bampton" or "rubin", of the mechanism in another pose, whose states are kept in this one as well; or
+        of several poses, between which the basis is interpolated. A mechanism is linearised in their coordinates.
+    part : float, optional
+        Of several bases: 0 for the first, 1 for the second, 1.5 for half the way from this to the third.
+    renewed : bool
+        Of a basis, only the vibrations are taken, beside static shapes of this pose: rigid motions and stiffness stay
+        exact. Without, the basis is that of the other pose altogether.
+    feed_through : bool
+        What is left out bends as forces and inertia forces want it, so that torques have places, angles and strains
+        jump a little (`D`). Without, these are combinations of the states. Balanced states have no such part.
+    mode, at, assembly, start, balanced
+        See `linearise`; not of a linear model, which is what it is.
+
+    Raises
+    ------
+    InputError
+        Fewer states than motors, or more than the model has; a mechanism without flexible links; balanced truncation of
+        a mechanism without damping; a basis of another mechanism, of other coordinates or of a pose beyond a singular
+        one.
+    AssemblyError
+        The mechanism does not reach the pose.
+    """
+    given = _given(basis, part, states, method)
+    options = {"mode": mode, "at": at, "assembly": assembly, "start": start, "balanced": balanced or None}
+    model = _linear_model(source, given, {name: value for name, value in options.items() if value is not None})
+    if not any(body.nf for body in model.minimal.system.bodies):
+        raise InputError(
+            "has rigid links only, so that no state can be left out", field="model", value=model.mechanism,
+            remedy="give it flexible links",
+        )  # fmt: skip
+    if given:
+        return _carried(model, given, part or 0.0, renewed, feed_through)
+    chosen = ReductionMethod.CRAIG_BAMPTON if method is None else as_enum(ReductionMethod, method, "method")
+    return _reduced(model, min(_STATES, len(model.states)) if states is None else states, chosen, feed_through)
+
+
+def _given(
+    basis: ReducedModel | Sequence[ReducedModel] | None,
+    part: float | None,
+    states: int | None,
+    method: ReductionMethod | str | None,
+) -> list[ReducedModel]:
+    """Reduced models whose bases are taken, in line with the other arguments."""
+    given = [] if basis is None else [basis] if isinstance(basis, ReducedModel) else list(basis)
+    if not given:
+        if basis is not None or part is not None:
+            raise InputError("names none", field="basis", remedy="give reduced models of other poses")
+        return given
+    for name, value in (("states", states), ("method", method)):
+        if value is not None:
+            raise InputError(f"is that of the basis, {getattr(given[0], name)!r}" if name == "method" else
+                             f"are those of the basis, {len(given[0].states)}",
+                             field=name, value=str(value), remedy="leave it out")  # fmt: skip
+    for one in given:
+        if one.method not in CARRIED:
+            raise InputError(
+                "does not keep the motors' coordinates, by which bases of other poses are taken over", field="basis",
+                value=one.method.value, remedy="give one by craig-bampton or rubin",
+            )  # fmt: skip
+        if one.states != given[0].states or one.full.states != given[0].full.states:
+            raise InputError("have different states", field="basis", value=one.full.mechanism,
+                             remedy="reduce all in the same way: pf.reduce(mechanism, basis=first)")  # fmt: skip
+    last = len(given) - 1
+    if not 0.0 <= (part or 0.0) <= last:
+        raise InputError("is not between the bases", field="part", value=part, remedy=f"give one from 0 to {last}")
+    return given
+
+
+def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[str, Any]) -> LinearModel:
+    """The full model: as it is given, or linearised, in the coordinates of bases where there are some."""
+    if isinstance(source, LinearModel):
+        for name, value in options.items():
+            raise InputError("means nothing for a linear model, which is what it is", field=name, value=str(value),
+                             remedy="leave it out, or give the mechanism")  # fmt: skip
+        if given:
+            _check_alike(given[0], source)
+        return source
+    if not given:
+        return linearise(source, **options)
+    first, sought = given[0].full, sought_motion(source, **options)
+    same = len(sought.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
+    if not same or [body.all for body in sought.coordinates.system.bodies] != [
+        body.all for body in first.minimal.system.bodies
+    ]:
+        raise _of_another(given[0], sought.coordinates.system.mechanism.name)
+    model = linear_model(*sought, chosen=first.minimal.chosen)
+    _check_alike(given[0], model)
+    if not describes(model.minimal, first.minimal):
+        raise InputError(
+            "has coordinates that do not describe the motion in this pose, which lies beyond a singular one",
+            field="basis", value=first.mechanism, remedy="give a basis of a pose nearer by",
+        )  # fmt: skip
+    return model
+
+
+def _check_alike(basis: ReducedModel, model: LinearModel) -> None:
+    """Refuse a basis of another mechanism or in other coordinates."""
+    if [body.all for body in model.minimal.system.bodies] != [body.all for body in basis.full.minimal.system.bodies]:
+        raise _of_another(basis, model.mechanism)
+    if basis.full.states != model.states:
+        own = {one.name for one in model.states}
+        other = next((one.name for one in basis.full.states if one.name not in own), basis.full.states[0].name)
+        raise InputError(
+            f"has other coordinates than the model, {other} among them", field="basis", value=basis.full.mechanism,
+            remedy="give the mechanism in place of its linear model: it is linearised in the coordinates of the basis",
+        )  # fmt: skip
+
+
+def _of_another(basis: ReducedModel, mechanism: str) -> InputError:
+    return InputError(f"is of a mechanism with other bodies or motors than {mechanism}", field="basis",
+                      value=basis.full.mechanism, remedy="give one of the same mechanism in another pose")  # fmt: skip
+
+
+def _carried(
+    model: LinearModel, given: Sequence[ReducedModel], part: float, renewed: bool, feed_through: bool
+) -> ReducedModel:
+    """The model in the basis of another pose, or between those of some."""
+    first = given[0]
+    shapes = interpolated([one.shapes for one in given], first.full.second_order.mass, first.interface, part)
+    equations, rows = model.second_order, model.joint_rows([one.name for one in first.states[: first.interface]])
+    basis = carried(equations.mass, _symmetric(equations.stiffness), rows, shapes, equations.typical, renewed=renewed)
+    space = _projected(model, basis, feed_through)
+    return replace(first, full=model, state_space=space, basis=basis.shapes)
+
+
+def _reduced(model: LinearModel, states: int, method: ReductionMethod, feed_through: bool) -> ReducedModel:
+    """The model in a basis of its own."""
+    most = len(model.states)
+    if not 1 <= states <= most:
+        raise InputError("no such number of states", field="states", value=states, remedy=f"choose one up to {most}")
+    if method is ReductionMethod.BALANCED:
+        return _balanced(model, states)
+    if states % 2:
+        raise InputError(
+            "is odd, but every coordinate brings its rate", field="states", value=states, remedy=f"say {states + 1}"
+        )
+    basis, names, interface = _basis(model, states // 2, method)
+    rates = tuple(Variable(f"{one.name}_rate", f"{one.unit}/s") for one in names)
+    space = _projected(model, basis, feed_through)
+    return ReducedModel(model, method, (*names, *rates), space, basis=basis.shapes, interface=interface)
+
+
+def _balanced(model: LinearModel, states: int) -> ReducedModel:
+    """The model in balanced states."""
+    full = model.scaled
+    found = balanced_truncation(full, states, model.low_frequency)
+    left, right = found.left, found.right
+    space = StateSpace(left @ full.A @ right, left @ full.B, full.C @ right, full.D)
+    names = tuple(Variable(f"balanced{k + 1}", "1") for k in range(len(left)))
+    return ReducedModel(model, ReductionMethod.BALANCED, names, space, hankel=found.hankel, bound=found.bound)
+
+
+def _symmetric(stiffness: Array) -> Array:
+    return 0.5 * (stiffness + stiffness.T)
+
+
+def _basis(model: LinearModel, count: int, method: ReductionMethod) -> tuple[Basis, tuple[Variable, ...], int]:
+    """So many coordinates, their names, and how many of them are those of motors' joints."""
+    equations = model.second_order
+    stiffness = _symmetric(equations.stiffness)
+    if method is ReductionMethod.MODAL:
+        basis = lowest_modes(equations.mass, stiffness, count, equations.typical)
+        return basis, tuple(Variable(f"mode{k + 1}", "m kg^0.5") for k in range(count)), 0
+    driven = [one.name for one in model.states[: model.minimal.chosen.joints.size]][-model.minimal.driven :]
+    joints = list(dict.fromkeys(motor.joint for motor in model.minimal.system.mechanism.motors))
+    joints += [joint for joint in driven if joint not in joints] if model.minimal.driven else []
+    rows = model.joint_rows(joints)
+    kept = independent_rows(rows, 1.0 / np.sqrt(np.diag(equations.mass)))
+    if count < len(kept):
+        raise InputError(
+            f"are fewer than the {2 * len(kept)} of the coordinates of {len(kept)} motors or drives and their rates",
+            field="states", value=2 * count, remedy=f"keep at least {2 * len(kept)}, better {2 * len(kept) + 8}",
+        )  # fmt: skip
+    mechanism = model.minimal.system.mechanism
+    names = [Variable(joints[k], "m" if mechanism.joint(joints[k]).slides else "rad") for k in kept]
+    names += [Variable(f"held_mode{k + 1}", "m kg^0.5") for k in range(count - len(kept))]
+    make = rubin if method is ReductionMethod.RUBIN else craig_bampton
+    basis = make(equations.mass, stiffness, rows[kept], count - len(kept), equations.typical)
+    return basis, tuple(names), len(kept)
+
+
+def _projected(model: LinearModel, basis: Basis, feed_through: bool) -> StateSpace:
+    """The equations in y = T z; outputs see y = T z + G (F u - K T z - D T z' - M T z''), F u the forces of inputs.
+
+    With the flexibility G vibrations that are left out bend as forces and inertia forces want it, without being states
+    (mode acceleration, Craig 1981): so bent, accelerations T z'' and constraint forces are in balance. Without
+    feed-through this is left out where outputs are places, angles and strains.
+    """
+    T, f, k = basis.shapes, len(basis.shapes), basis.shapes.shape[1]
+    equations = model.second_order
+    full = np.hstack([model.A[f:, :f] @ T, model.A[f:, f:] @ T, model.B[f:]])
+    few = scipy.linalg.solve(T.T @ equations.mass @ T, T.T @ equations.mass @ full)
+    bent = basis.flexibility @ equations.mass @ (full - T @ few)
+    outputs = np.hstack([model.C[:, :f] @ T, model.C[:, f:] @ T, model.D]) + model.C[:, :f] @ bent
+    if not feed_through:
+        outputs -= model.place_outputs @ bent
+    A = np.vstack([np.eye(k, 2 * k, k), few[:, : 2 * k]])
+    B = np.vstack([np.zeros((k, few.shape[1] - 2 * k)), few[:, 2 * k :]])
+    return StateSpace(A, B, outputs[:, : 2 * k], outputs[:, 2 * k :])

@@ -1,0 +1,188 @@
+"""How far the basis of one pose holds along a path, and between how many poses it is interpolated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from paraflex.errors import InputError
+from paraflex.linear.along import PosesAlong
+from paraflex.linear.model import LinearModel
+from paraflex.linear.reduced import ReducedModel, ReductionMethod
+from paraflex.linear.reduction import reduce
+from paraflex.linear.states_needed import DAMPING
+from paraflex.results.linear_data import HOLDINGS, motors_of
+from paraflex.results.numbers import finite_or_none
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+OWN, ONE = "of each pose", "of one pose"
+# Static shapes of each pose beside vibrations of others, or both of others.
+STATIC = ("renewed", "carried")
+# Numbers of poses between which bases are interpolated: each halves the distances, until errors are as asked for.
+_COUNTS = (2, 3, 5, 9, 17, 33)
+# Coordinates of two poses that are one, in their units.
+_SAME = 1e-6
+# Frequencies of responses, from this part of the highest on, and lowest frequencies above zero that are compared.
+_FREQUENCIES, _LOWEST, _COMPARED = 60, 1e-2, 2
+UNITS_ALONG = {
+    "along_error": ("largest error of the responses up to the highest frequency, over the full model's gain", "1"),
+    "along_frequency_error": ("largest relative error of the two lowest natural frequencies above zero", "1"),
+}
+
+
+class _Errors(NamedTuple):
+    """Errors of reduced models along a path: of responses (mode, place), of frequencies (mode, place, holding)."""
+
+    response: Array
+    frequency: Array
+
+
+def along_variables(
+    along: Sequence[PosesAlong], states: int | None, method: ReductionMethod, until: float, error: float
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and coordinates of a dataset: errors along a path of reduced models with bases of several poses.
+
+    Parameters
+    ----------
+    along : sequence of PosesAlong
+        One for each mode, in the same poses.
+    states : int, optional
+        Of the reduced models: see `reduce`.
+    method : ReductionMethod
+    until : float
+        Highest frequency [Hz].
+    error : float
+        Bases are interpolated between more poses until the largest error is not above.
+    """
+    places = along[0].places
+    if any(not np.array_equal(one.places, places) for one in along):
+        raise InputError("have other poses", field="along", remedy="give those of one motion")
+    paths = [_Path(one, states, method, until) for one in along]
+    own = _errors(paths, lambda path, _: path.own, True)
+    nothing = _Errors(*(np.full_like(part, np.nan) for part in own))
+    found, wanted = {OWN: [own, own]}, set(STATIC)
+    for name, take in _bases(places, closed=_is_closed(along[0])):
+        found[name] = [_errors(paths, take, static == STATIC[0]) if static in wanted else nothing for static in STATIC]
+        enough = [static for static, each in zip(STATIC, found[name], strict=True) if np.max(each.response) <= error]
+        wanted -= set(enough)
+        if not wanted:
+            break
+    # From (basis, static, mode, place, ...) to (mode, static, basis, place, ...).
+    response = np.array([[one.response for one in both] for both in found.values()]).swapaxes(0, 2)
+    frequency = np.array([[one.frequency for one in both] for both in found.values()]).swapaxes(0, 2)
+    variables = {
+        "along_error": (("mode", "static", "basis", "place"), response),
+        "along_frequency_error": (("mode", "static", "basis", "place", "holding"), frequency),
+    }
+    return variables, {"static": list(STATIC), "basis": list(found), "place": places}
+
+
+def _is_closed(along: PosesAlong) -> bool:
+    """Whether the last pose is the first."""
+    first, last = (along.models[k].minimal for k in (0, -1))
+    return bool(np.max(np.abs(last.point.q - first.point.q) / first.system.units) < _SAME)
+
+
+def _bases(places: Array, *, closed: bool) -> Iterator[tuple[str, Take]]:
+    """Names of bases, and what makes the reduced models of a path with them, static shapes renewed or not."""
+    yield ONE, lambda path, renewed: [reduce(model, basis=path.one, renewed=renewed) for model in path.along.models]
+    for count in (each for each in _COUNTS[closed:] if 2 * each <= places.size + 1):
+        chosen = np.round(np.linspace(0, places.size - 1, count)).astype(int)
+        parts = np.interp(places, places[chosen], np.arange(count)).tolist()
+
+        def between(
+            path: _Path, renewed: bool, chosen: NDArray[np.int64] = chosen, parts: list[float] = parts
+        ) -> list[ReducedModel]:
+            some = [path.own[k] for k in chosen]
+            return [reduce(model, basis=some, part=part, renewed=renewed)
+                    for model, part in zip(path.along.models, parts, strict=True)]  # fmt: skip
+
+        yield f"between {count} poses", between
+
+
+class _Path:
+    """Full models of a mode along a path, reduced ones with bases of their own, and the one whose basis is carried."""
+
+    def __init__(self, along: PosesAlong, states: int | None, method: ReductionMethod, until: float) -> None:
+        self.along: PosesAlong = along
+        self.own: list[ReducedModel] = [reduce(model, states, method=method) for model in along.models]
+        elsewhere = along.elsewhere
+        self.one: ReducedModel = self.own[0] if elsewhere is None else reduce(elsewhere, states, method=method)
+        self.full: list[_Measured] = [_Measured(model, until) for model in along.models]
+
+
+class _Measured:
+    """A full model, by which reduced ones are measured: responses and frequencies."""
+
+    def __init__(self, model: LinearModel, until: float) -> None:
+        self.s: NDArray[np.complexfloating[Any, Any]] = (
+            2.0 * np.pi * np.geomspace(_LOWEST * until, until, _FREQUENCIES) * (1j + DAMPING)
+        )
+        self.response: Complex = model.frequency_response(self.s)
+        self.motors: list[str] = motors_of(model)
+        self.frequencies: list[Array] = [model.frequencies, model.held_frequencies(self.motors)]
+
+    def errors(self, few: ReducedModel) -> tuple[float, list[float]]:
+        """Largest errors of the response, and of frequencies with motors free and held."""
+        error = np.max(output_errors(self.response, few.frequency_response(self.s)), initial=0.0)
+        both = (few.frequencies, few.held_frequencies(self.motors))
+        return float(error), [_relative(*pair) for pair in zip(both, self.frequencies, strict=True)]
+
+
+Take = Callable[[_Path, bool], list[ReducedModel]]
+
+
+def _errors(paths: Sequence[_Path], take: Take, renewed: bool) -> _Errors:
+    """Errors of the reduced models that are taken of each path."""
+    pairs = [[full.errors(few) for full, few in zip(path.full, take(path, renewed), strict=True)] for path in paths]
+    return _Errors(np.array([[one[0] for one in row] for row in pairs]),
+                   np.array([[one[1] for one in row] for row in pairs]))  # fmt: skip
+
+
+def output_errors(full: Complex, few: Complex) -> Array:
+    """Error of the gains to outputs (k, outputs) of responses (k, outputs, inputs), over those of the full model."""
+    size = np.linalg.norm(full, axis=2)
+    return np.linalg.norm(few - full, axis=2) / np.where(size > 0.0, size, np.inf)
+
+
+def _relative(few: Array, full: Array) -> float:
+    """Largest relative error of the lowest frequencies above zero; NaN where the few states have too few."""
+    free = int(np.sum(full == 0.0))
+    chosen = slice(free, free + _COMPARED)
+    if few[chosen].size < full[chosen].size or not full[chosen].size:
+        return np.nan
+    return float(np.max(np.abs(few[chosen] / full[chosen] - 1.0)))
+
+
+def along_summary(data: xr.Dataset, mode: str) -> dict[str, Any]:
+    """Errors along a path of reduced models of a mode as plain numbers: by static shapes and basis."""
+    error = float(data.attrs["accuracy"])
+
+    def of(run: xr.Dataset) -> dict[str, Any]:
+        frequency = run["along_frequency_error"].max("place")
+        return {
+            "largest_error": float(run["along_error"].max()),
+            **{f"frequency_error_{name}": finite_or_none(float(frequency.sel(holding=name))) for name in HOLDINGS},
+            "within": within(run["along_error"].values, data["place"].values, error),
+        }
+
+    bases = {static: {str(name): data.sel(mode=mode, static=static, basis=name) for name in data["basis"].values}
+             for static in STATIC}  # fmt: skip
+    return {static: {name: of(run) for name, run in runs.items() if run["along_error"].notnull().all()}
+            for static, runs in bases.items()}  # fmt: skip
+
+
+def within(errors: Array, places: Array, error: float) -> tuple[float, float] | None:
+    """From which place to which errors (k,) are not above one: the longest such stretch; None without any."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], errors <= error, [False]]).astype(int)))
+    if not edges.size:
+        return None
+    firsts, lasts = edges[::2], edges[1::2] - 1
+    longest = int(np.argmax(places[lasts] - places[firsts]))
+    return float(places[firsts[longest]]), float(places[lasts[longest]])
