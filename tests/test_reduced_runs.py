@@ -175,6 +175,17 @@ def test_more_coordinates_are_nearer_and_too_few_are_said(task, full):
     assert errors[0] > 0.1 > errors[1] > 3.0 * errors[2]
 
 
+def test_linear_models_and_statics_take_such_a_mechanism(arm, task):
+    few = pf.reduced_mechanism(task, 16, modes=MODES)
+    model, exact = (pf.linearise(each, mode="+-+-") for each in (few, arm))
+    assert (len(model.states), len(exact.states)) == (36, 184)
+    assert model.held_frequencies()[:2] == pytest.approx(exact.held_frequencies()[:2], rel=2e-5)
+    assert model.frequencies[2:4] == pytest.approx(exact.frequencies[2:4], rel=1e-4)
+    load = {"loads": {"link4.C.y": 10.0}, "steps": 1}
+    travel, right = (pf.statics(each, **load).travel("link4.C.y")[-1] for each in (few, arm))
+    assert travel == pytest.approx(right, rel=1e-3)
+
+
 def test_beams_of_the_paper_too(tmp_path):
     model = pf.load("raparm_i")
     task = pf.plan(model, "square", duration=0.7)

@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import LineariseRequest
-from paraflex.cli.ending import say_where, tell
+from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, moments_along
 from paraflex.cli.linearise_tables import print_linear
-from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import flagged
-from paraflex.folders import LINEAR_MODELS, ResultsFolder
+from paraflex.folders import LINEAR_MODELS
 from paraflex.results.linear_data import linear_dataset
 from paraflex.results.linear_summary import linear_summary
+
+if TYPE_CHECKING:
+    from paraflex.report import Page
 
 
 def linearise_command(request: LineariseRequest) -> int:
     """Linearise in every mode, print poles and zeros, and write files where that is asked for; the exit code."""
-    began = time.perf_counter()
     make = asked_models(request, "linearise")
-    if request.out is None:
-        _tell(_data(make(), request), request)
-        return COMPLETE
-    with hold_results(request.out, LINEAR_MODELS, force=request.force) as folder:
-        data = _data(make(), request)
-        _tell(data, request)
-        _write(data, folder, request)
-    if not request.json:
-        say_where(began, "numbers, figures", folder.path, report=request.report)
+    _COMMAND.run(request, lambda: _data(make(), request))
     return COMPLETE
 
 
@@ -42,19 +33,10 @@ def _data(found: AskedModels, request: LineariseRequest) -> xr.Dataset:
         return linear_dataset(found.models, along=along, parameters=found.parameters)
 
 
-def _tell(data: xr.Dataset, request: LineariseRequest) -> None:
-    tell(linear_summary(data), lambda out: print_linear(out, data), as_json=request.json, doubts=())
-
-
-def _write(data: xr.Dataset, folder: ResultsFolder, request: LineariseRequest) -> None:
-    """Numbers first, then what is drawn of them."""
-    from paraflex.cli.writing import write_drawn, write_numbers
-
-    write_numbers(data, linear_summary(data), folder, ("linear.nc", "linear.json"))
-    write_drawn(data, folder, _page(data) if request.report else None)
-
-
-def _page(data: xr.Dataset) -> Callable[[], Any]:
+def _page(data: xr.Dataset) -> Page:
     from paraflex.report.linear import linear_page
 
-    return lambda: linear_page(data)
+    return linear_page(data)
+
+
+_COMMAND = DatasetCommand(LINEAR_MODELS, ("linear.nc", "linear.json"), linear_summary, print_linear, _page, doubts=())

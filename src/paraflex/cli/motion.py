@@ -36,8 +36,9 @@ from paraflex.folders import RUN, ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion, state_at
+from paraflex.reduction import size_of
 from paraflex.results import motion_dataset, motion_summary
-from paraflex.results.reduced_runs import Size, beside_full
+from paraflex.results.reduced_runs import beside_full
 
 # Singular positions listed one by one.
 _MOST_TIMES = 4
@@ -106,7 +107,7 @@ def _run_held(
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     if run is not full:
-        sizes = [Size.of(one.system, State(0.0, one.solution.q[0], one.solution.v[0])) for one in (run, full)]
+        sizes = [size_of(one.system, State(0.0, one.solution.q[0], one.solution.v[0])) for one in (run, full)]
         data = beside_full(data, motion_dataset(full, options=options), *sizes)
     summary = motion_summary(data)
     write_numbers(data, summary, folder)

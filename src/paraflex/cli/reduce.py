@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import time
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import ReduceRequest
-from paraflex.cli.ending import say_where, tell
+from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, pose_asked
 from paraflex.cli.reduce_tables import print_reduction
-from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import flagged
 from paraflex.errors import InputError
 from paraflex.folders import REDUCED_MODELS
@@ -19,25 +18,16 @@ from paraflex.linear import PosesAlong, poses_along
 from paraflex.linear.reduced import ReductionMethod
 from paraflex.results.reduction_data import reduction_dataset, reduction_summary
 
+if TYPE_CHECKING:
+    from paraflex.report import Page
+
 _METHODS = (ReductionMethod.CRAIG_BAMPTON.value, ReductionMethod.MODAL.value)
 
 
 def reduce_command(request: ReduceRequest) -> int:
     """Reduce the models of every mode, print what is left of them, write files where that is asked for; exit code."""
-    began = time.perf_counter()
     make = asked_models(request, "reduce")
-    if request.out is None:
-        _tell(_data(make(), request), request)
-        return COMPLETE
-    with hold_results(request.out, REDUCED_MODELS, force=request.force) as folder:
-        data = _data(make(), request)
-        _tell(data, request)
-        from paraflex.cli.writing import write_drawn, write_numbers
-
-        write_numbers(data, reduction_summary(data), folder, ("reduced.nc", "reduced.json"))
-        write_drawn(data, folder)
-    if not request.json:
-        say_where(began, "numbers, figures", folder.path)
+    _COMMAND.run(request, lambda: _data(make(), request))
     return COMPLETE
 
 
@@ -67,5 +57,12 @@ def _along(found: AskedModels, request: ReduceRequest) -> list[PosesAlong]:
         raise (error.at("--along") if error.field == "count" else error) from None
 
 
-def _tell(data: xr.Dataset, request: ReduceRequest) -> None:
-    tell(reduction_summary(data), lambda out: print_reduction(out, data), as_json=request.json, doubts=())
+def _page(data: xr.Dataset) -> Page:
+    from paraflex.report.reduction import reduction_page
+
+    return reduction_page(data)
+
+
+_COMMAND = DatasetCommand(
+    REDUCED_MODELS, ("reduced.nc", "reduced.json"), reduction_summary, print_reduction, _page, doubts=()
+)

@@ -10,9 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 from rich.console import Console
 
-from paraflex.cli.tables import plain_table, print_titled
+from paraflex.cli.tables import number, plain_table, print_titled
 from paraflex.results.linear_data import HOLDINGS
-from paraflex.results.reduction_along import OWN, STATIC, along_summary
+from paraflex.results.reduction_along import along_heads, along_rows
 from paraflex.results.reduction_data import FULL, percent_off
 
 Array = NDArray[np.float64]
@@ -44,36 +44,11 @@ def print_reduction(out: Console, data: xr.Dataset) -> None:
         bound = float(data["bound"].sel(mode=mode, reduction=name))
         if not math.isnan(bound):
             out.print(f"mode {mode}, {name}: the gain of the error is nowhere above {bound:.3g}", soft_wrap=True)
-    if "along_error" in data:
-        title = (f"Bases of other poses, {attrs['along_method']}: errors at {data.sizes['place']} poses along"
-                 f" {float(data['place'][-1]):.3g} {attrs['place_unit']} up to {until:g} Hz")  # fmt: skip
-        table = plain_table("mode", "static shapes", "vibrations", numbers=["largest", *HOLDINGS, _within(data)],
-                            rows=_along_rows(data))  # fmt: skip
-        print_titled(out, title, table)
-
-
-def _within(data: xr.Dataset) -> str:
-    return f"{100.0 * float(data.attrs['accuracy']):.3g} % at [{data.attrs['place_unit']}]"
-
-
-def _along_rows(data: xr.Dataset) -> Iterator[list[str]]:
-    """Errors of responses and frequencies, and where the former are small enough."""
-    places = data["place"].values
-    for mode in map(str, data["mode"].values):
-        for static, runs in along_summary(data, mode).items():
-            for name, found in runs.items():
-                if name == OWN and static != STATIC[0]:
-                    continue
-                shapes = OWN if static == STATIC[0] else name
-                errors = [found["largest_error"], *(found[f"frequency_error_{holding}"] for holding in HOLDINGS)]
-                yield [mode, shapes, name, *("" if one is None else f"{one:.1e}" for one in errors),
-                       _stretch(found["within"], places)]  # fmt: skip
-
-
-def _stretch(at: tuple[float, float] | None, places: Array) -> str:
-    if at is None:
-        return "nowhere"
-    return "all" if at == (places[0], places[-1]) else f"{at[0]:.2g}-{at[1]:.2g}"
+    if rows := list(along_rows(data)):
+        title, stretch = along_heads(data)
+        cells = ([*one[:3], *(number(error, ".1e") for error in one[3:6]), one.within] for one in rows)
+        heads = ["largest", *HOLDINGS, stretch]
+        print_titled(out, title, plain_table("mode", "static shapes", "vibrations", numbers=heads, rows=cells))
 
 
 def _states(value: float) -> str:

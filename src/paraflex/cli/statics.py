@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from paraflex.cli import COMPLETE, TROUBLE
 from paraflex.cli.commands.models import StaticsRequest
-from paraflex.cli.ending import say_where, tell
-from paraflex.cli.replacing import hold_results
+from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.request import asked_model, of_assembly
 from paraflex.cli.statics_tables import print_statics
 from paraflex.equilibria import Statics, StaticsDefaults, statics
@@ -22,6 +20,9 @@ from paraflex.files import Model
 from paraflex.files.fields import number_in
 from paraflex.folders import EQUILIBRIA
 from paraflex.results.statics_data import statics_dataset, statics_summary
+
+if TYPE_CHECKING:
+    from paraflex.report import Page
 
 # The options that arguments of `statics` come from.
 _FLAGS = {
@@ -33,36 +34,18 @@ _NONE = "none"
 
 def statics_command(request: StaticsRequest) -> int:
     """Find the equilibria, print them, and write files where that is asked for; the exit code."""
-    began = time.perf_counter()
     model = asked_model(request.model)
-    if request.out is None:
-        data = _data(model, request)
-        _tell(data, request)
-        return _code(data)
-    with hold_results(request.out, EQUILIBRIA, force=request.force) as folder:
-        data = _data(model, request)
-        _tell(data, request)
-        from paraflex.cli.writing import write_drawn, write_numbers
-
-        write_numbers(data, statics_summary(data), folder, ("statics.nc", "statics.json"))
-        write_drawn(data, folder, _page(data) if request.report else None)
-    if not request.json:
-        say_where(began, "numbers, figures", folder.path, report=request.report)
-    return _code(data)
-
-
-def _page(data: xr.Dataset) -> Callable[[], Any]:
-    from paraflex.report.statics import statics_page
-
-    return lambda: statics_page(data)
-
-
-def _code(data: xr.Dataset) -> int:
+    data = _COMMAND.run(request, lambda: _data(model, request))
     return COMPLETE if data["status"].item() == "complete" else TROUBLE
 
 
-def _tell(data: xr.Dataset, request: StaticsRequest) -> None:
-    tell(statics_summary(data), lambda out: print_statics(out, data), as_json=request.json)
+def _page(data: xr.Dataset) -> Page:
+    from paraflex.report.statics import statics_page
+
+    return statics_page(data)
+
+
+_COMMAND = DatasetCommand(EQUILIBRIA, ("statics.nc", "statics.json"), statics_summary, print_statics, _page)
 
 
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:

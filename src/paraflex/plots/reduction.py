@@ -18,7 +18,7 @@ from paraflex.plots.selection import default_mode, names_of, place_of
 from paraflex.plots.style import BLACK, COLOURS, DASHES
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS
-from paraflex.results.reduction_along import OWN, STATIC
+from paraflex.results.reduction_along import OWN, STATIC, basis_name
 from paraflex.results.reduction_data import FULL
 
 # Decades of a gain that are shown below its largest.
@@ -136,10 +136,9 @@ def _bases_looks(data: xr.Dataset) -> dict[tuple[str, str], dict[str, Any]]:
     coloured = [colour for colour in COLOURS if colour != BLACK]
     for k, name in enumerate(names_of(data, "basis")):
         for static in STATIC[: 1 if name == OWN else None]:
-            own = static == STATIC[0]
-            kept = "" if name == OWN else "vibrations " if own else "all shapes "
+            dash = "-" if static == STATIC[0] else "--"
             colour = BLACK if name == OWN else coloured[(k - 1) % len(coloured)]
-            looks[static, name] = {"label": f"{kept}{name}", "color": colour, "linestyle": "-" if own else "--"}
+            looks[static, name] = {"label": basis_name(static, name), "color": colour, "linestyle": dash}
     return looks
 
 

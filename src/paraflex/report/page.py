@@ -287,6 +287,7 @@ def render(page: Page) -> str:
         tables=_sections(page.tables),
         more=_sections(page.more),
         no_film=escape(page.no_film),
+        charts=_of_charts(page),
         no_charts="" if page.panels else "hidden",
         no_survey="" if page.survey else "hidden",
         version=escape(version("paraflex")),
@@ -386,13 +387,18 @@ def _anchor(heading: str) -> str:
     return "part-" + re.sub(r"\W+", "-", heading.lower()).strip("-")
 
 
+def _of_charts(page: Page) -> str:
+    """Name of the part with what moves and what is drawn over time."""
+    return "Animation and charts" if page.film or page.no_film else "Charts"
+
+
 def _contents(page: Page) -> str:
     """Links to the parts of the page, in their order."""
     parts = [
         *((heading, _anchor(heading)) for heading, _ in page.summary),
         *([("All designs", "survey")] if page.survey else []),
         *((heading, _anchor(heading)) for heading, _ in page.tables),
-        *([("Animation and charts", "moving")] if page.panels else []),
+        *([(_of_charts(page), "moving")] if page.panels else []),
         *((heading, _anchor(heading)) for heading, _ in page.more),
         *([(_ORIGIN, _anchor(_ORIGIN))] if page.facts or page.command else []),
     ]

@@ -8,7 +8,7 @@ from paraflex.plots.labels import display_unit
 from paraflex.plots.selection import names_of
 from paraflex.report.text import number, table
 from paraflex.results.following import HEADLINE, ErrorSpan
-from paraflex.results.reduced_runs import DISTANCE, FULL, Size
+from paraflex.results.reduced_runs import COUNTS, DISTANCE, FULL
 
 
 def reduction_tables(data: xr.Dataset) -> list[tuple[str, str]]:
@@ -30,7 +30,7 @@ def reduction_tables(data: xr.Dataset) -> list[tuple[str, str]]:
     columns += [unit.factor * runs[DISTANCE].values, runs["wall_time"].values / runs[f"{FULL}wall_time"].values]
     names = names_of(runs, "mode") if along else ["run"]
     rows = [(name, [number(float(cell)) for cell in cells]) for name, *cells in zip(names, *columns, strict=True)]
-    kept, whole = ({name: data.attrs[prefix + name] for name in Size._fields} for prefix in ("", FULL))
+    kept, whole = ({name: data.attrs[prefix + name] for name in COUNTS} for prefix in ("", FULL))
     whose = "the end-effector" if along else "a named point"
     note = (
         f"{kept['flexible_coordinates']} of {whole['flexible_coordinates']} flexible coordinates, {kept['states']} of "

@@ -12,11 +12,12 @@ from paraflex.arguments import checked_arguments
 from paraflex.plots.labels import text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.curves import look
-from paraflex.report.page import PLAIN_LOOK, Chart, Curve, Page, Panel
+from paraflex.report.page import PLAIN_LOOK, Chart, Curve, Look, Page, Panel
 from paraflex.report.text import NO_VALUE, number, table
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS
 from paraflex.results.linear_summary import HELD_WORDS
+from paraflex.results.reduction_along import OWN, STATIC, along_heads, along_rows, basis_name
 from paraflex.results.reduction_data import FULL, percent_off
 
 # Gains and errors below this part of the largest are not drawn.
@@ -46,8 +47,12 @@ def reduction_page(data: xr.Dataset) -> Page:
             (needed, _of_outputs(data, "states", needed, _states)),
             (worst, _of_outputs(data, "largest_error", worst, number)),
             ("Frequencies", _frequencies(data)),
+            *_along_tables(data),
         ],
-        panels=[Panel("Responses and errors", [*_gain_charts(data), *_error_charts(data)])],
+        panels=[
+            Panel("Responses and errors", [*_gain_charts(data), *_error_charts(data)]),
+            *([Panel("Bases of other poses", [_along_chart(data)])] if "along_error" in data else []),
+        ],
     )  # fmt: skip
 
 
@@ -124,6 +129,36 @@ def _error_charts(data: xr.Dataset) -> Iterator[Chart]:
     ]  # fmt: skip
     yield Chart("errors", "Error to the worst output", "largest error over gain", curves, **_over(modes),
                 note=f"Wanted: {float(data.attrs['accuracy']):g} up to {float(data.attrs['until']):g} Hz.")  # fmt: skip
+
+
+def _along_tables(data: xr.Dataset) -> list[tuple[str, str]]:
+    """Errors along a path with bases of each pose, of one and between several; nothing where no path was asked for."""
+    rows = list(along_rows(data))
+    if not rows:
+        return []
+    title, stretch = along_heads(data)
+    heads = [("mode", ""), ("static shapes", ""), ("vibrations", ""), ("responses", "largest error"),
+             *(("frequencies", HELD_WORDS[holding]) for holding in HOLDINGS), ("within", stretch)]  # fmt: skip
+    cells = [(one.mode, [one.static_shapes, one.vibrations, *(NO_VALUE if error is None else number(error)
+                                                              for error in one[3:6]), one.within])
+             for one in rows]  # fmt: skip
+    return [("Bases of other poses", table(heads, cells, caption=title, note=f"{title}."))]
+
+
+def _along_chart(data: xr.Dataset) -> Chart:
+    """Largest error of responses over the way along the path, a line for each basis."""
+    modes, places = names_of(data, "mode"), data["place"].values
+    curves = []
+    for m, mode in enumerate(modes):
+        for b, name in enumerate(names_of(data, "basis")):
+            for static in names_of(data, "static")[: 1 if name == OWN else None]:
+                errors = data["along_error"].sel(mode=mode, static=static, basis=name).values
+                if np.isfinite(errors).all():
+                    line = PLAIN_LOOK if name == OWN else Look(look(b).colour, STATIC.index(static))
+                    curves.append(Curve(basis_name(static, name), errors, places, line, choice=m))
+    unit = data.attrs["place_unit"]
+    return Chart("along", "Error with bases of other poses", "largest error over gain", curves,
+                 **_over(modes) | {"x": f"along the path [{unit}]", "log_x": False})  # fmt: skip
 
 
 def _over(modes: list[str]) -> dict[str, Any]:

@@ -3,36 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from paraflex.dynamics import State, System
-from paraflex.dynamics.rank import dependence
 from paraflex.findings import Finding
 from paraflex.results.doubts import MODE, keep_findings, verdict_of
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.numbers import finite_or_none
 
+if TYPE_CHECKING:
+    # It needs the kernels, which who reads results does without.
+    from paraflex.reduction import Size
+
 # The variable by which such a dataset is known, and the prefix of numbers of the full runs.
 DISTANCE, FULL = "reduction_distance", "full_"
+# Attributes with what is kept and, with the prefix, what there is.
+COUNTS = ("flexible_coordinates", "states")
 # Numbers of full runs that are kept: tracking errors along a path, and what they cost.
 _NUMBERS = (*HEADLINE.values(), "wall_time", "steps")
 # A distance beyond this part of what flexibility does in the full run is a finding.
 _FAR = 0.1
-
-
-class Size(NamedTuple):
-    """How many flexible coordinates a system has, and how many states its motion at a pose."""
-
-    flexible_coordinates: int
-    states: int
-
-    @classmethod
-    def of(cls, system: System, state: State) -> Size:
-        """That of a system at a state."""
-        return cls(system.n_flexible, 2 * (system.n - dependence(system, state.q).rank))
 
 
 def beside_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> xr.Dataset:
@@ -87,5 +79,5 @@ def reduction_figures(data: xr.Dataset) -> dict[str, Any]:
     if DISTANCE not in data:
         return {}
     numbers = {name: finite_or_none(data[name].item()) for name in data if str(name).startswith(FULL)}
-    counts = {name: int(data.attrs[name]) for size in Size._fields for name in (size, FULL + size)}
+    counts = {name: int(data.attrs[name]) for each in COUNTS for name in (each, FULL + each)}
     return {"reduction": {"distance": finite_or_none(data[DISTANCE].item()), **numbers, **counts}}

@@ -178,6 +178,57 @@ def along_summary(data: xr.Dataset, mode: str) -> dict[str, Any]:
             for static, runs in bases.items()}  # fmt: skip
 
 
+class AlongRow(NamedTuple):
+    """Errors along a path of the reduced models of a mode with bases of some poses.
+
+    `within` is the longest stretch of the path where responses are as accurate as was asked for.
+    """
+
+    mode: str
+    static_shapes: str
+    vibrations: str
+    response: float
+    free: float | None
+    held: float | None
+    within: str
+
+
+def along_rows(data: xr.Dataset) -> Iterator[AlongRow]:
+    """Rows of a table of all bases; none where no path was asked for."""
+    places = data["place"].values if "along_error" in data else np.zeros(0)
+    for mode in map(str, data["mode"].values) if places.size else ():
+        for static, runs in along_summary(data, mode).items():
+            for name, found in runs.items():
+                if name == OWN and static != STATIC[0]:
+                    continue
+                shapes = OWN if static == STATIC[0] else name
+                free, held = (found[f"frequency_error_{holding}"] for holding in HOLDINGS)
+                stretch = _stretch(found["within"], places)
+                yield AlongRow(mode, shapes, name, found["largest_error"], free, held, stretch)
+
+
+def _stretch(at: tuple[float, float] | None, places: Array) -> str:
+    if at is None:
+        return "nowhere"
+    return "all" if at == (places[0], places[-1]) else f"{at[0]:.2g}-{at[1]:.2g}"
+
+
+def along_heads(data: xr.Dataset) -> tuple[str, str]:
+    """Title of that table, and the head of its last column."""
+    attrs, unit = data.attrs, data.attrs["place_unit"]
+    title = (
+        f"Bases of other poses, {attrs['along_method']}: errors at {data.sizes['place']} poses along "
+        f"{float(data['place'][-1]):.3g} {unit} up to {float(attrs['until']):g} Hz"
+    )
+    return title, f"{100.0 * float(attrs['accuracy']):.3g} % at [{unit}]"
+
+
+def basis_name(static: str, name: str) -> str:
+    """What a line of a figure is called: which shapes are those of which poses."""
+    kept = "" if name == OWN else "vibrations " if static == STATIC[0] else "all shapes "
+    return f"{kept}{name}"
+
+
 def within(errors: Array, places: Array, error: float) -> tuple[float, float] | None:
     """From which place to which errors (k,) are not above one: the longest such stretch; None without any."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], errors <= error, [False]]).astype(int)))

@@ -228,7 +228,7 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
 def percent_off(value: float, exact: float) -> str:
     """How far a number is off another one, in percent; rounding is none."""
     part = value / exact - 1.0
-    return "0 %" if abs(part) < _ROUNDING else f"{100.0 * part:+.2g} %"
+    return "0 %" if abs(part) < _ROUNDING else f"{100.0 * part:+{'.2g' if abs(part) < 1.0 else '.0f'}} %"
 
 
 def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:

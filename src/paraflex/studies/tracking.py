@@ -20,9 +20,10 @@ from paraflex.findings import Finding
 from paraflex.folders import RUN
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
+from paraflex.reduction import size_of
 from paraflex.results import summary, tracking_dataset
 from paraflex.results.following import ErrorSpan
-from paraflex.results.reduced_runs import Size, beside_full
+from paraflex.results.reduced_runs import beside_full
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 
@@ -201,7 +202,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
                 runs, options=self.options, parameters=self.parameters, error=self.error, findings=self.findings
             )
         if data is not None and self.full is not None and whole:
-            sizes = [Size.of(task.system, task.start) for task in (self.task, self.full)]
+            sizes = [size_of(task.system, task.start) for task in (self.task, self.full)]
             data = beside_full(data, tracking_dataset(whole, options=self.options), *sizes)
         return StudyResult(data, failed, interrupted)
 

@@ -148,7 +148,7 @@ class ReduceRequest(LinearRequest):
         Option(
             "--method",
             metavar="NAME",
-            help="craig-bampton, modal or balanced; repeatable. Default: the first two. Balanced needs damping.",
+            help="craig-bampton, rubin, modal or balanced (of damped models); repeatable. Default: first and third.",
         ),
     ] = field(default_factory=list)
     until: Annotated[float, Option(metavar="HZ", help="Highest frequency [Hz].")] = 40.0
@@ -163,9 +163,10 @@ class ReduceRequest(LinearRequest):
     ] = None
     out: Annotated[
         str | None,
-        Option("--out", "--output", metavar="DIR", help="Folder for reduced.nc, reduced.json and figures."),
+        Option("--out", "--output", metavar="DIR", help="Folder for reduced.nc, reduced.json, figures and report."),
     ] = None
     force: ReplaceOption = False
+    report: ReportOption = True
     json: Json = False
 
 
