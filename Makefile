@@ -24,8 +24,9 @@ types: $(VENV)/.dev
 imports: $(VENV)/.dev
 	$(BIN)/lint-imports
 
+# One thread for small matrices, as commands have it: of several processes with several threads each waits for the others.
 tests: $(VENV)/.dev $(VENV)/.kernels
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 # Which lines no test reaches; a third slower, so not a part of the test.
 coverage: $(VENV)/.dev $(VENV)/.kernels

@@ -191,6 +191,8 @@ class Dask(Engine):
     def close(self, *, abandon: bool = False) -> None:
         """See `Engine`; workers of our own that are told to stop need seconds for it, which nobody waits for."""
         if abandon and self._cluster is not None:
+            # Its end takes back that its logs are silent, while connections still break off.
+            logging.getLogger("distributed").setLevel(logging.CRITICAL)
             threading.Thread(target=self._let_go, args=[True], daemon=True).start()
         else:
             self._let_go(abandon)
