@@ -47,7 +47,8 @@ class PlannedDeflections:
 
     def __init__(self, task: TrackingTask) -> None:
         motion = task.motion
-        self.task, self.samples = task, _instants(motion.t, task.path.duration)
+        self.task: TrackingTask = task
+        self.samples: list[int] = _instants(motion.t, task.path.duration)
         states = [undeformed_at(task.system, motion, k) for k in self.samples]
         self._q, self._v, self._a = (np.array(part) for part in zip(*states, strict=True))
         self._structures = [_Structure(task.system, pose) for pose in self._q]

@@ -208,7 +208,7 @@ def _peaks(values: Trace) -> Trace:
 VALIDITY = "validity"
 # And of statics: those of equilibria that no mechanism stays in.
 UNSTABLE = "unstable_steps"
-ALWAYS = {PATH: (VALIDITY,), MOTION: (VALIDITY,), STATICS: (VALIDITY, UNSTABLE)}
+ALWAYS: dict[str, tuple[str, ...]] = {PATH: (VALIDITY,), MOTION: (VALIDITY,), STATICS: (VALIDITY, UNSTABLE)}
 _ANY = (PATH, MOTION, STATICS)
 _AWAY = "distance of the end-effector from its desired place"
 
