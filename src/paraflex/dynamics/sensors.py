@@ -82,6 +82,31 @@ class _Local(NamedTuple):
         return MotionSamples(*(values[:, own] for values, own in zip(given, self.columns, strict=True)))
 
 
+class SensorReader:
+    """Readings of some sensors of a system, for one call after another.
+
+    Parameters
+    ----------
+    system : System
+    sensors : sequence of Sensor, optional
+        By default those of the mechanism.
+
+    Raises
+    ------
+    InputError
+        A sensor of what the mechanism does not have.
+    """
+
+    def __init__(self, system: System, sensors: Sequence[Sensor] | None = None) -> None:
+        self._locals: list[_Local] = _locals(system, sensors)
+
+    def __call__(self, q: Numbers, v: Numbers, a: Numbers, multipliers: Numbers, torques: Numbers) -> Numbers:
+        """See `sensor_readings`."""
+        given = MotionSamples(q, v, a, multipliers, torques)
+        readings = [each.read(each.taken(given)) for each in self._locals]
+        return np.stack(readings, axis=1) if readings else np.zeros((len(q), 0))
+
+
 def sensor_readings(
     system: System,
     q: Numbers,
@@ -108,9 +133,7 @@ def sensor_readings(
     InputError
         A sensor of what the mechanism does not have.
     """
-    given = MotionSamples(q, v, a, multipliers, torques)
-    readings = [each.read(each.taken(given)) for each in _locals(system, sensors)]
-    return np.stack(readings, axis=1) if readings else np.zeros((len(q), 0))
+    return SensorReader(system, sensors)(q, v, a, multipliers, torques)
 
 
 def sensor_rows(

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, inputs_of
+from paraflex.errors import InputError
 from paraflex.integrators.method import NativeMethod, Treatment
 from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, MEMORY, Figures, Instant, Problem, empty_samples
+from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, MEMORY, Figures, Instant, Problem, Run, empty_samples
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Workspace
@@ -35,6 +36,7 @@ from paraflex.kernel.run_state import (
     SAMPLE,
     STEP,
     STEPS,
+    STOP,
     TIME,
     WEIGHT_0,
     WORK,
@@ -117,9 +119,9 @@ class NativeRun:
         jumps, now = self.problem.jumps, self.state.clock[TIME]
         # The last call may have ended there; until now the run had the values before the jump.
         if np.any(jumps == now):
-            self._resume()
-        ahead = jumps[jumps > now]
+            self.resume()
         stops = self.problem.stops
+        ahead = jumps[(jumps > now) & (jumps < stops[-1])]
         if ahead.size:
             stops = stops[stops <= ahead[0]]
         given = (self.problem.system.packed, self.problem.signals_from(now))
@@ -154,12 +156,30 @@ class NativeRun:
             passages=state.passages[:, : state.counts[PASSAGES]],
         )
 
-    def _resume(self) -> None:
+    def resume(self) -> None:
         """A first stage after a jump; energies and work continue."""
         kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
         arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
         start(*arguments, self.state, self.workspace, empty_samples(np.zeros(0), self.problem.system))
         self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
+
+
+def until(run: Run, time: float) -> Run:
+    """The same run, whose steps end at a time before its end, where it pauses.
+
+    Raises
+    ------
+    InputError
+        It is by another program's solver, which steps on over any time that it was not told at the start.
+    """
+    if not isinstance(run, NativeRun):
+        raise InputError(
+            "goes on from time to time with own methods only", field="method",
+            remedy="choose one of paraflex's own, say esdirk5 or tr-bdf2",
+        )  # fmt: skip
+    before = run.problem.stops[run.problem.stops < time]
+    run.state.counts[STOP] = 0
+    return replace(run, problem=replace(run.problem, stops=np.append(before, time)))
 
 
 def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:

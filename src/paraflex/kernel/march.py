@@ -185,6 +185,8 @@ def start(system, signals, tableau, controls, march, work, out):
     t = march.clock[TIME]
     first_stage(system, signals, t, controls, march, work)
     a, lam = march.stage_a[1, 0], march.stage_lam[0]
+    # No starting guess reaches across a jump: what was before does not count as another time.
+    fill(march.stage_t[0], t)
     march.stage_t[1, 0] = t
     copy(march.q, march.stage_q[0])
     copy(march.v, march.stage_v[0])
