@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -127,6 +129,17 @@ def integrate(
     return integration.solution()
 
 
+class Kept(NamedTuple):
+    """State of an integration: the arrays of its run, and what is noted beside them."""
+
+    arrays: tuple[np.ndarray, ...]
+    more: dict[str, Any]
+
+
+# What an integration notes beside the arrays of its run.
+_KEPT = ("status", "message", "_code", "_drifts", "_broken", "_crossing", "_functions")
+
+
 class Integration:
     """An integration in progress, marched to one time after another: see `integrate` for what it is made of.
 
@@ -201,6 +214,20 @@ class Integration:
     def interrupt(self) -> None:
         """Keep what is there, as the user has it."""
         self.status, self.message = "interrupted", f"interrupted at t = {self.time:.6g} s"
+
+    def saved(self) -> Kept:
+        """All that it goes on from, to the bit; of own methods only."""
+        more = {name: getattr(self, name) for name in _KEPT}
+        return Kept(native.arrays_of(self.run), more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
+
+    def restore(self, kept: Kept) -> None:
+        """Go back to what `saved` gave, of this integration or of one made of the same."""
+        # Into the arrays that are there: how they lie in memory must not change, as rounding may depend on it.
+        for own, array in zip(native.arrays_of(self.run, copies=False), kept.arrays, strict=True):
+            own[...] = array
+        for name, value in kept.more.items():
+            setattr(self, name, value)
+        self._ends, self._pace = copy.copy(self._ends), self._pace.copy()
 
     @property
     def goes_on(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -173,13 +174,39 @@ def until(run: Run, time: float) -> Run:
         It is by another program's solver, which steps on over any time that it was not told at the start.
     """
     if not isinstance(run, NativeRun):
-        raise InputError(
-            "goes on from time to time with own methods only", field="method",
-            remedy="choose one of paraflex's own, say esdirk5 or tr-bdf2",
-        )  # fmt: skip
+        raise _not_in_parts()
     before = run.problem.stops[run.problem.stops < time]
     run.state.counts[STOP] = 0
     return replace(run, problem=replace(run.problem, stops=np.append(before, time)))
+
+
+def arrays_of(run: Run, *, copies: bool = True) -> tuple[np.ndarray, ...]:
+    """All arrays that a run of an own method goes on from, or copies of them; its samples among them.
+
+    Raises
+    ------
+    InputError
+        See `until`.
+    """
+    if not isinstance(run, NativeRun):
+        raise _not_in_parts()
+    found = tuple(_arrays((run.state, run.workspace, run.slow, run.samples)))
+    return tuple(one.copy() for one in found) if copies else found
+
+
+def _arrays(given: object) -> Iterator[np.ndarray]:
+    if isinstance(given, np.ndarray):
+        yield given
+    elif isinstance(given, tuple):
+        for one in given:
+            yield from _arrays(one)
+
+
+def _not_in_parts() -> InputError:
+    return InputError(
+        "goes on from time to time with own methods only", field="method",
+        remedy="choose one of paraflex's own, say esdirk5 or tr-bdf2",
+    )  # fmt: skip
 
 
 def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:

@@ -234,10 +234,10 @@ def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], p
     for point in points:
         known_point(mechanism, point, "forces")
     # Of beams in several frames the sensors are on the parts.
-    return Ports(mode, points, tuple(prescribed), _sensors(in_frames(mechanism)))
+    return Ports(mode, points, tuple(prescribed), measured_sensors(in_frames(mechanism)))
 
 
-def _sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:
+def measured_sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:
     """An encoder of every motor's joint, the end-effector's place, then the mechanism's own sensors, each name once."""
     joints = dict.fromkeys(motor.joint for motor in mechanism.motors)
     found: list[Sensor] = [Encoder(joint, joint) for joint in joints]
