@@ -71,7 +71,8 @@ class SampledController:
         Resolution of readings, of all or by sensor: they are rounded to its multiples.
     filters : mapping of str to Filter, optional
         By sensor: cut-off frequency of a low-pass of first order [Hz], or coefficients (numerator, denominator) in
-        descending powers of s. It starts settled at the first reading; between samples readings count as straight lines.
+        descending powers of s. It starts settled at the first reading, and takes readings for straight lines between
+        samples.
     limits : float, pair or mapping of str to either, optional
         Of torques, of all or by motor: their largest magnitude, or (lowest, highest) [N m, N].
     rates : float or mapping of str to float, optional
@@ -140,7 +141,7 @@ class SampledController:
         if hasattr(self.law, "start"):
             self.law.start(plant)
 
-    def step(self, k: int, t: float, y: Array) -> Array:
+    def step(self, k: int, t: float, y: Array) -> Any:
         """See `Controller`."""
         y = np.array(y, dtype=float)
         for i, (resolution, filtered) in enumerate(zip(self._resolution, self._filters, strict=True)):
@@ -152,9 +153,13 @@ class SampledController:
         for i, reference in enumerate(self._references):
             if reference is not None:
                 errors[i] -= reference(t)
-        wanted = np.array(self.law.step(k, t, errors), dtype=float)
+        said = self.law.step(k, t, errors)
+        try:
+            wanted = np.array(said, dtype=float)
+        except (TypeError, ValueError):
+            return said  # The loop says what is wrong with it.
         if wanted.shape != self._given.shape or not np.all(np.isfinite(wanted)):
-            return wanted  # The loop says what is wrong with it.
+            return wanted
         given = np.clip(wanted, self._lowest, self._highest)
         given = np.clip(given, self._given - self._most, self._given + self._most)
         self._given = given
@@ -177,7 +182,14 @@ class DiscreteModel:
     """
 
     def __init__(
-        self, A: Array, B: Array, C: Array, D: Array, period: float | None, inputs: Sequence[str], outputs: Sequence[str]
+        self,
+        A: Array,
+        B: Array,
+        C: Array,
+        D: Array,
+        period: float | None,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
     ) -> None:
         self.A, self.B, self.C, self.D = A, B, C, D
         self.period = period
@@ -329,6 +341,6 @@ def _transfer_function(value: Any, field: str) -> tuple[Array, Array]:
             remedy="give a cut-off frequency in Hz, or coefficients (numerator, denominator) in descending powers of s",
         )  # fmt: skip
     if np.any(np.roots(denominator).real >= 0.0):
-        raise InputError("is not stable", field=field, value=value, remedy="give a denominator whose roots have negative "
-                         "real parts")  # fmt: skip
+        raise InputError("is not stable", field=field, value=value,
+                         remedy="give a denominator whose roots have negative real parts")  # fmt: skip
     return numerator, denominator

@@ -12,7 +12,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.control.chain import Record, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
-from paraflex.errors import InputError, ParaflexError
+from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 
 # Instants closer than this part of the shortest period are one.
@@ -193,8 +193,6 @@ class Loop:
         name, controller, outputs = self.names[k], self.controllers[k], self._plants[k].outputs
         try:
             given = controller.step(number, t, y)
-        except ParaflexError:
-            raise
         except Exception as error:
             said = " ".join(str(error).split())
             raise LawFailure(f'controller "{name}" raised {type(error).__name__}: {said}') from error
@@ -263,7 +261,7 @@ def _names(controllers: Sequence[Controller]) -> list[str]:
     if len(set(given)) == len(given):
         return given
     twice = [name for name in given if given.count(name) > 1]
-    numbers = {name: 0 for name in twice}
+    numbers = dict.fromkeys(twice, 0)
     found = []
     for name in given:
         if name in numbers:

@@ -44,8 +44,8 @@ class Affine(NamedTuple):
 class Readings:
     """Readings of some sensors of a system, one instant after another.
 
-    Angles, their rates and strains are linear in coordinates, velocities and accelerations, but for what the turning of a
-    beam adds to its strain; others are read one by one.
+    Angles, their rates and strains are linear in coordinates, velocities and accelerations, but for what the turning of
+    a beam adds to its strain; others are read one by one.
 
     Parameters
     ----------
@@ -108,5 +108,6 @@ def _affine(system: System, sensor: Sensor) -> Affine | None:
 
 def _stacked(parts: Sequence[Affine], n: int) -> Affine:
     if not parts:
-        return Affine(np.zeros(0), *(np.zeros((0, n)) for _ in range(4)), np.zeros(0, int))
-    return Affine(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+        none = np.zeros((0, n))
+        return Affine(np.zeros(0), none, none, none, none, np.zeros(0, int))
+    return Affine(*map(np.concatenate, zip(*parts, strict=True)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -43,18 +43,19 @@ def references(given: Mapping[str, Any] | str | None, plant: Plant) -> list[Refe
 
 def _reference(given: Any, field: str) -> Reference:
     if callable(given):
-        return lambda t: float(given(t))
+        function: Callable[[float], Any] = given
+        return lambda t: float(function(t))
     if isinstance(given, int | float | np.floating) and np.isfinite(given):
-        return lambda t, value=float(given): value
+        value = float(given)
+        return lambda t: value
     raise InputError("is no reference", field=field, value=given, remedy="give a number or a function of time")
 
 
 class AtSamples:
-    """Values (k, ...) at the samples of a controller, found by their time; the last goes on."""
+    """Values (k, ...) at the samples of a controller from its start on, found by their time; the last goes on."""
 
-    def __init__(self, times: Array, values: Array) -> None:
-        self._start, self._values = float(times[0]), values
-        self._period = float(times[1] - times[0])
+    def __init__(self, plant: Plant, values: Array) -> None:
+        self._start, self._period, self._values = plant.state.time, plant.period, values
 
     def __call__(self, t: float) -> Any:
         """The value at a time [s]."""
@@ -88,15 +89,9 @@ def planned_readings(plant: Plant) -> list[AtSamples | None]:
     system = motion.system
     nothing = np.zeros((motion.t.size, system.m)), np.zeros((motion.t.size, len(system.mechanism.motors)))
     values = SensorReader(system, told)(motion.q, motion.v, motion.a, *nothing)
-    times = plant.state.time + plant.period * np.arange(motion.t.size)
-    columns = {sensor.name: AtSamples(times, values[:, k]) for k, sensor in enumerate(told)}
+    columns = {sensor.name: AtSamples(plant, values[:, k]) for k, sensor in enumerate(told)}
     return [columns.get(name) for name in plant.inputs]
 
 
 def _is_told(sensor: Sensor) -> bool:
     return isinstance(sensor, Encoder | Tachometer | PointSensor)
-
-
-def at_samples(plant: Plant, values: Sequence[Any] | Array) -> AtSamples:
-    """Values at a controller's samples from its start on, as a function of time."""
-    return AtSamples(plant.state.time + plant.period * np.arange(2), np.asarray(values))

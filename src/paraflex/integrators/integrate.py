@@ -176,7 +176,7 @@ class Integration:
         self.run: Run = prepare(problem, options)
         self.status: str = "complete"
         self.message: str = ""
-        self._code, self._drifts = PAUSED, False
+        self._code, self._drifts = FINISHED, False
         self._broken: Breakdown | None = None
         window = _WINDOW if own else _WINDOW_OUTSIDE
         self._pace = Pace(initial.time, float(problem.times[-1]), options.max_steps, window)
@@ -190,6 +190,10 @@ class Integration:
     def start(self) -> None:
         """Find accelerations and multipliers, and take the first sample."""
         self.run.start()
+
+    def resume(self) -> None:
+        """Find accelerations and multipliers once more, as something given has changed at this time."""
+        native.resume(self.run)
 
     def march(self, until: float | None = None, *, on_progress: Callable[[float], None] | None = None) -> None:
         """Go on to a time [s], at which a step ends, or to the end; less far to an event, or where it cannot go on.

@@ -180,6 +180,19 @@ def until(run: Run, time: float) -> Run:
     return replace(run, problem=replace(run.problem, stops=np.append(before, time)))
 
 
+def resume(run: Run) -> None:
+    """See `NativeRun.resume`.
+
+    Raises
+    ------
+    InputError
+        See `until`.
+    """
+    if not isinstance(run, NativeRun):
+        raise _not_in_parts()
+    run.resume()
+
+
 def arrays_of(run: Run, *, copies: bool = True) -> tuple[np.ndarray, ...]:
     """All arrays that a run of an own method goes on from, or copies of them; its samples among them.
 

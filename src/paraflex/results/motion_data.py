@@ -13,7 +13,6 @@ from paraflex.arguments import checked_arguments
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of
-from paraflex.mechanism import AngleLaw
 from paraflex.motion import MotionRun
 from paraflex.results.acting import load_variables
 from paraflex.results.doubts import keep_findings, verdict_of
@@ -80,7 +79,7 @@ def motion_dataset(
     data |= load_variables(mechanism, run.times)
     data |= {name: getattr(solution, name) for name in RUN_FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
-    if any(isinstance(law, AngleLaw) for law in run.torques.values()):
+    if run.in_time:
         data["applied_torque"] = (("time", "motor"), padded(torques, run.times.size))
     else:
         data["applied_torque"] = (("motor",), np.array(list(run.torques.values()), dtype=float))
