@@ -61,12 +61,13 @@ class SampledController:
     delay : float
         From a sample until its torques act [s].
     inputs : sequence of str, optional
-        Sensors. By default the law's own, or the names of a model's inputs.
+        Sensors. By default the law's own, or the names of a model's inputs, else the encoders of the mode's motors.
     outputs : sequence of str, optional
         Motors. By default the law's own, or the names of a model's outputs, else all of the mode.
     reference : mapping of str to float or callable, or "plan", optional
         What is taken off the readings of sensors: numbers, functions of time, or the values on the planned motion of
-        all that it tells: angles and travels of joints, their rates, and the end-effector's coordinates.
+        all that it tells: angles and travels of joints, their rates, and the end-effector's coordinates. By default the
+        law's own.
     quantise : float or mapping of str to float, optional
         Resolution of readings, of all or by sensor: they are rounded to its multiples.
     filters : mapping of str to Filter, optional
@@ -111,7 +112,8 @@ class SampledController:
         self.delay: float = _not_negative(delay, "delay")
         self.inputs: tuple[str, ...] = tuple(getattr(self.law, "inputs", ()) if inputs is None else inputs)
         self.outputs: tuple[str, ...] = tuple(getattr(self.law, "outputs", ()) if outputs is None else outputs)
-        self.reference: Mapping[str, Any] | str | None = reference
+        own = getattr(self.law, "reference", None)
+        self.reference: Mapping[str, Any] | str | None = own if reference is None else reference
         self.quantise: Any = quantise
         self.filters: Mapping[str, Any] = filters or {}
         self.limits: Any = limits
@@ -204,19 +206,18 @@ class DiscreteModel:
         InputError
             They differ.
         """
-        for names, count, field in ((inputs, self.B.shape[1], "inputs"), (outputs, self.C.shape[0], "outputs")):
-            if len(names) != count and (names or field == "inputs"):
-                raise InputError(f"the model has {count}", field=field, value=", ".join(names) or None,
-                                 remedy="name as many")  # fmt: skip
+        if inputs:
+            _check_count(inputs, self.B.shape[1], "inputs")
+        if outputs:
+            _check_count(outputs, self.C.shape[0], "outputs")
         if self.period is not None and abs(period - self.period) > 1e-9 * period:
             raise InputError(f"the model is sampled every {self.period:g} s", field="period", value=period,
                              remedy="leave it out")  # fmt: skip
 
     def start(self, plant: Plant) -> None:
         """Set its states to zero."""
-        if len(plant.outputs) != self.C.shape[0]:
-            raise InputError(f"the model has {self.C.shape[0]}", field="outputs", value=", ".join(plant.outputs),
-                             remedy="name as many motors")  # fmt: skip
+        _check_count(plant.inputs, self.B.shape[1], "inputs")
+        _check_count(plant.outputs, self.C.shape[0], "outputs")
         self.x = np.zeros(len(self.A))
 
     def step(self, k: int, t: float, y: Array) -> Array:
@@ -224,6 +225,11 @@ class DiscreteModel:
         torques = self.C @ self.x + self.D @ y
         self.x = self.A @ self.x + self.B @ y
         return torques
+
+
+def _check_count(names: Sequence[str], count: int, field: str) -> None:
+    if len(names) != count:
+        raise InputError(f"the model has {count}", field=field, value=", ".join(names), remedy="name as many")
 
 
 class _Function:

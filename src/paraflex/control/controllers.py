@@ -55,9 +55,10 @@ class Controller(Protocol):
     delay : float
         From a sample until its torques act [s].
     inputs : tuple of str
-        Names of sensors: encoders have those of motors' joints, the end-effector's coordinates are "x" and "y".
+        Names of sensors: encoders have those of motors' joints, the end-effector's coordinates are "x" and "y". None
+        stands for the encoders of its motors.
     outputs : tuple of str
-        Names of motors.
+        Names of motors; none for all of the mode.
 
     Its state is all that its attributes hold: a saved simulation has copies of them.
     """

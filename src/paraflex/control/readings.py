@@ -11,7 +11,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.sensors import SensorReader, sensor_rows
 from paraflex.integrators.run import Instant
-from paraflex.mechanism import Encoder, Sensor, StrainGauge, Tachometer
+from paraflex.mechanism import Encoder, JointForceSensor, Sensor, StrainGauge, Tachometer
 
 # A reading is taken for a product with constant rows where it agrees to this part at random states.
 _SAME = 1e-9
@@ -56,6 +56,8 @@ class Readings:
     ----------
     names : tuple of str
     units : tuple of str
+    of_torques : bool
+        Whether some are of torques as well.
     """
 
     def __init__(self, system: System, sensors: Sequence[Sensor]) -> None:
@@ -66,6 +68,7 @@ class Readings:
         self.linear: list[int] = [k for k, one in enumerate(found) if one is not None]
         self.affine: Affine = _stacked([one for one in found if one is not None], system.n)
         self._others: list[int] = [k for k, one in enumerate(found) if one is None]
+        self.of_torques: bool = any(isinstance(self.sensors[k], JointForceSensor) for k in self._others)
         self._reader = SensorReader(system, [self.sensors[k] for k in self._others])
 
     def __call__(self, now: Instant, torques: Array) -> Array:

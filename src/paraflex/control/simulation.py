@@ -214,10 +214,8 @@ class Simulation:
         self._apply(given)
         self._march(min(until, self.end))
         if self._integration.status == "stopped":
-            raise IntegrationError(
-                f"the run has ended: {self._integration.message}", self._moment(), self.result(),
-                "call result() for what there is, or reset()",
-            )  # fmt: skip
+            cause = f"the run has ended: {self._integration.message}"
+            raise IntegrationError(cause, None, self.result(), "call result() for what there is, or reset()")
         return self.sensors()
 
     @property
@@ -359,8 +357,9 @@ class Simulation:
         return Moment(self.time, self._integration.run.attempts)
 
     def _plant(self, controller: Controller) -> Plant:
-        inputs = tuple(controller.inputs)
         outputs = tuple(controller.outputs) or self.motors
+        encoders = (motor.joint for motor in self.mechanism.motors if motor.name in outputs)
+        inputs = tuple(controller.inputs) or tuple(dict.fromkeys(encoders))
         units = dict(zip(self.sensors_read, self._readings.units, strict=True))
         return Plant(
             self.mechanism, self.mode, self.task, self.state, inputs, tuple(units[name] for name in inputs), outputs,
@@ -384,7 +383,8 @@ class Simulation:
     def _read(self) -> Array:
         """Readings of all sensors now."""
         now = self._integration.run.now()
-        return self._readings(now, self._held + self._torques.evaluate(np.array([now.t]))[0])
+        given = self._torques.evaluate(np.array([now.t]))[0] if self._readings.of_torques else np.zeros(len(self._held))
+        return self._readings(now, self._held + given)
 
     def _apply(self, torques: Array) -> None:
         """Let torques (motors,) of all motors act from now on."""

@@ -15,7 +15,7 @@ import scipy
 
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.contacts import sliding_joints
-from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate
+from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, marker_position
 from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
 from paraflex.dynamics.points import marker_motion
 from paraflex.dynamics.sections import section_at
@@ -248,10 +248,11 @@ def _of_point(system: System, sensor: PointSensor) -> Callable[[MotionSamples], 
     frame = None if sensor.body == GROUND else system.body(sensor.body)
 
     def read(at: MotionSamples) -> Numbers:
-        motion = marker_motion(system, marker, at.q, at.v, at.a)
         if isinstance(sensor, PositionSensor):
-            vector = motion.position if frame is None else motion.position - at.q[:, frame.position]
+            vector = marker_position(system, marker, at.q)
+            vector = vector if frame is None else vector - at.q[:, frame.position]
         else:
+            motion = marker_motion(system, marker, at.q, at.v, at.a)
             vector = motion.velocity if isinstance(sensor, VelocitySensor) else motion.acceleration
         if frame is None:
             return ex * vector[:, 0] + ey * vector[:, 1]

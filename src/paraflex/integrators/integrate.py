@@ -137,7 +137,7 @@ class Kept(NamedTuple):
 
 
 # What an integration notes beside the arrays of its run.
-_KEPT = ("status", "message", "_code", "_drifts", "_broken", "_crossing", "_functions")
+_KEPT = ("status", "message", "_code", "_drifts", "_broken", "_crossing", "_functions", "_looked")
 
 
 class Integration:
@@ -178,6 +178,7 @@ class Integration:
         self.message: str = ""
         self._code, self._drifts = FINISHED, False
         self._broken: Breakdown | None = None
+        self._looked = 0
         window = _WINDOW if own else _WINDOW_OUTSIDE
         self._pace = Pace(initial.time, float(problem.times[-1]), options.max_steps, window)
         self._most = self._pace.most - (0 if begun is None else begun.steps + begun.rejected)
@@ -185,7 +186,7 @@ class Integration:
     @property
     def time(self) -> float:
         """The time reached [s]."""
-        return self.run.now().t
+        return self.run.time
 
     def start(self) -> None:
         """Find accelerations and multipliers, and take the first sample."""
@@ -261,6 +262,10 @@ class Integration:
     def _breaks(self, now: Instant) -> bool:
         """Whether something has come apart, or is too slow."""
         run, options, problem = self.run, self._options, self.run.problem
+        # Marched to one time soon after another it is looked at as seldom as in one go.
+        if self._code == FINISHED and run.attempts < self._looked + _SLICE and now.t < problem.times[-1]:
+            return False
+        self._looked = run.attempts
         limits = (run.dependent_rows, options.tolerance, options.treatment)
         bent = bent_too_far(self._system, now.q)
         drift = come_apart(self._system, problem.signals, now.t, now.q, *limits)

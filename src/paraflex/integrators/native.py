@@ -22,6 +22,7 @@ from paraflex.kernel.run_state import (
     BAUMGARTE,
     DPHI_MAX,
     ENERGY_0,
+    FACTOR_B,
     FACTORS,
     FINISHED,
     GGL,
@@ -48,6 +49,8 @@ from paraflex.kernel.run_state import (
     make_march,
 )
 
+# What a jump leaves as it is.
+_KEPT = [ENERGY_0, WEIGHT_0, FACTOR_B]
 # How long a velocity error that Newton leaves is taken to last, as a fraction of the run: it must count for more
 # than its share of one step, since it is of one sign while a factor is in use.
 _NEWTON_MEMORY = 0.02
@@ -85,6 +88,9 @@ class NativeRun:
     workspace: Workspace
     slow: Workspace
     samples: Samples
+    # For first stages after a jump, so that the factor in the workspace stays.
+    aside: Workspace
+    nothing: Samples
 
     @property
     def dependent_rows(self) -> int:
@@ -130,6 +136,11 @@ class NativeRun:
         code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
         return PAUSED if code == FINISHED and ahead.size else code
 
+    @property
+    def time(self) -> float:
+        """See `Run`."""
+        return float(self.state.clock[TIME])
+
     def now(self) -> Instant:
         """See `Run`."""
         state = self.state
@@ -159,10 +170,11 @@ class NativeRun:
 
     def resume(self) -> None:
         """A first stage after a jump; energies and work continue."""
-        kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
+        kept = self.state.clock[_KEPT]
         arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
-        start(*arguments, self.state, self.workspace, empty_samples(np.zeros(0), self.problem.system))
-        self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
+        self.aside.redundant[:] = self.workspace.redundant
+        start(*arguments, self.state, self.aside, self.nothing)
+        self.state.clock[_KEPT] = kept
 
 
 def until(run: Run, time: float) -> Run:
@@ -272,4 +284,6 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         workspace=workspace,
         slow=system.workspace(),
         samples=empty_samples(problem.times, system),
+        aside=system.workspace(),
+        nothing=empty_samples(np.zeros(0), system),
     )

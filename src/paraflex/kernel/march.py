@@ -6,7 +6,7 @@ from math import ceil, sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import inlined, releases_lock, routine, unoptimised
+from paraflex.kernel.compiling import inlined, kernel, releases_lock, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
@@ -45,6 +45,7 @@ from paraflex.kernel.run_state import (
     STEPS,
     STOP,
     TIME,
+    TRIED,
     WEIGHT_0,
     WIDEST,
     WORK,
@@ -68,6 +69,8 @@ GROWING = 0.05
 LEAST_PART = 1e-11
 # A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
 SMALLEST_PART = 1e-4
+# Steps that differ by less than this part of them are of one length.
+SAME_STEP = 1e-9
 
 
 @inlined
@@ -179,7 +182,7 @@ def enter(system, signals, t, controls, march, work):
     first_stage(system, signals, t, controls, march, work)
 
 
-@unoptimised
+@kernel
 def start(system, signals, tableau, controls, march, work, out):
     """First stage and first sample of a run."""
     t = march.clock[TIME]
@@ -281,14 +284,15 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
         if controls.fixed_step > 0.0:
             # Intervals between stops are divided evenly.
             h = left / max(1.0, ceil(left / longest - 1e-6))
-            # But for rounding the same step: its factor still serves.
-            if abs(h - march.clock[STEP]) <= 1e-9 * h:
-                h = march.clock[STEP]
             march.clock[STEP] = h
         if left <= h * (1.0 + 1e-9):
             h, landing = left, True
         elif left < 2.0 * h and controls.fixed_step == 0.0:
             h = 0.5 * left
+        # But for rounding the step before: its factor still serves.
+        if abs(h - march.clock[TRIED]) <= SAME_STEP * h:
+            h = march.clock[TRIED]
+        march.clock[TRIED] = h
         cause, error = attempt(system, signals, tableau, controls, t, h, march, work, slow)
         if cause == ENTERS:
             enter(system, signals, t, controls, march, work)
