@@ -1,47 +1,15 @@
 """Simulations one can step, under sampled controllers: closed forms, open-loop runs, saved states, failures."""
 
-import tomllib
-
 import numpy as np
 import pytest
 
 import paraflex as pf
 from paraflex.control import SampledController, Simulation
 from paraflex.errors import ControllerError, IntegrationError
-from paraflex.files import model_from
+from rotors import J, T, rotor
 
-J, T = 0.01, 1e-3
 # Closed form of a rigid rotor under sampled PD: z^2 - (2 - (Kp T^2/2 + Kd T)/J) z + 1 + (Kp T^2/2 - Kd T)/J.
 AT_20_MS = {0.0: (0.61753479, -23.76106697), T: (0.61700998, -24.83802936)}
-
-ROTOR = """
-name = "rotor"
-[ground]
-O = [0.0, 0.0]
-[body.rotor]
-type = "rigid"
-mass = 1.0
-inertia = 0.01
-points = { O = [0.0, 0.0] }
-[joint.hub]
-type = "revolute"
-points = ["ground.O", "rotor.O"]
-[motor]
-tau = "hub"
-[sensor.rate]
-type = "tachometer"
-joint = "hub"
-"""
-
-
-def rotor(angle=1.0, rate=0.0):
-    start = f"""
-[start.coordinates]
-rotor = {{ x = 0.0, y = 0.0, phi = {angle} }}
-[start.rates]
-rotor = {{ x = 0.0, y = 0.0, phi = {rate} }}
-"""
-    return model_from(tomllib.loads(ROTOR + start), "rotor.toml")
 
 
 def simulated_rotor(duration=0.02, **more):
@@ -370,7 +338,9 @@ def test_an_event_ends_it():
     assert run.solution.q[-1, 2] == pytest.approx(0.8, abs=1e-9)
     assert run.applied.shape == (run.solution.t.size, 1)
     sim.reset()
-    with pytest.raises(IntegrationError, match=r"the run has ended: joint hub reached .* at t = 0\.00816497 s; call result"):
+    with pytest.raises(
+        IntegrationError, match=r"the run has ended: joint hub reached .* at t = 0\.00816497 s; call result"
+    ):
         sim.step([-60.0], 0.02)
 
 

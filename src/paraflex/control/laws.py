@@ -17,6 +17,7 @@ from paraflex.actuation import Effort, required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
+from paraflex.control.rates import RateFilter
 from paraflex.control.references import PLAN, AtSamples, planned_motion
 from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError
@@ -75,9 +76,7 @@ class JointPID:
     ) -> None:
         self._gains = {"stiffness": stiffness, "damping": damping, "integral": integral}
         self._project = project
-        if cutoff is not None and not (np.isfinite(cutoff) and cutoff > 0.0):
-            raise InputError("not a positive number", field="cutoff", value=cutoff, remedy="give a frequency in Hz")
-        self._cutoff = cutoff
+        self._rates = RateFilter(cutoff)
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
@@ -89,20 +88,15 @@ class JointPID:
         gains = (_per_motor(gain, plant.outputs, field) for field, gain in self._gains.items())
         self._Kp, self._Kd, self._Ki = gains
         self._period = plant.period
-        self._new = 1.0 if self._cutoff is None else 1.0 - np.exp(-2.0 * np.pi * self._cutoff * plant.period)
-        self._last: Array | None = None
-        self._rate = np.zeros(len(plant.outputs))
+        self._rates.start(plant.period)
         self._sum = np.zeros(len(plant.outputs))
         self._wanted = np.zeros(len(plant.outputs))
         self._projector = projectors(plant) if self._project and plant.task is not None else None
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`; y are errors of angles."""
-        last = y if self._last is None else self._last
-        self._rate = self._rate + self._new * ((y - last) / self._period - self._rate)
-        self._last = y
         self._sum = self._sum + self._Ki * self._period * y
-        torques = -(self._Kp * y + self._Kd * self._rate + self._sum)
+        torques = -(self._Kp * y + self._Kd * self._rates(y) + self._sum)
         if self._projector is not None:
             torques = self._projector(t) @ torques
         self._wanted = torques
