@@ -27,6 +27,7 @@ PACKAGES = (
     "elastodynamics",
     "reduction",
     "linear",
+    "control",
     "equilibria",
     "integrators.methods",
     "integrators",

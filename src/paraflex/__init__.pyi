@@ -94,6 +94,19 @@ from .reduction import reduced_mechanism as reduced_mechanism
 # Statics
 from .equilibria import statics as statics, Statics as Statics
 
+# Control
+from .control import (
+    Simulation as Simulation,
+    SampledController as SampledController,
+    Controller as Controller,
+    Plant as Plant,
+    JointPID as JointPID,
+    joint_gains as joint_gains,
+    internal_torques as internal_torques,
+    ComputedTorque as ComputedTorque,
+    RateFeedback as RateFeedback,
+)
+
 # Studies
 from .campaign import Workers as Workers
 from .studies import (

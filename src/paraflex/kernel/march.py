@@ -284,13 +284,16 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
         if controls.fixed_step > 0.0:
             # Intervals between stops are divided evenly.
             h = left / max(1.0, ceil(left / longest - 1e-6))
+            # But for rounding the same step: its factor still serves.
+            if abs(h - march.clock[STEP]) <= SAME_STEP * h:
+                h = march.clock[STEP]
             march.clock[STEP] = h
         if left <= h * (1.0 + 1e-9):
             h, landing = left, True
         elif left < 2.0 * h and controls.fixed_step == 0.0:
             h = 0.5 * left
-        # But for rounding the step before: its factor still serves.
-        if abs(h - march.clock[TRIED]) <= SAME_STEP * h:
+        # After a jump, but for rounding, the step before it: its factor still serves.
+        if march.clock[LAST_STEP] == 0.0 and abs(h - march.clock[TRIED]) <= SAME_STEP * h:
             h = march.clock[TRIED]
         march.clock[TRIED] = h
         cause, error = attempt(system, signals, tableau, controls, t, h, march, work, slow)
