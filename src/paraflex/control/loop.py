@@ -120,7 +120,9 @@ class Loop:
                 each.start(self._plants[-1])
             except InputError as error:
                 raise error.within(name) from None
-        self._inputs = [[sensors.index(name) for name in plant.inputs] for plant in self._plants]
+        # Names of the sensors that controllers read, in the order of the readings that `act` needs.
+        self.read: tuple[str, ...] = tuple(dict.fromkeys(name for plant in self._plants for name in plant.inputs))
+        self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self._plants]
         self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self._plants]
         self.period: float = min(each.period for each in self.controllers)
         self._every = [self._multiple(name, each.period) for name, each in self._named()]
@@ -165,6 +167,11 @@ class Loop:
 
     def act(self, readings: Callable[[], Array]) -> Array | None:
         """Take the samples of this instant, then let torques act; those of all motors, None where nothing changes.
+
+        Parameters
+        ----------
+        readings : callable
+            Gives readings of the sensors in `read`.
 
         Raises
         ------

@@ -61,6 +61,7 @@ class Readings:
     """
 
     def __init__(self, system: System, sensors: Sequence[Sensor]) -> None:
+        self._system = system
         self.sensors: tuple[Sensor, ...] = tuple(sensors)
         self.names: tuple[str, ...] = tuple(sensor.name for sensor in sensors)
         self.units: tuple[str, ...] = tuple(system.mechanism.sensor_unit(sensor) for sensor in sensors)
@@ -70,6 +71,10 @@ class Readings:
         self._others: list[int] = [k for k, one in enumerate(found) if one is None]
         self.of_torques: bool = any(isinstance(self.sensors[k], JointForceSensor) for k in self._others)
         self._reader = SensorReader(system, [self.sensors[k] for k in self._others])
+
+    def only(self, names: Sequence[str]) -> Readings:
+        """Readings of some of the sensors."""
+        return Readings(self._system, [self.sensors[self.names.index(name)] for name in names])
 
     def __call__(self, now: Instant, torques: Array) -> Array:
         """Readings (sensors,) at an instant, under torques (motors,)."""

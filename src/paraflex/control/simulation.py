@@ -144,6 +144,7 @@ class Simulation:
         self.end: float = float(self._times[-1])
         self._pack()
         self._readings = Readings(self.system, measured_sensors(self.system.mechanism))
+        self._watched = self._readings
         self.sensors_read: tuple[str, ...] = self._readings.names
         self._integration = Integration(
             self.system, self._signals, self._initial, self._times, knots=self._knots, options=self._options,
@@ -182,7 +183,7 @@ class Simulation:
 
     def sensors(self) -> dict[str, float]:
         """Readings of all sensors at the time reached, by name and in their units, before torques change there."""
-        return dict(zip(self.sensors_read, self._read().tolist(), strict=True))
+        return dict(zip(self.sensors_read, self._read(self._readings).tolist(), strict=True))
 
     def reset(self) -> dict[str, float]:
         """Go back to the start, without torques and controllers; the readings there."""
@@ -210,7 +211,7 @@ class Simulation:
         if not self.time < until <= self.end * (1.0 + _SAME):
             raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
                              value=until, remedy="give a later time in it, or reset the simulation")  # fmt: skip
-        self._loop = None
+        self._use(None)
         self._apply(given)
         self._march(min(until, self.end))
         if self._integration.status == "stopped":
@@ -232,10 +233,11 @@ class Simulation:
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` gave, of this simulation."""
         self._integration.restore(saved.kept)
-        self._held, self._log, self._loop = saved.held.copy(), saved.log, saved.loop
+        self._held, self._log = saved.held.copy(), saved.log
         self._hold()
-        if self._loop is not None:
-            self._loop.restore(saved.controllers)
+        self._use(saved.loop)
+        if saved.loop is not None:
+            saved.loop.restore(saved.controllers)
 
     # --- Under controllers ---
 
@@ -277,7 +279,7 @@ class Simulation:
         if controllers is not None:
             self.reset()
             several = controllers if isinstance(controllers, list | tuple) else [controllers]
-            self._loop = Loop(several, self._plant, self.sensors_read, self.motors, self._initial.time)
+            self._use(Loop(several, self._plant, self.sensors_read, self.motors, self._initial.time))
         end = self.end if until is None else min(until, self.end)
         try:
             while self.time < end and not self.ended:
@@ -305,7 +307,7 @@ class Simulation:
             return
         slack = _SAME * loop.period
         if loop.next <= self.time + slack:
-            changed = loop.act(self._read)
+            changed = loop.act(lambda: self._read(self._watched))
             if changed is not None:
                 everything = np.zeros(len(self._held))
                 everything[self._active] = changed
@@ -356,6 +358,12 @@ class Simulation:
     def _moment(self) -> Moment:
         return Moment(self.time, self._integration.run.attempts)
 
+    def _use(self, loop: Loop | None) -> None:
+        """Let these controllers act."""
+        if loop is not self._loop and loop is not None:
+            self._watched = self._readings.only(loop.read)
+        self._loop = loop
+
     def _plant(self, controller: Controller) -> Plant:
         outputs = tuple(controller.outputs) or self.motors
         encoders = (motor.joint for motor in self.mechanism.motors if motor.name in outputs)
@@ -380,11 +388,11 @@ class Simulation:
         everything[self._active] = given
         return everything
 
-    def _read(self) -> Array:
-        """Readings of all sensors now."""
+    def _read(self, readings: Readings) -> Array:
+        """Readings now."""
         now = self._integration.run.now()
-        given = self._torques.evaluate(np.array([now.t]))[0] if self._readings.of_torques else np.zeros(len(self._held))
-        return self._readings(now, self._held + given)
+        given = self._torques.evaluate(np.array([now.t]))[0] if readings.of_torques else np.zeros(len(self._held))
+        return readings(now, self._held + given)
 
     def _apply(self, torques: Array) -> None:
         """Let torques (motors,) of all motors act from now on."""
