@@ -1,0 +1,1 @@
+"""Sampled controllers, references and input shapers."""
