@@ -267,6 +267,10 @@ def _vibration(omega: Any, damping: float, times: Array, amplitudes: Array) -> t
 def _impulses(kind: ShaperKind, frequency: Any, damping: Any, tolerance: Any) -> tuple[Numbers, Numbers]:
     """Times and amplitudes for one mode."""
     if kind is ShaperKind.EI:
+        if np.iscomplexobj([damping, tolerance]):
+            raise InputError(
+                "no derivative by damping or tolerance of an EI shaper", field="shaper", remedy="leave it out"
+            )
         times, amplitudes = _extra_insensitive(damping, tolerance)
         return times / (2.0 * pi * frequency), amplitudes
     order, root = _ORDERS[kind], np.sqrt(1.0 - damping**2)
