@@ -275,7 +275,7 @@ def test_info_and_a_run_name_and_draw_a_shaped_path(tmp_path):
     model = pf.load(file)
     assert data.attrs["motion_end"] == pytest.approx(model.paths["square"].duration)
     desired = model.paths["square"].evaluate(data["time"].values).position
-    np.testing.assert_allclose(data["desired_position"].values, desired, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(data["end_effector_desired"].isel(mode=0).values, desired, rtol=0, atol=1e-12)
     assert pf.plots.end_effector_path(data, "++++").axes
 
 

@@ -27,6 +27,8 @@ PACKAGES = (
     "elastodynamics",
     "reduction",
     "linear",
+    "control.shaping",
+    "control.shaped",
     "equilibria",
     "integrators.methods",
     "integrators",
