@@ -33,6 +33,7 @@ import documented  # noqa: E402
         ("stresses.md", 2),
         ("quick-return.md", 4),
         ("linear-models.md", 3),
+        ("shaping.md", 3),
         ("reduction.md", 5),
         ("reduced-runs.md", 1),
         ("statics.md", 3),

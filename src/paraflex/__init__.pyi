@@ -91,6 +91,10 @@ from .linear import (
 )
 from .reduction import reduced_mechanism as reduced_mechanism
 
+# Control
+from .control.shaping import Shaper as Shaper, shaper as shaper
+from .control.shaped import ShapedPath as ShapedPath, shape_torques as shape_torques
+
 # Statics
 from .equilibria import statics as statics, Statics as Statics
 

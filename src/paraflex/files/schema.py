@@ -522,7 +522,26 @@ class PayloadTable(_Table):
     )
 
 
-class PolygonTable(_Table):
+class ShaperTable(_Table):
+    """An input shaper, by which a path leaves modes of vibration at rest."""
+
+    type: Literal["zv", "zvd", "zvdd", "ei"] = Field(description='the kind: "zv", "zvd", "zvdd" or "ei"')
+    frequencies: Number | list[Number] = Field(
+        description="the undamped natural frequencies of the modes in Hz, one number or a list"
+    )
+    damping: Number | list[Number] = Field(
+        default=0.0, description="the damping ratio of all modes, or a list with one for each"
+    )
+    tolerance: Number | None = Field(
+        default=None, description='of "ei", the residual at its frequency as a fraction, by default 0.05'
+    )
+
+
+class _PathTable(_Table):
+    shaper: ShaperTable | None = Field(default=None, description="the input shaper of the path: none by default")
+
+
+class PolygonTable(_PathTable):
     """Straight segments from corner to corner."""
 
     type: Literal["polygon"]
@@ -531,7 +550,7 @@ class PolygonTable(_Table):
     closed: Yes = Field(default=True, description="whether the path returns to start")
 
 
-class LineTable(_Table):
+class LineTable(_PathTable):
     """A straight line."""
 
     type: Literal["line"]
@@ -540,7 +559,7 @@ class LineTable(_Table):
     max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
 
 
-class CircleTable(_Table):
+class CircleTable(_PathTable):
     """A circle or arc."""
 
     type: Literal["circle"]
@@ -551,7 +570,7 @@ class CircleTable(_Table):
     sweep: Number = Field(default=6.283185307179586, description="the angle swept in rad, positive counter-clockwise")
 
 
-class PointsTable(_Table):
+class PointsTable(_PathTable):
     """A smooth motion through points."""
 
     type: Literal["points"]
@@ -561,7 +580,7 @@ class PointsTable(_Table):
     motion_time: Number = Field(description="the time from the first point to the last in s")
 
 
-class TabulatedPathTable(_Table):
+class TabulatedPathTable(_PathTable):
     """A smooth curve through many points, such as those of a file."""
 
     type: Literal["table"]
@@ -575,7 +594,7 @@ class TabulatedPathTable(_Table):
     max_speed: Number | None = Field(default=None, description="the largest speed along the path in m/s")
 
 
-class SequenceTable(_Table):
+class SequenceTable(_PathTable):
     """Paths one after another in one motion."""
 
     type: Literal["sequence"]

@@ -9,6 +9,7 @@ from itertools import count
 from numbers import Integral
 from typing import Any
 
+from paraflex.control.shaped import ShapedPath
 from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import InputError
 from paraflex.files.laws import components_table, law_parameters, law_table
@@ -298,6 +299,11 @@ def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, 
 
 
 def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
+    if isinstance(path, ShapedPath):
+        said = _path(path.path, name, paths)
+        if "shaper" in said:
+            raise _unwritable(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
+        return said | {"shaper": {"type": path.shaper.kind.value} | _fields(path.shaper, "kind")}
     if isinstance(path, SequencePath):
         names = [next((other for other, one in paths.items() if one == part), "") for part in path.paths]
         if not all(names):
@@ -310,7 +316,9 @@ def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
         if type(path) is made:
             return {"type": kind} | _fields(path)
     raise _unwritable(
-        f"path.{name}", type(path).__name__, "give a Polygon, Line, Circle, PointPath, TabulatedPath or SequencePath"
+        f"path.{name}",
+        type(path).__name__,
+        "give a Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath",
     )
 
 
