@@ -1,0 +1,1 @@
+"""Sampled control: controllers with their chain, design by linear models, margins."""
