@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
-from paraflex.control.estimators import KalmanFilter, kalman_filter
+from paraflex.control.estimators import KalmanFilter, kalman_filter, riccati
 from paraflex.control.reach import check_reach
 from paraflex.control.sampled import SampledPlant, as_sampled, places
 from paraflex.errors import InputError
@@ -358,7 +358,7 @@ def _with_integrals(plant: SampledPlant, names: Sequence[str]) -> tuple[Array, A
 
 def _riccati(A: Array, B: Array, cost: _Cost) -> Array:
     try:
-        return scipy.linalg.solve_discrete_are(A, B, *cost)
+        return riccati(A, B, *cost)
     except (np.linalg.LinAlgError, ValueError):
         raise InputError(
             "no feedback is the best one", field="deviations",
