@@ -91,6 +91,22 @@ from .linear import (
 )
 from .reduction import reduced_mechanism as reduced_mechanism
 
+# Control
+from .control.sampled import discretise as discretise, SampledPlant as SampledPlant
+from .control.regulators import lqr as lqr, lqg as lqg, Regulator as Regulator, LQGDesign as LQGDesign
+from .control.estimators import (
+    quantisation_noise as quantisation_noise,
+    Differentiator as Differentiator,
+    BackwardDifference as BackwardDifference,
+)
+from .control.closed_loops import (
+    closed_loop as closed_loop,
+    closed_loops as closed_loops,
+    spillover as spillover,
+    ClosedLoop as ClosedLoop,
+)
+from .control.margins import margins as margins, Margins as Margins
+
 # Statics
 from .equilibria import statics as statics, Statics as Statics
 

@@ -215,7 +215,7 @@ def law_of(controller: Any) -> StateSpace:
 
 
 def spillover(full: Any, reduced: Any, controller: Any, **settings: Any) -> pd.DataFrame:
-    """A controller that was designed on a reduced model, on that and on the full one: see `over_models`.
+    """A controller that was designed on a reduced model, on that and on the full one: see `closed_loops`.
 
     The vibrations that the design does not know may become unstable (spillover): the row "full" says which.
 
@@ -230,10 +230,10 @@ def spillover(full: Any, reduced: Any, controller: Any, **settings: Any) -> pd.D
     ResultWarning
         One of the two is unstable.
     """
-    return over_models({"reduced": reduced, "full": full}, controller, **settings)
+    return closed_loops({"reduced": reduced, "full": full}, controller, **settings)
 
 
-def over_models(models: Mapping[str, Any], controller: Any, **settings: Any) -> pd.DataFrame:
+def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) -> pd.DataFrame:
     """One controller on several models: poses along a path, payloads, one of few states and the full one.
 
     Parameters

@@ -22,6 +22,8 @@ from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import known, not_negative, positive
 
 Complex = NDArray[np.complex128]
+# Random torques by default, as a part of the largest ones.
+_OF_EFFORT = 0.1
 
 
 @dataclass(frozen=True)
@@ -275,8 +277,9 @@ def lqg(
         Standard deviations of readings, of all or by sensor, in their units: see `quantisation_noise`.
     disturbance : float or mapping of str to float, optional
         Standard deviations of random efforts at inputs, constant from sample to sample [N m, N], of all motors or by
-        input, points of `forces` among them. By default the `effort` of each motor, which makes the filter fast and the
-        loop as robust at the motors as it can be (loop transfer recovery).
+        input, points of `forces` among them. By default a tenth of the `effort` of each motor. More makes the filter
+        faster and the loop more robust at the motors (loop transfer recovery), and lets it reach vibrations that the
+        model does not have.
     state_noise : (n, n) array, optional
         Covariance added to that of the disturbances, of the model's own states or of all, for one sample.
 
@@ -370,7 +373,8 @@ def _riccati(A: Array, B: Array, cost: _Cost) -> Array:
 def _disturbances(plant: SampledPlant, regulator: Regulator, given: Any, effort: Any) -> Array:
     """Covariance (n, n) of what disturbs the states from sample to sample."""
     if given is None:
-        given = effort
+        efforts = _by_name(effort, regulator.motors, "effort", "N m or N")
+        given = {name: _OF_EFFORT * value for name, value in efforts.items()}
     if isinstance(given, Mapping):
         sizes = _by_name(given, plant.inputs, "disturbance", "N m or N", not_negative)
     else:
