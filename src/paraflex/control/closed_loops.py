@@ -107,9 +107,10 @@ class ClosedLoop:
         Parameters
         ----------
         omega : (k,) array
-            [rad/s], up to pi / period.
+            [rad/s], up to pi / period; at zero a loop with integrals or free motions has none that is finite.
         """
-        return 1.0 / np.diagonal(self.sensitivity(omega), axis1=1, axis2=2) - 1.0
+        own = np.diagonal(self.sensitivity(omega), axis1=1, axis2=2)
+        return 1.0 / np.where(own == 0.0, np.finfo(float).tiny, own) - 1.0
 
     def later(self, delay: float) -> ClosedLoop:
         """The same controller with torques that act so late [s].

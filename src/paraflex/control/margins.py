@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 # Lowest frequency of the grid, as a part of the slowest pole's and of the sampling frequency.
 _LOWEST, _OF_NYQUIST = 1e-2, 1e-5
 _GRID = 1500
+# At zero a loop with free motions or integrals has no response; rounding leaves one that is larger.
+_INFINITE = 1e7
 # About a resonance the grid has points at so many of its half widths.
 _ABOUT = np.array([0.0, 0.15, 0.4, 0.8, 1.5, 3.0, 6.0, 12.0, 25.0])
 
@@ -131,14 +133,13 @@ def _of_motor(loop: ClosedLoop, motor: int, grid: Array, S: Array) -> MotorMargi
     def response(omega: float) -> complex:
         return complex(loop.loop(omega)[0, motor])
 
-    with np.errstate(divide="ignore"):
-        L = 1.0 / S - 1.0
+    L = 1.0 / S - 1.0
     gains = _roots(lambda omega: np.log(abs(response(omega))), grid, np.log(np.abs(L)))
     real = _roots(lambda omega: response(omega).imag / (1.0 + abs(response(omega))), grid, L.imag / (1.0 + np.abs(L)))
-    # At half the sampling frequency responses are real.
-    turned = np.array([*real, grid[-1]])
+    # At zero and at half the sampling frequency responses are real.
+    turned = np.array([0.0, *real[real < (1.0 - 1e-9) * grid[-1]], grid[-1]])
     at = np.array([response(omega).real for omega in turned])
-    negative = at < 0.0
+    negative = (at < 0.0) & (at > -_INFINITE)
     factors = -1.0 / at[negative]
     phases = np.array([np.angle(-response(omega)) for omega in gains])
     lost = np.mod(phases, 2.0 * np.pi)
@@ -180,12 +181,14 @@ def _peak(function: Callable[[float], float], grid: Array, values: Array) -> tup
     best: tuple[float, float] = (float(grid[np.argmax(values)]), float(np.max(values)))
     for k in _highest(values):
         if 0 < k < len(grid) - 1:
+            # Measured from the grid's point, as the search is no finer than 1e-8 of its variable.
+            middle, width = grid[k], grid[k + 1] - grid[k - 1]
             found = scipy.optimize.minimize_scalar(
-                lambda omega: -function(omega), bounds=(grid[k - 1], grid[k + 1]), method="bounded",
-                options={"xatol": 1e-9 * grid[k]},
+                lambda part, middle=middle, width=width: -function(middle + width * part),
+                bounds=tuple((grid[[k - 1, k + 1]] - middle) / width), method="bounded", options={"xatol": 1e-9},
             )  # fmt: skip
             if -found.fun > best[1]:
-                best = float(found.x), float(-found.fun)
+                best = float(middle + width * found.x), float(-found.fun)
     return best
 
 
