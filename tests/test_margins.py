@@ -94,7 +94,7 @@ def test_an_integrator_with_delay(late):
 
 
 def test_delay_margin_of_an_integrator():
-    """Exact for parts of a sample: z (z - 1) + k T (1 - f) z + k T f = 0 has |z|^2 = k T f = 1, a double lag of samples."""
+    """Exact for parts of a sample: z (z - 1) + k T (1 - f) z + k T f = 0 has |z|^2 = k T f = 1."""
     k = 160.0
     loop = pf.closed_loop(integrator(), gains(k, period=PERIOD))
     assert loop.delay_margin() == pytest.approx(PERIOD / (k * PERIOD), rel=1e-9)
@@ -105,7 +105,7 @@ def test_delay_margin_of_an_integrator():
 
 
 def test_margins_are_those_of_python_control():
-    """Of few states, as it makes polynomials: a rotor with friction under a lead, both gain margins, one sample late."""
+    """Of few states, as it makes polynomials: a rotor with friction under a lead, one sample late."""
     control = pytest.importorskip("control")
     A, B, C, D = rotor()
     A = A + np.diag([0.0, -8.0])
@@ -124,7 +124,7 @@ def test_margins_are_those_of_python_control():
 
 
 def test_gains_that_may_not_fall():
-    """An inverted pendulum, z - e^aT: it needs k b > a. Both margins of L = k b_d / (z - e^aT), b_d = (e^aT - 1) / a."""
+    """What grows as e^at needs k > a: both margins of L = k b / (z - e^aT), b = (e^aT - 1) / a."""
     a, k = 3.0, 8.0
     found = pf.margins(([[a]], [[1.0]], [[1.0]], [[0.0]]), gains(k, period=PERIOD)).motors["u1"]
     grown = np.exp(a * PERIOD)
@@ -224,7 +224,9 @@ def test_poses_along_a_path_and_payloads():
     poses = pf.poses_along(pf.plan(bar, path, samples=41), 3, mode="++")
     few = pf.reduce(poses.models[0], 12)
     angles = [one.name for one in few.outputs][:2]
-    design = pf.lqg(few, 1e-3, delay=1e-3, measured=angles, deviations=dict.fromkeys(angles, 0.02), effort=1.0, noise=1e-3)
+    design = pf.lqg(
+        few, 1e-3, delay=1e-3, measured=angles, deviations=dict.fromkeys(angles, 0.02), effort=1.0, noise=1e-3
+    )
     named = {f"{place:.3f} {poses.unit}": one for place, one in zip(poses.places, poses.models, strict=True)}
     named["payload"] = pf.linearise(bar.with_payload(pf.Payload(0.1)), mode="++")
     table = pf.closed_loops(named, design)
@@ -236,9 +238,11 @@ def test_poses_along_a_path_and_payloads():
     ("arguments", "settings", "field"),
     [
         ((rotor(), 3.0), {}, "controller"), ((rotor(), scipy.signal.StateSpace(*oscillator())), {}, "controller"),
-        ((rotor(), gains(1.0)), {}, "controller"), ((rotor(), scipy.signal.dlti(-1.0, 0.0, 0.0, -1.0, dt=True)), {}, "period"),
-        ((rotor(), gains(1.0, 1.0)), {"inputs": ["y1", "y9"]}, "inputs"), ((rotor(), gains(1.0, 1.0)), {"delay": -1.0}, "delay"),
-        ((rotor(), gains(1.0, 1.0)), {"outputs": ["u9"]}, "outputs"), ((rotor(), gains(1.0, 1.0)), {"period": 0.0}, "period"),
+        ((rotor(), gains(1.0)), {}, "controller"),
+        ((rotor(), scipy.signal.dlti(-1.0, 0.0, 0.0, -1.0, dt=True)), {}, "period"),
+        ((rotor(), gains(1.0, 1.0)), {"inputs": ["y1", "y9"]}, "inputs"),
+        ((rotor(), gains(1.0, 1.0)), {"outputs": ["u9"]}, "outputs"),
+        ((rotor(), gains(1.0, 1.0)), {"delay": -1.0}, "delay"), ((rotor(), gains(1.0, 1.0)), {"period": 0.0}, "period"),
         ((pf.discretise(rotor(), 0.5), gains(1.0, 1.0)), {}, "model"),
     ],
 )  # fmt: skip
@@ -257,7 +261,9 @@ def test_controllers_of_all_kinds_are_one_loop():
         pf.closed_loop(quanser(), design), pf.closed_loop(quanser(), design.law()),
         pf.closed_loop(quanser(), SampledController(design.law(), limits=1.0)),
         pf.closed_loop(quanser(), law, delay=0.02, inputs=["y1", "y2"]),
-        pf.closed_loop(pf.discretise(quanser(), PERIOD, 0.02), control.ss(*design.state_space, PERIOD), inputs=["y1", "y2"]),
+        pf.closed_loop(
+            pf.discretise(quanser(), PERIOD, 0.02), control.ss(*design.state_space, PERIOD), inputs=["y1", "y2"]
+        ),
     ]  # fmt: skip
     for one in ways[1:]:
         assert one.spectral_radius == pytest.approx(ways[0].spectral_radius, rel=1e-12)

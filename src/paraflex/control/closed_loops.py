@@ -110,7 +110,7 @@ class ClosedLoop:
             [rad/s], up to pi / period; at zero a loop with integrals or free motions has none that is finite.
         """
         own = np.diagonal(self.sensitivity(omega), axis1=1, axis2=2)
-        return 1.0 / np.where(own == 0.0, np.finfo(float).tiny, own) - 1.0
+        return np.asarray(1.0 / np.where(own == 0.0, np.finfo(float).tiny, own) - 1.0, dtype=complex)
 
     def later(self, delay: float) -> ClosedLoop:
         """The same controller with torques that act so late [s].
@@ -163,7 +163,7 @@ def closed_loop(
     ----------
     model : LinearModel, ReducedModel, state space, (A, B, C, D) or SampledPlant
     controller : LQGDesign, law, SampledController, or state space
-        From readings to torques with its sign, u = C x + D y; of a chain its law, without limits, filters and resolution.
+        From readings to torques with its sign, u = C x + D y; of a chain its law, without limits, filters, resolution.
     period, delay : float, optional
         [s]; by default the controller's own. Of a `SampledPlant` its own count.
     inputs : sequence of str, optional
@@ -187,7 +187,7 @@ def closed_loop(
     if law.D.shape[::-1] != wanted:
         raise InputError(
             f"has {law.D.shape[1]} inputs and {law.D.shape[0]} outputs", field="controller", value=controller,
-            remedy=f"the model has {wanted[0]} sensors and {wanted[1]} motors: name as many, inputs=[...], outputs=[...]",
+            remedy=f"the model has {wanted[0]} sensors, {wanted[1]} motors: name as many, inputs=[...], outputs=[...]",
         )  # fmt: skip
     return ClosedLoop(plant, law, None if isinstance(model, SampledPlant) else model)
 
@@ -247,8 +247,8 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
     Returns
     -------
     DataFrame
-        A row a model, the worst last: `stable`, `spectral_radius`, `frequency` [Hz] and `damping` of the pole nearest to the
-        unit circle, its decay `rate` [1/s].
+        A row a model, the worst last: `stable`, `spectral_radius`, of the pole nearest to the unit circle `frequency`
+        [Hz], `damping` and the `rate` of its growth [1/s].
 
     Raises
     ------
@@ -287,7 +287,9 @@ def warn_if_unstable(loop: ClosedLoop, where: str = "") -> None:
     if loop.stable:
         return
     outside = [z for z in loop.poles if abs(z) >= 1.0 - _ON_CIRCLE and z.imag >= 0.0]
-    named = ", ".join(f"|z| = {abs(z):.6g} at {frequency_of(complex(z), loop.plant.period):.4g} Hz" for z in outside[:4])
+    named = ", ".join(
+        f"|z| = {abs(z):.6g} at {frequency_of(complex(z), loop.plant.period):.4g} Hz" for z in outside[:4]
+    )
     more = f" and {len(outside) - 4} more" if len(outside) > 4 else ""
     warn_user(ResultWarning(f"the sampled loop is unstable{f' {where}' if where else ''}: {named}{more}"))
 

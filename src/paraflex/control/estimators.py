@@ -57,7 +57,7 @@ class KalmanFilter:
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
         """How the error decays: eigenvalues z (n,) of A (1 - L C)."""
-        return np.linalg.eigvals(self.A - self.A @ self.gain @ self.C)
+        return np.asarray(np.linalg.eigvals(self.A - self.A @ self.gain @ self.C), dtype=complex)
 
     def corrected(self, x: Array, y: Array) -> Array:
         """The estimate (n,) after readings (outputs,)."""
@@ -71,8 +71,8 @@ class KalmanFilter:
 def kalman_filter(A: Array, B: Array, C: Array, process: Array, noise: Array) -> KalmanFilter:
     """The filter whose error is smallest, from the stationary Riccati equation.
 
-    P = A P A^T - A P C^T (C P C^T + R)^-1 C P A^T + W, L = P C^T (C P C^T + R)^-1 (Anderson and Moore, Optimal Filtering,
-    section 4.4).
+    P = A P A^T - A P C^T (C P C^T + R)^-1 C P A^T + W, L = P C^T (C P C^T + R)^-1 (Anderson and Moore, Optimal
+    Filtering, section 4.4).
 
     Parameters
     ----------
@@ -134,9 +134,9 @@ def _symmetric(matrix: Array) -> Array:
 class Differentiator:
     """Values and rates of quantised readings: the steady Kalman filter of a motion whose acceleration is random.
 
-    Between samples the acceleration is constant, with standard deviation `acceleration`; readings have the noise of their
-    resolution. The filter is the alpha-beta one (Kalata, IEEE Trans. Aerosp. Electron. Syst. 20 (1984) 174): it trusts the
-    readings the more, the larger acceleration T^2 / noise. What turns steadily has the right rate without lag.
+    Between samples the acceleration is constant, with standard deviation `acceleration`; readings have the noise of
+    their resolution. The filter is the alpha-beta one (Kalata, IEEE Trans. Aerosp. Electron. Syst. 20 (1984) 174): the
+    larger acceleration T^2 / noise, the more it trusts the readings. Of steady motion the rate has no lag.
 
     Parameters
     ----------
@@ -180,12 +180,10 @@ class Differentiator:
     def step(self, y: Array | float) -> tuple[Array, Array]:
         """Estimated values and rates (readings,) after the readings (readings,) of a sample."""
         y = np.atleast_1d(np.asarray(y, dtype=float))
-        if self._x is None:
-            self._x = np.array([y, np.zeros_like(y)])
-        else:
-            self._x = self._A @ self._x
-        self._x = self._x + self.gain[:, None] * (y - self._x[0])
-        return self._x[0].copy(), self._x[1].copy()
+        before = np.array([y, np.zeros_like(y)]) if self._x is None else self._A @ self._x
+        found = before + self.gain[:, None] * (y - before[0])
+        self._x = found
+        return found[0].copy(), found[1].copy()
 
 
 class BackwardDifference:

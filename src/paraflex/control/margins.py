@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.control.closed_loops import ClosedLoop, closed_loop, warn_if_unstable
+from paraflex.control.closed_loops import ClosedLoop, Complex, closed_loop, warn_if_unstable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -127,7 +127,7 @@ def margins(model: Any, controller: Any = None, **settings: Any) -> Margins:
     return Margins(loop, found, peak, where)
 
 
-def _of_motor(loop: ClosedLoop, motor: int, grid: Array, S: Array) -> MotorMargins:
+def _of_motor(loop: ClosedLoop, motor: int, grid: Array, S: Complex) -> MotorMargins:
     """Margins at a motor from its sensitivity (k,) on a grid of frequencies."""
 
     def response(omega: float) -> complex:

@@ -1,4 +1,4 @@
-"""Linear-quadratic design of sampled controllers: state feedback (LQR), and with a Kalman filter from readings (LQG)."""
+"""Linear-quadratic design of sampled controllers: state feedback (LQR), and from readings by a filter (LQG)."""
 
 from __future__ import annotations
 
@@ -243,7 +243,7 @@ def lqr(
     Raises
     ------
     InputError
-        Unknown names, numbers that are not positive, a motion without friction or vibration that the motors do not reach
+        Unknown names, numbers that are not positive, a free motion or undamped vibration that the motors do not reach
         or the weights do not see.
     """
     plant = as_sampled(model, period, delay)
@@ -384,7 +384,7 @@ def _disturbances(plant: SampledPlant, regulator: Regulator, given: Any, effort:
 
 
 def _first_estimate(plant: SampledPlant, C: Array, spread: Array) -> Array:
-    """States (n, measured) from first readings, least squares: at rest without torques, displaced in what moves freely."""
+    """States (n, measured) from first readings, least squares: at rest without torques, displaced in free motions."""
     n = plant.own
     own = plant.A[:n, :n]
     balanced, (size, _) = scipy.linalg.matrix_balance(own, permute=False, separate=True)
@@ -421,11 +421,9 @@ def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
     return whole
 
 
-def _by_name(
-    given: Any, names: Sequence[str], field: str, unit: str, check: Any = positive
-) -> dict[str, float]:
+def _by_name(given: Any, names: Sequence[str], field: str, unit: str, check: Any = positive) -> dict[str, float]:
     """Numbers by name, of all names where one number is given."""
-    table = given if isinstance(given, Mapping) else dict.fromkeys(names, given)
+    table: Mapping[str, float] = given if isinstance(given, Mapping) else dict.fromkeys(names, float(given))
     for name, value in table.items():
         known(name, names, field, "name")
         check(value, f"{field}.{name}" if isinstance(given, Mapping) else field, unit)

@@ -35,8 +35,8 @@ class NamedMatrices(NamedTuple):
 class SampledPlant:
     """x_k+1 = A x_k + B u_k, readings y_k = C x_k: a linear model between a digital controller's samples.
 
-    Torques u_k, computed at sample k, act from k `period` + `delay` on until the next ones do. Readings are taken before
-    torques change: the feed-through of the model is with those of the period before, so that no loop is algebraic.
+    Torques u_k, computed at sample k, act from k `period` + `delay` on until the next ones do. Readings are taken
+    before torques change: the feed-through of the model is with those before, so that no loop is algebraic.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class SampledPlant:
     def poles(self) -> NDArray[np.complex128]:
         """Eigenvalues z (n,) of A; torques under way have zeros."""
         own = np.linalg.eigvals(self.A[: self.own, : self.own])
-        return np.concatenate([own, np.zeros(len(self.states) - self.own)])
+        return np.concatenate([own, np.zeros(len(self.states) - self.own)]).astype(complex)
 
     def rows(self, names: Sequence[str], field: str = "outputs") -> Array:
         """Rows of C (names, n) of some outputs.
