@@ -189,15 +189,24 @@ def test_sensitivity_of_two_motors():
 
 
 def test_peaks_between_points_of_the_grid():
-    """A vibration of damping 1e-5 under a weak law: the peak beside its pole, a thousandth of the grid's step wide."""
-    found = pf.margins(oscillator(30.0, 1e-5), gains(-0.004, 0.0, period=0.01))
+    """Two vibrations of damping 1e-5 within a step of the grid: peaks are found beside their poles, the higher one."""
+    A = scipy.linalg.block_diag(oscillator(30.0, 1e-5)[0], oscillator(30.04, 1e-5)[0])
+    model = A, np.array([[0.0], [1.0], [0.0], [0.3]]), np.array([[1.0, 0.0, 1.0, 0.0]]), np.zeros((1, 1))
+    found = pf.margins(model, gains(-0.004, period=0.01))
     loop = found.loop
-    pole = abs(np.angle(loop.poles[0])) / 0.01
-    near = pole * (1.0 + np.linspace(-1e-4, 1e-4, 20001))
+    poles = np.unique(np.round(np.abs(np.angle(loop.poles)) / 0.01, 9))
+    near = (poles[:, None] * (1.0 + np.linspace(-1e-4, 1e-4, 20001))).ravel()
     highest = np.max(np.abs(loop.sensitivity(near)[:, 0, 0]))
     assert highest > 1.05
     assert found.peak == pytest.approx(highest, rel=1e-6)
     assert found.peak >= highest * (1.0 - 1e-10)
+
+
+def test_crossovers_at_a_resonance_narrower_than_the_grid():
+    """Gain above one within 2e-5 of 30 rad/s only: k / sqrt((w0^2 - w^2)^2 + (2 d w0 w)^2) = 1, sampled."""
+    found = pf.margins(oscillator(30.0, 1e-5), gains(-0.04, 0.0, period=0.01)).motors["u1"]
+    offset = np.sqrt(0.04**2 - (2e-5 * 900.0) ** 2) / 60.0
+    assert found.crossovers == pytest.approx([30.0 - offset, 30.0 + offset], abs=0.03 * offset)
 
 
 # --- Several models ---------------------------------------------------------------------------------------------------
