@@ -36,6 +36,7 @@ import documented  # noqa: E402
         ("shaping.md", 3),
         ("reduction.md", 5),
         ("reduced-runs.md", 1),
+        ("regulators.md", 2),
         ("statics.md", 3),
         ("flexures.md", 6),
         ("control.md", 3),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from paraflex.control import SampledController, Simulation
+from paraflex import SampledController, Simulation
 from paraflex.errors import ControllerError, IntegrationError
 from rotors import J, T, rotor
 
@@ -285,9 +285,9 @@ def test_a_controller_that_fails_ends_the_run(value, said):
     [
         ({"inputs": ["hob"]}, r'sensors: unknown sensor.*did you mean "hub"'),
         ({"outputs": ["tao"]}, r'motors: unknown motor.*did you mean "tau"'),
-        ({"period": 0.0}, "period: not a positive number"),
+        ({"period": 0.0}, "period: must be positive"),
         ({"period": None}, "period: is missing"),
-        ({"delay": -1e-3}, "delay: not a positive number"),
+        ({"delay": -1e-3}, "delay: must be positive"),
         ({"quantise": {"hab": 0.1}}, "quantise: unknown name"),
         ({"limits": (3.0, 1.0)}, "limits: the lowest must be below"),
         ({"filters": {"hub": ([1.0], [1.0, -3.0])}}, r"filters\.hub: is not stable"),

@@ -17,7 +17,7 @@ from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
 from paraflex.control.references import Reference, references
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import known, positive
 
 # A transfer function: the time constant's inverse as a cut-off frequency [Hz] of first order, or coefficients of
 # numerator and denominator in descending powers of s.
@@ -25,7 +25,7 @@ Filter = float | tuple[Sequence[float], Sequence[float]]
 Limit = float | tuple[float, float]
 
 
-class Record(NamedTuple):
+class ChainSample(NamedTuple):
     """One sample of a controller with its chain.
 
     Attributes
@@ -118,7 +118,7 @@ class SampledController:
         self.filters: Mapping[str, Any] = filters or {}
         self.limits: Any = limits
         self.rates: Any = rates
-        self.last: Record | None = None
+        self.last: ChainSample | None = None
         if isinstance(self.law, DiscreteModel):
             self.law.check(self.inputs, self.outputs, self.period)
 
@@ -167,7 +167,7 @@ class SampledController:
         self._given = given
         if hasattr(self.law, "limited"):
             self.law.limited(given)
-        self.last = Record(y, wanted, given)
+        self.last = ChainSample(y, wanted, given)
         return given
 
 
@@ -308,8 +308,9 @@ def _by_name(given: Any, names: Sequence[str], field: str, take: Callable[[Any, 
 def _positive(value: Any, field: str) -> float:
     if value is None:
         raise InputError("is missing", field=field, remedy="give it in seconds")
-    if not (isinstance(value, int | float | np.floating | np.integer) and np.isfinite(value) and value > 0.0):
-        raise InputError("not a positive number", field=field, value=value, remedy="give one above zero")
+    if not isinstance(value, int | float | np.floating | np.integer):
+        raise InputError("is no number", field=field, value=value, remedy="give one above zero")
+    positive(float(value), field, "its unit")
     return float(value)
 
 

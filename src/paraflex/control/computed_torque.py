@@ -16,13 +16,14 @@ from paraflex.actuation.allocation import Effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
-from paraflex.control.rates import RateFilter
+from paraflex.control.estimators import BackwardDifference
 from paraflex.control.references import planned_motion
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import InputError
 from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.kinematics import RigidMotion
 from paraflex.kinematics.closure import PathClosure
+from paraflex.mechanism.quantities import positive
 
 # A place is found when it moves by less than this part of the mechanism's size, in so many iterations.
 _FOUND, _ITERATIONS = 1e-11, 20
@@ -49,12 +50,11 @@ class ComputedTorque:
 
     @checked_arguments()
     def __init__(self, frequency: float, damping_ratio: float = 0.7, *, cutoff: float | None = None) -> None:
-        for field, value in (("frequency", frequency), ("damping_ratio", damping_ratio)):
-            if not (np.isfinite(value) and value > 0.0):
-                raise InputError("not a positive number", field=field, value=value, remedy="give one above zero")
+        positive(frequency, "frequency", "Hz")
+        positive(damping_ratio, "damping_ratio", "parts of the critical one")
         omega = 2.0 * np.pi * frequency
         self._Kp, self._Kv = omega**2, 2.0 * damping_ratio * omega
-        self._rates = RateFilter(cutoff)
+        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
@@ -70,7 +70,7 @@ class ComputedTorque:
         self._motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in plant.outputs]
         self._closure = PathClosure(mechanism, 0.0, float(self._plan.t[-1]))
         self._wanted = self._closure.target(self._plan.path, self._plan.t)
-        self._rates.start(plant.period)
+        self._rates = BackwardDifference(plant.period, self._cutoff)
         self._pose = self._plan.q[0]
 
     def step(self, k: int, t: float, y: Array) -> Array:
@@ -79,7 +79,7 @@ class ComputedTorque:
         place = self._closure.task(self._plan.q[sample])
         _, rate, acceleration = self._wanted[sample]
         found = self._found(y, place)
-        velocity = found.rows @ self._rates(y)
+        velocity = found.rows @ self._rates.step(y)[1]
         command = acceleration - self._Kv * (velocity - rate) - self._Kp * (found.place - place)
         effort = required_effort(self._motion(t, found.place, velocity, command))
         return self._least_norm(effort)

@@ -17,12 +17,12 @@ from paraflex.actuation import Effort, required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
-from paraflex.control.rates import RateFilter
+from paraflex.control.estimators import BackwardDifference
 from paraflex.control.references import PLAN, AtSamples, planned_motion
 from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError
 from paraflex.mechanism import ActuationMode
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import known, positive
 from paraflex.tracking import TrackingTask
 
 Gain = float | Sequence[float] | Mapping[str, float] | Array
@@ -76,7 +76,7 @@ class JointPID:
     ) -> None:
         self._gains = {"stiffness": stiffness, "damping": damping, "integral": integral}
         self._project = project
-        self._rates = RateFilter(cutoff)
+        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
@@ -88,7 +88,7 @@ class JointPID:
         gains = (_per_motor(gain, plant.outputs, field) for field, gain in self._gains.items())
         self._Kp, self._Kd, self._Ki = gains
         self._period = plant.period
-        self._rates.start(plant.period)
+        self._rates = BackwardDifference(plant.period, self._cutoff)
         self._sum = np.zeros(len(plant.outputs))
         self._wanted = np.zeros(len(plant.outputs))
         self._projector = projectors(plant) if self._project and plant.task is not None else None
@@ -96,7 +96,7 @@ class JointPID:
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`; y are errors of angles."""
         self._sum = self._sum + self._Ki * self._period * y
-        torques = -(self._Kp * y + self._Kd * self._rates(y) + self._sum)
+        torques = -(self._Kp * y + self._Kd * self._rates.step(y)[1] + self._sum)
         if self._projector is not None:
             torques = self._projector(t) @ torques
         self._wanted = torques
@@ -169,9 +169,8 @@ def joint_gains(
     InputError
         A frequency or a ratio that is not positive.
     """
-    for field, value in (("frequency", frequency), ("damping_ratio", damping_ratio)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InputError("not a positive number", field=field, value=value, remedy="give one above zero")
+    positive(frequency, "frequency", "Hz")
+    positive(damping_ratio, "damping_ratio", "parts of the critical one")
     omega = 2.0 * np.pi * frequency
     B = task.effort.matrix[:, :, task.effort.active(task.mode(mode))]
     ratio = np.linalg.solve(task_inertia(task.effort), B @ np.swapaxes(B, 1, 2))

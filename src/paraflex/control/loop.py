@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.control.chain import Record, SampledController, as_law
+from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
@@ -29,7 +29,7 @@ class Due(NamedTuple):
 
 
 @dataclass
-class Kept:
+class Done:
     """What a controller has done so far, at its samples: times, readings, torques wanted and given."""
 
     t: list[float] = field(default_factory=list)
@@ -131,7 +131,7 @@ class Loop:
         self._next = [0] * len(self.controllers)
         self._due: list[Due] = []
         self._acting = np.zeros((len(self.controllers), len(motors)))
-        self.kept: list[Kept] = [Kept() for _ in self.controllers]
+        self.kept: list[Done] = [Done() for _ in self.controllers]
 
     def _named(self) -> list[tuple[str, Controller]]:
         return list(zip(self.names, self.controllers, strict=True))
@@ -214,7 +214,7 @@ class Loop:
         if wrong:
             raise LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(wrong)}')
         kept, last = self.kept[k], getattr(controller, "last", None)
-        record = last if isinstance(last, Record) else Record(y, torques, torques)
+        record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
         kept.t.append(t)
         kept.readings.append(record.readings)
         kept.wanted.append(record.wanted)

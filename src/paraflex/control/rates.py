@@ -1,4 +1,4 @@
-"""Rates of sampled readings, and feedback of them."""
+"""Feedback of rates of readings."""
 
 from __future__ import annotations
 
@@ -10,42 +10,9 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
+from paraflex.control.estimators import BackwardDifference
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
-
-
-class RateFilter:
-    """Differences of readings over the period, low-pass filtered if a cut-off is given; zero at the first reading.
-
-    Parameters
-    ----------
-    cutoff : float, optional
-        [Hz]
-
-    Raises
-    ------
-    InputError
-        A cut-off that is not positive.
-    """
-
-    def __init__(self, cutoff: float | None = None) -> None:
-        if cutoff is not None and not (np.isfinite(cutoff) and cutoff > 0.0):
-            raise InputError("not a positive number", field="cutoff", value=cutoff, remedy="give a frequency in Hz")
-        self._cutoff = cutoff
-
-    def start(self, period: float) -> None:
-        """Forget earlier readings; the next ones come every period [s]."""
-        self._period = period
-        self._new = 1.0 if self._cutoff is None else 1.0 - float(np.exp(-2.0 * np.pi * self._cutoff * period))
-        self._last: Array | None = None
-        self._rate: Array | float = 0.0
-
-    def __call__(self, y: Array) -> Array:
-        """Rates (inputs,) from readings (inputs,)."""
-        last = y if self._last is None else self._last
-        self._last = y
-        self._rate = self._rate + self._new * ((y - last) / self._period - self._rate)
-        return self._rate
 
 
 class RateFeedback:
@@ -75,7 +42,7 @@ class RateFeedback:
             raise InputError("no gains", field="gains", remedy="give them by motor and sensor")
         self._gains = np.array([[_gain(row.get(name, 0.0), f"gains.{motor}.{name}") for name in self.inputs]
                                 for motor, row in gains.items()])  # fmt: skip
-        self._rates = RateFilter(cutoff)
+        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
@@ -84,11 +51,11 @@ class RateFeedback:
                 known(name, own, what, "name")
         self._K = self._gains[np.ix_([self.outputs.index(name) for name in plant.outputs],
                                      [self.inputs.index(name) for name in plant.inputs])]  # fmt: skip
-        self._rates.start(plant.period)
+        self._rates = BackwardDifference(plant.period, self._cutoff)
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`."""
-        return -self._K @ self._rates(y)
+        return -self._K @ self._rates.step(y)[1]
 
 
 def _gain(value: Any, field: str) -> float:
