@@ -349,9 +349,12 @@ def test_ctrl_c_keeps_what_is_there():
         if t > 0.0055:
             raise KeyboardInterrupt
 
-    run = simulated_rotor().run(pd(), on_progress=stop)
+    sim = simulated_rotor()
+    run = sim.run(pd(), on_progress=stop)
     assert run.solution.status == "interrupted"
     assert run.solution.t[-1] == pytest.approx(0.006)
+    assert sim.run().solution.status == "complete"
+    assert np.array_equal(sim.result().solution.q, simulated_rotor().run(pd()).solution.q)
 
 
 def test_a_run_in_the_middle_says_so():

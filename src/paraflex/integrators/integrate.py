@@ -203,6 +203,8 @@ class Integration:
         """
         run = self.run if until is None else native.until(self.run, until)
         self._code = PAUSED
+        if self.status == "interrupted":
+            self.status, self.message = "complete", ""
         while self._code == PAUSED and run.attempts < self._most:
             self._code, crossing = advance(run, self._functions, min(_SLICE, self._most - run.attempts))
             if crossing is not None:

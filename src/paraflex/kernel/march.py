@@ -69,8 +69,8 @@ GROWING = 0.05
 LEAST_PART = 1e-11
 # A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
 SMALLEST_PART = 1e-4
-# Steps that differ by less than this part of them are of one length.
-SAME_STEP = 1e-9
+# Steps from one instant to the next that differ by less than this part of them, by rounding, are of one length.
+SAME_STEP = 1e-11
 
 
 @inlined
@@ -285,7 +285,7 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
             # Intervals between stops are divided evenly.
             h = left / max(1.0, ceil(left / longest - 1e-6))
             # But for rounding the same step: its factor still serves.
-            if abs(h - march.clock[STEP]) <= SAME_STEP * h:
+            if abs(h - march.clock[STEP]) <= 1e-9 * h:
                 h = march.clock[STEP]
             march.clock[STEP] = h
         if left <= h * (1.0 + 1e-9):
