@@ -255,7 +255,8 @@ class Simulation:
         Parameters
         ----------
         controllers : Controller, law or sequence of them, optional
-            See `Controller` and `SampledController`; torques of several for one motor add up.
+            See `Controller` and `SampledController`; torques of several for one motor add up. An empty list starts
+            anew without any.
         until : float, optional
             Up to when [s]; to the end by default.
         on_progress : callable, optional
@@ -279,7 +280,8 @@ class Simulation:
         if controllers is not None:
             self.reset()
             several = controllers if isinstance(controllers, list | tuple) else [controllers]
-            self._use(Loop(several, self._plant, self.sensors_read, self.motors, self._initial.time))
+            start = self._initial.time
+            self._use(Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None)
         end = self.end if until is None else min(until, self.end)
         try:
             while self.time < end and not self.ended:
