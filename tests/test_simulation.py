@@ -243,6 +243,8 @@ def test_a_model_of_python_control_is_a_law():
 
     by_hand = simulated_rotor().run(SampledController(Difference(), period=T, inputs=["hub"]))
     assert np.allclose(run.solution.q, by_hand.solution.q, atol=1e-12)
+    # As it is: with its period, and the encoders of all motors.
+    assert np.array_equal(simulated_rotor().run(model).solution.q, run.solution.q)
 
 
 # --- Failures ---------------------------------------------------------------------------------------------------------

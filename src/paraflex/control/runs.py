@@ -77,18 +77,23 @@ class TorqueLog:
     """
 
     def __init__(self, motors: int) -> None:
-        self._times: tuple[float, ...] = ()
-        self._torques: tuple[Array, ...] = (np.zeros(motors),)
+        self._times: list[float] = []
+        self._torques: list[Array] = [np.zeros(motors)]
 
     @property
     def begun(self) -> bool:
         """Whether anything was given."""
         return bool(self._times)
 
-    def note(self, t: float, torques: Array) -> TorqueLog:
-        """The log with torques (motors,) that act from a time on."""
+    def note(self, t: float, torques: Array) -> None:
+        """Add torques (motors,) that act from a time on."""
+        self._times.append(t)
+        self._torques.append(torques)
+
+    def copy(self) -> TorqueLog:
+        """The same so far, to go on from apart."""
         other = TorqueLog(0)
-        other._times, other._torques = (*self._times, t), (*self._torques, torques)
+        other._times, other._torques = self._times.copy(), self._torques.copy()
         return other
 
     def at(self, times: Array, slack: float) -> Array:

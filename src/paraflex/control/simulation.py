@@ -228,12 +228,12 @@ class Simulation:
         """All that it goes on from, controllers included: continued from there it gives the same bits."""
         loop = self._loop
         controllers = None if loop is None else loop.saved()
-        return Saved(self.time, self._integration.saved(), self._held.copy(), self._log, loop, controllers)
+        return Saved(self.time, self._integration.saved(), self._held.copy(), self._log.copy(), loop, controllers)
 
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` gave, of this simulation."""
         self._integration.restore(saved.kept)
-        self._held, self._log = saved.held.copy(), saved.log
+        self._held, self._log = saved.held.copy(), saved.log.copy()
         self._hold()
         self._use(saved.loop)
         if saved.loop is not None:
@@ -402,7 +402,7 @@ class Simulation:
             return
         changed = not np.array_equal(torques, self._held)
         self._held = torques
-        self._log = self._log.note(self.time, torques)
+        self._log.note(self.time, torques)
         if changed:
             self._hold()
             if self._integration.run.attempts == 0:
