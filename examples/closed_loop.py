@@ -79,14 +79,28 @@ def learned(task, simulation, runs=3):
     return torques, np.array(table.read)
 
 
-def feedback(task, read):
-    """LQG about the learned motion, of which sensors read so much."""
+def design_of(task):
+    """LQG about the start of a motion."""
     model = pf.reduce(pf.linearise(task, mode=MODE, at=0.0), 16)
-    design = pf.lqg(
+    return pf.lqg(
         model, PERIOD, delay=PERIOD, measured=[*ENCODERS, *GAUGES], effort=1.0, disturbance=0.3,
         deviations={"x": 2e-4, "y": 2e-4, **dict.fromkeys(ENCODERS, 0.02)},
         noise={**dict.fromkeys(ENCODERS, 1e-3), **dict.fromkeys(GAUGES, 3e-5)},
     )  # fmt: skip
+
+
+def robustness(task, design, payloads=(0.0, 0.12, 0.2, 0.5)):
+    """Largest spectral radius along the path and over payloads, least gain and delay margins of a motor."""
+    loaded = {f"{one} kg": task.remodelled(manipulator(one)) for one in payloads}
+    models = {f"pose {k}": model for k, model in enumerate(pf.poses_along(task, 8, mode=MODE).models)}
+    models |= {name: pf.linearise(one, mode=MODE, at=0.0) for name, one in loaded.items()}
+    rows = pf.margins(pf.linearise(task, mode=MODE, at=0.0), design).to_frame()
+    radius = float(pf.closed_loops(models, design)["spectral_radius"].max())
+    return {"radius": radius, "gain": float(rows["gain_up"].min()), "delay": float(rows["delay"].min())}
+
+
+def feedback(design, read):
+    """The design as a controller about the learned motion, of which sensors read so much."""
     columns = {name: read[:, k] for k, name in enumerate([*ENCODERS, *GAUGES])}
     return pf.SampledController(
         design.law(), limits=20.0,
@@ -112,10 +126,11 @@ def main():
         for name, one in (("as designed", task), ("20 % more payload", heavy))
     }
     torques, read = learned(task, plants["as designed"])
+    design = design_of(task)
     laws = {
         "rigid torques": [],
         "learned torques": [Learned(torques)],
-        "learned and LQG": [Learned(torques), feedback(task, read)],
+        "learned and LQG": [Learned(torques), feedback(design, read)],
     }
     found = {
         (law, name): figures(plant.run(list(laws[law]), warning=False))
@@ -125,6 +140,10 @@ def main():
     print("                 error, vibration after the path [mm]")
     for law in laws:
         print(f"{law:16s}", *(f"{name}: {found[law, name][0]:.4f}, {found[law, name][1]:.4f};" for name in plants))
+    found["robust"] = robustness(task, design)
+    print(
+        "spectral radius up to {radius:.4f}, gain margin {gain:.2f}, delay margin {delay:.2f}".format(**found["robust"])
+    )
     return found
 
 
