@@ -35,6 +35,7 @@ import documented  # noqa: E402
         ("linear-models.md", 3),
         ("reduction.md", 5),
         ("reduced-runs.md", 1),
+        ("learning.md", 4),
         ("statics.md", 3),
         ("flexures.md", 6),
     ],

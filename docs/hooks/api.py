@@ -27,6 +27,7 @@ PACKAGES = (
     "elastodynamics",
     "reduction",
     "linear",
+    "control.environment",
     "equilibria",
     "integrators.methods",
     "integrators",

@@ -91,6 +91,9 @@ from .linear import (
 )
 from .reduction import reduced_mechanism as reduced_mechanism
 
+# Control
+from .control.environment import Environment as Environment
+
 # Statics
 from .equilibria import statics as statics, Statics as Statics
 

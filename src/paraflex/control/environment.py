@@ -10,16 +10,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.observations import WIDEST, Observer
+from paraflex.control.observations import WIDEST, Observer, observed_sensors
 from paraflex.control.simulation import Simulation
 from paraflex.dynamics import State
 from paraflex.dynamics.joint_coordinates import marker_position
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Method
 from paraflex.kinematics import ModelWithPaths
+from paraflex.linear.linearise import measured_sensors
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.mechanism.quantities import known, not_negative, positive
 from paraflex.tracking import TrackingTask
@@ -35,21 +37,33 @@ else:
 Reward = Callable[[Simulation, Mapping[str, float], Array], float]
 # A last period of less than this part of one is none.
 _SAME = 1e-9
-# What an episode of the library's mechanism is called, and what makes it.
-REGISTERED = {"paraflex/RAParM-I-v0": ("paraflex.library:environment", {"name": "raparm_i"})}
+# Beside the feed-forward actions are corrections, of this part of its torques.
+_CORRECTING = 0.1
+# With 0.25 ms deviations of RAParM-I are exact to a hundredth.
+_STEP = 2.5e-4
+# Environments of the library: what makes them, and its settings.
+REGISTERED = {
+    "paraflex/RAParM-I-v0": (
+        "paraflex.library:environment",
+        {"name": "raparm_i", "options": IntegrationOptions(method="generalised-alpha", step=_STEP)},
+    )
+}
 
 
-class Environment(Env[Array, Array]):
+class Environment(Env[Array, NDArray[Any]]):
     """A mechanism as an environment of Gymnasium, its actions the torques of motors.
 
     An action a (motors,) lets the torques a x `limits` act for one period, beside those of the plan where it has a
     feed-forward. The observation is read at the end of the period. The reward of a period is
 
-        - (d / accuracy)^2 - effort_weight sum(a^2),
+        - min((d / accuracy)^2 + effort_weight sum(a^2), penalty),
 
     d the deviation of the end-effector from the plan at its end. An episode is truncated at the end of the run. It is
     terminated, with the cause in `info["error"]`, where an event of the options ends it, or where it has diverged and
-    cannot go on; its last observation is shown again, and each period left costs `penalty`.
+    cannot go on; its last observation is shown again, and each period left costs `penalty`, so that it never pays.
+
+    Torques that jump from one period to the next make the steps of an adaptive method short. With
+    `IntegrationOptions(method="generalised-alpha", step=2.5e-4)` runs are some ten times as fast, and coarser.
 
     Parameters
     ----------
@@ -60,8 +74,8 @@ class Environment(Env[Array, Array]):
     period : float
         From one action to the next [s].
     limits : float or mapping of str to float, optional
-        Torque of an action of one, of all motors of the mode or each [N m, N]. By default, of a plan, the largest that
-        it needs of any of them.
+        Torque of an action of one, of all motors of the mode or each [N m, N]. By default the largest that a plan needs
+        of any of them, or a tenth of it beside the feed-forward.
     sensors : sequence of str, optional
         Observed ones: see `Simulation.sensors_read`. By default encoders of the motors and the end-effector's place.
     errors : bool
@@ -79,13 +93,13 @@ class Environment(Env[Array, Array]):
     effort_weight : float
         What a motor at its limit costs in a period.
     penalty : float
-        What each period costs that is left when an episode is terminated.
+        The most that a period costs, and what each costs that is left when an episode is terminated.
     reward : callable, optional
         reward(simulation, readings, action) after a period, in place of the formula: readings of all sensors by name,
         without noise.
     vary : callable, optional
-        vary(random) -> Mechanism: that of an episode, from the environment's generator of random numbers, of the same
-        motors and sensors. A plan stays that of the mechanism it was made for.
+        vary(random) -> Mechanism: that of an episode, from the environment's generator of random numbers, of members
+        with the same names. A plan stays that of the mechanism it was made for.
     duration, start, balanced, method, options
         See `Simulation`.
 
@@ -156,11 +170,17 @@ class Environment(Env[Array, Array]):
         self._source, self._task, self._vary, self._reward = source, task, vary, reward
         self._accuracy, self._effort_weight, self._penalty = accuracy, effort_weight, penalty
         self.simulation: Simulation = Simulation(source, **self._settings)
+        if task is None and start is None and not isinstance(source, Mechanism):
+            self._settings["start"] = source.start
         self.motors: tuple[str, ...] = self.simulation.motors
-        self.limits: Array = _limits(limits, task, self.simulation)
+        self.limits: Array = _limits(
+            limits, task, self.simulation, _CORRECTING if self._settings["feed_forward"] else 1.0
+        )
+        self._members = _members(self.simulation.mechanism)
+        self._duration = self.simulation.end - self.simulation.time
         self._times = _instants(self.simulation.time, self.simulation.end, period)
         self._observe = Observer(
-            self.simulation.mechanism, task, _observed(sensors, self.simulation), self._times,
+            self.simulation.mechanism, task, observed_sensors(sensors, self.simulation), self._times,
             errors=errors, ahead=ahead, noise=noise, quantise=quantise, scales=scales,
         )  # fmt: skip
         self.observed: tuple[str, ...] = self._observe.names
@@ -188,7 +208,7 @@ class Environment(Env[Array, Array]):
         Raises
         ------
         InputError
-            Options; a mechanism of `vary` with other motors or sensors.
+            Options; a mechanism of `vary` that has other members.
         """
         super().reset(seed=seed)
         if options:
@@ -200,7 +220,7 @@ class Environment(Env[Array, Array]):
         self._seen = self._observe(0, readings, self.np_random)
         return self._seen.copy(), self._info(np.zeros(len(self.motors)))
 
-    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[Any]) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Let torques act for one period; observation, reward, whether terminated, whether truncated, `info`.
 
         `info` has the "time" reached [s], the "torques" of the action [N m, N], with a plan the end-effector's
@@ -247,7 +267,8 @@ class Environment(Env[Array, Array]):
     def _rewarded(self, readings: Mapping[str, float], action: Array, info: Mapping[str, Any]) -> float:
         if self._reward is not None:
             return float(self._reward(self.simulation, readings, action))
-        return -float((info["deviation"] / self._accuracy) ** 2 + self._effort_weight * (action @ action))
+        cost = (info["deviation"] / self._accuracy) ** 2 + self._effort_weight * (action @ action)
+        return -min(float(cost), self._penalty)
 
     def _info(self, action: Array) -> dict[str, Any]:
         info: dict[str, Any] = {"time": self.simulation.time, "torques": action * self.limits}
@@ -270,14 +291,20 @@ class Environment(Env[Array, Array]):
         return np.clip(given, -1.0, 1.0)
 
     def _varied(self, mechanism: Mechanism) -> Simulation:
-        """The simulation of another mechanism, with the same motors and sensors."""
-        source = mechanism if self._task is None else self._task.remodelled(mechanism)
-        simulation = Simulation(source, **self._settings)
-        same = (simulation.motors, simulation.sensors_read) == (self.motors, self.simulation.sensors_read)
-        if not (same and simulation.end == self.simulation.end):
-            raise InputError("makes a mechanism with other motors, sensors or another end", field="vary",
-                             value=mechanism.name, remedy="change numbers of bodies only")  # fmt: skip
-        return simulation
+        """The simulation of another mechanism, of the same members."""
+        if _members(mechanism) != self._members:
+            raise InputError("makes a mechanism of other members", field="vary", value=mechanism.name,
+                             remedy="change numbers only: members keep their names")  # fmt: skip
+        if self._task is not None:
+            return Simulation(self._task.remodelled(mechanism), **self._settings)
+        settings: dict[str, Any] = self._settings | {"duration": self._duration}
+        return Simulation(mechanism, **settings)
+
+
+def _members(mechanism: Mechanism) -> tuple[tuple[str, ...], ...]:
+    """Names of bodies, joints, motors and sensors."""
+    groups = (mechanism.bodies, mechanism.joints, mechanism.motors, measured_sensors(mechanism))
+    return tuple(tuple(each.name for each in group) for group in groups)
 
 
 def _instants(start: float, end: float, period: float) -> Array:
@@ -288,20 +315,8 @@ def _instants(start: float, end: float, period: float) -> Array:
     return times
 
 
-def _observed(sensors: Sequence[str] | None, simulation: Simulation) -> tuple[str, ...]:
-    """Names of sensors to observe."""
-    if sensors is not None:
-        for name in sensors:
-            known(name, simulation.sensors_read, "sensors", "sensor")
-        return tuple(sensors)
-    mechanism, effector = simulation.mechanism, simulation.mechanism.end_effector
-    joints = [motor.joint for motor in mechanism.motors if motor.name in simulation.motors]
-    axes = [] if effector is None else [axis for axis in ("x", "y") if axis in effector.coordinates]
-    return tuple(dict.fromkeys([*joints, *axes]))
-
-
-def _limits(given: Any, task: TrackingTask | None, simulation: Simulation) -> Array:
-    """Torques (motors,) of an action of one."""
+def _limits(given: Any, task: TrackingTask | None, simulation: Simulation, part: float) -> Array:
+    """Torques (motors,) of an action of one; by default this part of the largest that a plan needs."""
     motors = simulation.motors
     if given is None:
         if task is None:
@@ -309,15 +324,18 @@ def _limits(given: Any, task: TrackingTask | None, simulation: Simulation) -> Ar
         peak = float(np.max(np.abs(task.torques(simulation.mode).evaluate(task.motion.t))))
         if not peak:
             raise InputError("are missing", field="limits", remedy="give them in N m: the plan needs no torques")
-        return np.full(len(motors), peak)
+        return np.full(len(motors), part * peak)
     if isinstance(given, Mapping):
         for name in given:
             known(name, motors, "limits", "motor")
         missing = [name for name in motors if name not in given]
         if missing:
-            raise InputError(f"{', '.join(missing)} missing", field="limits", value=given, remedy="give one for each motor")
+            raise InputError(
+                f"{', '.join(missing)} missing", field="limits", value=given, remedy="give one for each motor"
+            )
         given = [given[name] for name in motors]
-    limits = np.broadcast_to(np.asarray(given, dtype=float), (len(motors),)).copy()
+    limits = np.empty(len(motors))
+    limits[:] = given
     for name, limit in zip(motors, limits, strict=True):
         positive(float(limit), f"limits.{name}", "N m or N")
     return limits
@@ -330,3 +348,7 @@ def register() -> None:
     for name, (entry_point, settings) in REGISTERED.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, entry_point=entry_point, kwargs=settings)
+
+
+if Env.__module__.startswith("gymnasium"):
+    register()

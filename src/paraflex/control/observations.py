@@ -8,6 +8,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.control.references import readings_of
+from paraflex.control.simulation import Simulation
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import known
@@ -88,6 +89,24 @@ class Observer:
         y[coarse] = self._resolution[coarse] * np.round(y[coarse] / self._resolution[coarse])
         seen = np.concatenate([y - self._planned[k], self._changes[k]]) / self._scale
         return np.clip(seen, -WIDEST, WIDEST)
+
+
+def observed_sensors(given: Sequence[str] | None, simulation: Simulation) -> tuple[str, ...]:
+    """Names of sensors to observe; by default encoders of the motors and the end-effector's place.
+
+    Raises
+    ------
+    InputError
+        Unknown ones.
+    """
+    if given is not None:
+        for name in given:
+            known(name, simulation.sensors_read, "sensors", "sensor")
+        return tuple(given)
+    mechanism, effector = simulation.mechanism, simulation.mechanism.end_effector
+    joints = [motor.joint for motor in mechanism.motors if motor.name in simulation.motors]
+    axes = [] if effector is None else [axis for axis in ("x", "y") if axis in effector.coordinates]
+    return tuple(dict.fromkeys([*joints, *axes]))
 
 
 def _planned(task: TrackingTask, mechanism: Mechanism, names: tuple[str, ...], times: Array) -> dict[str, Array]:

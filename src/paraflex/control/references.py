@@ -84,7 +84,9 @@ def planned_motion(plant: Plant, ahead: float = 0.0) -> RigidMotion:
 def planned_readings(plant: Plant) -> list[AtSamples | None]:
     """Readings on the planned motion at a controller's samples; None of sensors that it says nothing of."""
     motion = planned_motion(plant)
-    columns = {name: AtSamples(plant, values) for name, values in readings_of(motion, plant.mechanism, plant.inputs).items()}
+    columns = {
+        name: AtSamples(plant, values) for name, values in readings_of(motion, plant.mechanism, plant.inputs).items()
+    }
     return [columns.get(name) for name in plant.inputs]
 
 
