@@ -310,7 +310,7 @@ def _members(mechanism: Mechanism) -> tuple[tuple[str, ...], ...]:
 def _instants(start: float, end: float, period: float) -> Array:
     """Instants (k,) of observations [s]: the start, then ends of periods, the last one shorter."""
     count = max(1, int(np.ceil((end - start) / period - _SAME)))
-    times = start + period * np.arange(count + 1)
+    times = start + period * np.arange(count + 1, dtype=np.float64)
     times[-1] = end
     return times
 
