@@ -37,6 +37,7 @@ import documented  # noqa: E402
         ("reduction.md", 5),
         ("reduced-runs.md", 1),
         ("regulators.md", 2),
+        ("learning.md", 4),
         ("statics.md", 3),
         ("flexures.md", 6),
         ("control.md", 3),

@@ -42,6 +42,7 @@ PACKAGES = (
     "control.margins",
     "control.shaping",
     "control.shaped",
+    "control.environment",
     "equilibria",
     "integrators.methods",
     "integrators",

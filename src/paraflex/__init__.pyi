@@ -117,6 +117,7 @@ from .control.closed_loops import (
     ClosedLoop as ClosedLoop,
 )
 from .control.margins import margins as margins, Margins as Margins
+from .control.environment import Environment as Environment
 
 # Studies
 from .campaign import Workers as Workers

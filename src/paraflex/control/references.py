@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion
 from paraflex.linear.linearise import measured_sensors
-from paraflex.mechanism import Encoder, PointSensor, Sensor, Tachometer
+from paraflex.mechanism import Encoder, Mechanism, PointSensor, Sensor, Tachometer
 from paraflex.mechanism.quantities import known
 
 Reference = Callable[[float], float]
@@ -83,14 +83,21 @@ def planned_motion(plant: Plant, ahead: float = 0.0) -> RigidMotion:
 
 def planned_readings(plant: Plant) -> list[AtSamples | None]:
     """Readings on the planned motion at a controller's samples; None of sensors that it says nothing of."""
-    sensors = {sensor.name: sensor for sensor in measured_sensors(plant.mechanism)}
-    told: list[Sensor] = [sensors[name] for name in plant.inputs if _is_told(sensors[name])]
     motion = planned_motion(plant)
+    columns = {
+        name: AtSamples(plant, values) for name, values in readings_of(motion, plant.mechanism, plant.inputs).items()
+    }
+    return [columns.get(name) for name in plant.inputs]
+
+
+def readings_of(motion: RigidMotion, mechanism: Mechanism, names: Sequence[str]) -> dict[str, Array]:
+    """Readings (k,) on a rigid motion of those sensors of a mechanism that it says something of, by name."""
+    sensors = {sensor.name: sensor for sensor in measured_sensors(mechanism)}
+    told: list[Sensor] = [sensors[name] for name in names if _is_told(sensors[name])]
     system = motion.system
     nothing = np.zeros((motion.t.size, system.m)), np.zeros((motion.t.size, len(system.mechanism.motors)))
     values = SensorReader(system, told)(motion.q, motion.v, motion.a, *nothing)
-    columns = {sensor.name: AtSamples(plant, values[:, k]) for k, sensor in enumerate(told)}
-    return [columns.get(name) for name in plant.inputs]
+    return {sensor.name: values[:, k] for k, sensor in enumerate(told)}
 
 
 def _is_told(sensor: Sensor) -> bool:
