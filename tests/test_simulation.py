@@ -370,7 +370,9 @@ def test_an_event_ends_it():
     assert run.solution.q[-1, 2] == pytest.approx(0.8, abs=1e-9)
     assert run.applied.shape == (run.solution.t.size, 1)
     sim.reset()
-    with pytest.raises(IntegrationError, match=r"the run has ended: joint hub reached .* at t = 0\.00816497 s; call result"):
+    with pytest.raises(
+        IntegrationError, match=r"the run has ended: joint hub reached .* at t = 0\.00816497 s; call result"
+    ):
         sim.step([-60.0], 0.02)
 
 
