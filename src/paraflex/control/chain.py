@@ -143,6 +143,16 @@ class SampledController:
         if hasattr(self.law, "start"):
             self.law.start(plant)
 
+    @property
+    def title(self) -> str:
+        """What its law is, in a few words."""
+        return str(getattr(self.law, "title", type(self.law).__name__))
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest torques (outputs, 2), and their largest changes in a second (outputs,), once started."""
+        return np.stack([self._lowest, self._highest], axis=1), self._most / self.period
+
     def step(self, k: int, t: float, y: Array) -> Any:
         """See `Controller`."""
         y = np.array(y, dtype=float)
@@ -182,6 +192,8 @@ class DiscreteModel:
     inputs, outputs : tuple of str
         Names, where the model has any.
     """
+
+    title = "state space"
 
     def __init__(
         self,
@@ -237,6 +249,8 @@ class _Function:
 
     def __init__(self, function: Callable[[int, float, Array], Any]) -> None:
         self.step = function
+        name = getattr(function, "__name__", "")
+        self.title: str = name if name.isidentifier() else "function"
 
 
 def as_law(given: Any) -> Any:

@@ -62,6 +62,7 @@ class JointPID:
         mode's.
     """
 
+    title = "PID of joints"
     reference: str | None = PLAN
 
     @checked_arguments()

@@ -58,6 +58,12 @@ class ControllerRecord:
         Torques of the law.
     given : (k, outputs) array
         Those within the limits, which acted from t + delay on.
+    law : str
+        What it computes torques by, in a few words.
+    limits : (outputs, 2) array
+        Lowest and highest torque [N m, N]; infinite without.
+    rates : (outputs,) array
+        Largest change of torques in a second [N m/s, N/s]; infinite without.
     """
 
     name: str
@@ -71,6 +77,9 @@ class ControllerRecord:
     readings: Array
     wanted: Array
     given: Array
+    law: str
+    limits: Array
+    rates: Array
 
     @property
     def limited(self) -> Array:
@@ -227,7 +236,13 @@ class Loop:
             ControllerRecord(
                 name, controller.period, controller.delay, plant.inputs, plant.outputs, plant.input_units,
                 tuple(units(motor) for motor in plant.outputs), np.array(kept.t),
-                *(np.array(each).reshape(len(kept.t), -1) for each in (kept.readings, kept.wanted, kept.given)),
+                *(
+                    np.array(each).reshape(len(kept.t), len(names))
+                    for each, names in (
+                        (kept.readings, plant.inputs), (kept.wanted, plant.outputs), (kept.given, plant.outputs),
+                    )
+                ),
+                *_bounds(controller, len(plant.outputs)),
             )
             for name, controller, plant, kept in zip(self.names, self.controllers, self._plants, self.kept, strict=True)
         )  # fmt: skip
@@ -262,9 +277,31 @@ def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -
     return controller
 
 
+def _bounds(controller: Controller, outputs: int) -> tuple[str, Array, Array]:
+    """Words for a controller's law, limits (outputs, 2) and rates (outputs,) of its torques."""
+    if isinstance(controller, SampledController):
+        return controller.title, *controller.bounds
+    return type(controller).__name__, np.tile([-np.inf, np.inf], (outputs, 1)), np.full(outputs, np.inf)
+
+
+def check_name(name: Any) -> None:
+    """Check that a controller's name can stand in files of results, and in names of fields.
+
+    Raises
+    ------
+    InputError
+        It cannot.
+    """
+    if not isinstance(name, str) or not name or set(name) & set("./"):
+        raise InputError("is no name of a controller", field="name", value=name,
+                         remedy="give a text without dots and slashes")  # fmt: skip
+
+
 def _names(controllers: Sequence[Controller]) -> list[str]:
     """Names of controllers, with numbers where they have none of their own."""
     given = [getattr(each, "name", "controller") for each in controllers]
+    for name in given:
+        check_name(name)
     if len(set(given)) == len(given):
         return given
     twice = [name for name in given if given.count(name) > 1]
