@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import paraflex as pf
-from paraflex.control import SampledController, Simulation
+from paraflex import SampledController, Simulation
 from paraflex.control.laws import JointPID, internal_torques
 from paraflex.designs.measure import measure
 from paraflex.errors import ControllerError, InputError

@@ -232,20 +232,27 @@ class Loop:
 
     def records(self, units: Callable[[str], str]) -> tuple[ControllerRecord, ...]:
         """What each controller has done."""
-        return tuple(
-            ControllerRecord(
-                name, controller.period, controller.delay, plant.inputs, plant.outputs, plant.input_units,
-                tuple(units(motor) for motor in plant.outputs), np.array(kept.t),
-                *(
-                    np.array(each).reshape(len(kept.t), len(names))
-                    for each, names in (
-                        (kept.readings, plant.inputs), (kept.wanted, plant.outputs), (kept.given, plant.outputs),
-                    )
-                ),
-                *_bounds(controller, len(plant.outputs)),
-            )
-            for name, controller, plant, kept in zip(self.names, self.controllers, self._plants, self.kept, strict=True)
-        )  # fmt: skip
+        return tuple(self._record(k, units) for k in range(len(self.controllers)))
+
+    def _record(self, k: int, units: Callable[[str], str]) -> ControllerRecord:
+        controller, plant, kept = self.controllers[k], self._plants[k], self.kept[k]
+        law, limits, rates = _bounds(controller, len(plant.outputs))
+        return ControllerRecord(
+            name=self.names[k],
+            period=controller.period,
+            delay=controller.delay,
+            inputs=plant.inputs,
+            outputs=plant.outputs,
+            input_units=plant.input_units,
+            output_units=tuple(units(motor) for motor in plant.outputs),
+            t=np.array(kept.t),
+            readings=np.array(kept.readings).reshape(len(kept.t), len(plant.inputs)),
+            wanted=np.array(kept.wanted).reshape(len(kept.t), len(plant.outputs)),
+            given=np.array(kept.given).reshape(len(kept.t), len(plant.outputs)),
+            law=law,
+            limits=limits,
+            rates=rates,
+        )
 
     def saved(self) -> Any:
         """State of all controllers and of what is to come."""

@@ -18,7 +18,7 @@ from paraflex.results.traces import Trace
 from paraflex.units import WHERE_IT_SLIDES
 
 if TYPE_CHECKING:
-    from paraflex.control import ControllerRecord
+    from paraflex.control.loop import ControllerRecord
 
 # Kinds of runs.
 PATH, MOTION, STATICS = "path", "motion", "statics"

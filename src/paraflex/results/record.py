@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import given_as
-from paraflex.control import ControlledTracking, ControllerRecord
+from paraflex.control.loop import ControllerRecord
+from paraflex.control.runs import ControlledTracking
 from paraflex.dynamics.points import PointMotion, point_motion
 from paraflex.findings import Finding
 from paraflex.results.links import Links, system_links

@@ -9,8 +9,9 @@ from typing import Generic, TypeVar, overload
 
 import numpy as np
 
-from paraflex.control import ControlledMotion, ControlledTracking, ControllerRecord
 from paraflex.control.laws import internal_torques
+from paraflex.control.loop import ControllerRecord
+from paraflex.control.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import drive_torques, joint_parts, load_in
 from paraflex.dynamics.points import point_motion
