@@ -87,7 +87,7 @@ class JointPID:
                 f"{len(plant.inputs)} readings for {len(plant.outputs)} motors", field="inputs",
                 value=", ".join(plant.inputs), remedy="give the encoder of each motor, in their order",
             )  # fmt: skip
-        gains = (_per_motor(gain, plant.outputs, field) for field, gain in self._gains.items())
+        gains = (gains_of(gain, plant.outputs, field) for field, gain in self._gains.items())
         self._Kp, self._Kd, self._Ki = gains
         self._period = plant.period
         self._new = 1.0 if self._cutoff is None else 1.0 - np.exp(-2.0 * np.pi * self._cutoff * plant.period)
@@ -193,8 +193,14 @@ def task_inertia(effort: Effort) -> Array:
     return np.swapaxes(motion.basis, 1, 2) @ masses @ motion.basis
 
 
-def _per_motor(given: Any, motors: Sequence[str], field: str) -> Array:
-    """A gain for each motor (motors,)."""
+def gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
+    """A gain for each motor (motors,), from one for all or by motor.
+
+    Raises
+    ------
+    InputError
+        Unknown motors, or no numbers from zero on.
+    """
     if isinstance(given, Mapping):
         for name in given:
             known(name, motors, field, "motor")

@@ -132,7 +132,7 @@ class Loop:
         self._inputs = [[sensors.index(name) for name in plant.inputs] for plant in self._plants]
         self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self._plants]
         self.period: float = min(each.period for each in self.controllers)
-        self._every = [self._multiple(name, each.period) for name, each in self._named()]
+        self._every = [multiple_of(name, each.period, self.period) for name, each in self._named()]
         self._delays = [self._ticks(each.delay) for each in self.controllers]
         # Number of the next sample of each, torques to come, and those of each that act.
         self._next = [0] * len(self.controllers)
@@ -142,15 +142,6 @@ class Loop:
 
     def _named(self) -> list[tuple[str, Controller]]:
         return list(zip(self.names, self.controllers, strict=True))
-
-    def _multiple(self, name: str, period: float) -> int:
-        times = period / self.period
-        if abs(times - round(times)) > _SAME * times:
-            raise InputError(
-                f"is no multiple of the shortest period, {self.period:g} s", field=f"{name}.period", value=period,
-                remedy=f"say {round(times) * self.period:g}",
-            )  # fmt: skip
-        return round(times)
 
     def _ticks(self, time: float) -> tuple[int, float]:
         """A time in whole shortest periods, and what is left as a part of one."""
@@ -229,13 +220,8 @@ class Loop:
             ControllerRecord(
                 name, controller.period, controller.delay, plant.inputs, plant.outputs, plant.input_units,
                 tuple(units(motor) for motor in plant.outputs), np.array(kept.t),
-                *(
-                    np.array(each).reshape(len(kept.t), len(names))
-                    for each, names in (
-                        (kept.readings, plant.inputs), (kept.wanted, plant.outputs), (kept.given, plant.outputs),
-                    )
-                ),
-                *_bounds(controller, len(plant.outputs)),
+                _columns(kept.readings, plant.inputs), _columns(kept.wanted, plant.outputs),
+                _columns(kept.given, plant.outputs), *_bounds(controller, len(plant.outputs)),
             )
             for name, controller, plant, kept in zip(self.names, self.controllers, self._plants, self.kept, strict=True)
         )  # fmt: skip
@@ -270,11 +256,33 @@ def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -
     return controller
 
 
+def _columns(rows: Sequence[Array], names: Sequence[str]) -> Array:
+    """Rows (k, names) of samples, which may be none."""
+    return np.array(rows).reshape(len(rows), len(names))
+
+
 def _bounds(controller: Controller, outputs: int) -> tuple[str, Array, Array]:
     """Words for a controller's law, limits (outputs, 2) and rates (outputs,) of its torques."""
     if isinstance(controller, SampledController):
         return controller.title, *controller.bounds
     return type(controller).__name__, np.tile([-np.inf, np.inf], (outputs, 1)), np.full(outputs, np.inf)
+
+
+def multiple_of(name: str, period: float, shortest: float) -> int:
+    """How many shortest periods [s] the period of a controller is [s].
+
+    Raises
+    ------
+    InputError
+        It is no multiple of them.
+    """
+    times = period / shortest
+    if abs(times - round(times)) > _SAME * times:
+        raise InputError(
+            f"is no multiple of the shortest period, {shortest:g} s", field=f"{name}.period", value=period,
+            remedy=f"say {round(times) * shortest:g}",
+        )  # fmt: skip
+    return round(times)
 
 
 def check_name(name: Any) -> None:

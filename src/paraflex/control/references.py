@@ -74,7 +74,7 @@ def planned_motion(plant: Plant, ahead: float = 0.0) -> RigidMotion:
     task = plant.task
     if task is None:
         raise InputError("there is no planned motion", field="reference", value=PLAN,
-                         remedy="give Simulation the task that pf.plan makes")  # fmt: skip
+                         remedy="give numbers or functions of time by sensor, or a path to plan along")  # fmt: skip
     end = float(task.motion.t[-1])
     count = int(np.floor((end - plant.state.time) / plant.period * (1.0 + 1e-12))) + 1
     times = plant.state.time + plant.period * np.arange(max(count, 2))

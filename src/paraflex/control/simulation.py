@@ -12,6 +12,7 @@ from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.control.controllers import Controller, Plant
+from paraflex.control.described import ControllerDescription
 from paraflex.control.loop import LawFailure, Loop
 from paraflex.control.readings import Readings
 from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
@@ -252,7 +253,7 @@ class Simulation:
 
         Parameters
         ----------
-        controllers : Controller, law or sequence of them, optional
+        controllers : Controller, ControllerDescription, law or sequence of them, optional
             See `Controller` and `SampledController`; torques of several for one motor add up.
         until : float, optional
             Up to when [s]; to the end by default.
@@ -276,7 +277,9 @@ class Simulation:
         """
         if controllers is not None:
             self.reset()
-            several = controllers if isinstance(controllers, list | tuple) else [controllers]
+            given = controllers if isinstance(controllers, list | tuple) else [controllers]
+            several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
+                       for each in given]  # fmt: skip
             self._loop = Loop(several, self._plant, self.sensors_read, self.motors, self._initial.time)
         end = self.end if until is None else min(until, self.end)
         try:
