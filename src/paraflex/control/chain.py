@@ -43,6 +43,27 @@ class ChainSample(NamedTuple):
     given: Array
 
 
+class Chain(NamedTuple):
+    """What stands around a law, of each sensor and motor; None where there is nothing.
+
+    Attributes
+    ----------
+    resolution : list of float or None
+        Of readings.
+    filters : list of pair of arrays or None
+        Coefficients of numerator and denominator.
+    limits : list of pair of float or None
+        Lowest and highest torque [N m, N].
+    rates : list of float or None
+        [N m/s, N/s]
+    """
+
+    resolution: list[Any]
+    filters: list[Any]
+    limits: list[Any]
+    rates: list[Any]
+
+
 class SampledController:
     """A control law with what a real controller has around it: a `Controller`.
 
@@ -122,6 +143,21 @@ class SampledController:
         if isinstance(self.law, DiscreteModel):
             self.law.check(self.inputs, self.outputs, self.period)
 
+    def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> Chain:
+        """What stands around the law, for sensors and motors.
+
+        Raises
+        ------
+        InputError
+            Other names, or numbers that make no sense.
+        """
+        return Chain(
+            _by_name(self.quantise, inputs, "quantise", _positive),
+            _by_name(self.filters, inputs, "filters", _transfer_function),
+            _by_name(self.limits, outputs, "limits", _range),
+            _by_name(self.rates, outputs, "rates", _positive),
+        )
+
     def start(self, plant: Plant) -> None:
         """See `Controller`.
 
@@ -131,13 +167,10 @@ class SampledController:
             Names that the plant does not have.
         """
         self._references: list[Reference | None] = references(self.reference, plant)
-        self._resolution = _by_name(self.quantise, plant.inputs, "quantise", _positive)
-        self._filters = [_SettledFilter(given, plant.period) if given is not None else None for given in
-                         _by_name(self.filters, plant.inputs, "filters", _transfer_function)]  # fmt: skip
-        limits = _by_name(self.limits, plant.outputs, "limits", _range)
+        self._resolution, filters, limits, rates = self.check(plant.inputs, plant.outputs)
+        self._filters = [None if given is None else _SettledFilter(given, plant.period) for given in filters]
         self._lowest = np.array([-np.inf if one is None else one[0] for one in limits])
         self._highest = np.array([np.inf if one is None else one[1] for one in limits])
-        rates = _by_name(self.rates, plant.outputs, "rates", _positive)
         self._most = np.array([np.inf if one is None else one * plant.period for one in rates])
         self._given: Array = np.zeros(len(plant.outputs))
         if hasattr(self.law, "start"):

@@ -21,8 +21,8 @@ from paraflex.dynamics.joint_coordinates import marker_position
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Method
 from paraflex.kinematics import ModelWithPaths
-from paraflex.linear.linearise import measured_sensors
 from paraflex.mechanism import ActuationMode, Mechanism, Start
+from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import known, not_negative, positive
 from paraflex.tracking import TrackingTask
 

@@ -86,7 +86,7 @@ class JointPID:
                 f"{len(plant.inputs)} readings for {len(plant.outputs)} motors", field="inputs",
                 value=", ".join(plant.inputs), remedy="give the encoder of each motor, in their order",
             )  # fmt: skip
-        gains = (_per_motor(gain, plant.outputs, field) for field, gain in self._gains.items())
+        gains = (gains_of(gain, plant.outputs, field) for field, gain in self._gains.items())
         self._Kp, self._Kd, self._Ki = gains
         self._period = plant.period
         self._rates = BackwardDifference(plant.period, self._cutoff)
@@ -186,8 +186,14 @@ def task_inertia(effort: Effort) -> Array:
     return np.swapaxes(motion.basis, 1, 2) @ masses @ motion.basis
 
 
-def _per_motor(given: Any, motors: Sequence[str], field: str) -> Array:
-    """A gain for each motor (motors,)."""
+def gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
+    """A gain for each motor (motors,), from one for all or by motor.
+
+    Raises
+    ------
+    InputError
+        Unknown motors, or no numbers from zero on.
+    """
     if isinstance(given, Mapping):
         for name in given:
             known(name, motors, field, "motor")

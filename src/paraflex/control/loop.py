@@ -134,7 +134,7 @@ class Loop:
         self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self._plants]
         self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self._plants]
         self.period: float = min(each.period for each in self.controllers)
-        self._every = [self._multiple(name, each.period) for name, each in self._named()]
+        self._every = [multiple_of(name, each.period, self.period) for name, each in self._named()]
         self._delays = [self._ticks(each.delay) for each in self.controllers]
         # Number of the next sample of each, torques to come, and those of each that act.
         self._next = [0] * len(self.controllers)
@@ -144,15 +144,6 @@ class Loop:
 
     def _named(self) -> list[tuple[str, Controller]]:
         return list(zip(self.names, self.controllers, strict=True))
-
-    def _multiple(self, name: str, period: float) -> int:
-        times = period / self.period
-        if abs(times - round(times)) > _SAME * times:
-            raise InputError(
-                f"is no multiple of the shortest period, {self.period:g} s", field=f"{name}.period", value=period,
-                remedy=f"say {round(times) * self.period:g}",
-            )  # fmt: skip
-        return round(times)
 
     def _ticks(self, time: float) -> tuple[int, float]:
         """A time in whole shortest periods, and what is left as a part of one."""
@@ -246,9 +237,9 @@ class Loop:
             input_units=plant.input_units,
             output_units=tuple(units(motor) for motor in plant.outputs),
             t=np.array(kept.t),
-            readings=np.array(kept.readings).reshape(len(kept.t), len(plant.inputs)),
-            wanted=np.array(kept.wanted).reshape(len(kept.t), len(plant.outputs)),
-            given=np.array(kept.given).reshape(len(kept.t), len(plant.outputs)),
+            readings=_columns(kept.readings, plant.inputs),
+            wanted=_columns(kept.wanted, plant.outputs),
+            given=_columns(kept.given, plant.outputs),
             law=law,
             limits=limits,
             rates=rates,
@@ -284,11 +275,33 @@ def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -
     return controller
 
 
+def _columns(rows: Sequence[Array], names: Sequence[str]) -> Array:
+    """Rows (k, names) of samples, which may be none."""
+    return np.array(rows).reshape(len(rows), len(names))
+
+
 def _bounds(controller: Controller, outputs: int) -> tuple[str, Array, Array]:
     """Words for a controller's law, limits (outputs, 2) and rates (outputs,) of its torques."""
     if isinstance(controller, SampledController):
         return controller.title, *controller.bounds
     return type(controller).__name__, np.tile([-np.inf, np.inf], (outputs, 1)), np.full(outputs, np.inf)
+
+
+def multiple_of(name: str, period: float, shortest: float) -> int:
+    """How many shortest periods [s] the period of a controller is [s].
+
+    Raises
+    ------
+    InputError
+        It is no multiple of them.
+    """
+    times = period / shortest
+    if abs(times - round(times)) > _SAME * times:
+        raise InputError(
+            f"is no multiple of the shortest period, {shortest:g} s", field=f"{name}.period", value=period,
+            remedy=f"say {round(times) * shortest:g}",
+        )  # fmt: skip
+    return round(times)
 
 
 def check_name(name: Any) -> None:

@@ -12,8 +12,8 @@ from paraflex.control.controllers import Plant
 from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion
-from paraflex.linear.linearise import measured_sensors
 from paraflex.mechanism import Encoder, Mechanism, PointSensor, Sensor, Tachometer
+from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import known
 
 Reference = Callable[[float], float]
@@ -74,7 +74,7 @@ def planned_motion(plant: Plant, ahead: float = 0.0) -> RigidMotion:
     task = plant.task
     if task is None:
         raise InputError("there is no planned motion", field="reference", value=PLAN,
-                         remedy="give Simulation the task that pf.plan makes, or references by sensor")  # fmt: skip
+                         remedy="give numbers or functions of time by sensor, or a path to plan along")  # fmt: skip
     end = float(task.motion.t[-1])
     count = int(np.floor((end - plant.state.time) / plant.period * (1.0 + 1e-12))) + 1
     times = plant.state.time + plant.period * np.arange(max(count, 2))

@@ -12,6 +12,7 @@ from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.control.controllers import Controller, Plant
+from paraflex.control.described import ControllerDescription
 from paraflex.control.loop import LawFailure, Loop
 from paraflex.control.readings import Readings
 from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
@@ -21,8 +22,8 @@ from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, choose
 from paraflex.integrators.integrate import Integration, Kept
 from paraflex.kinematics import ModelWithPaths
-from paraflex.linear.linearise import measured_sensors
 from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode
+from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import known
 from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask, path_stops
@@ -254,7 +255,7 @@ class Simulation:
 
         Parameters
         ----------
-        controllers : Controller, law or sequence of them, optional
+        controllers : Controller, ControllerDescription, law or sequence of them, optional
             See `Controller` and `SampledController`; torques of several for one motor add up. An empty list starts
             anew without any.
         until : float, optional
@@ -279,7 +280,9 @@ class Simulation:
         """
         if controllers is not None:
             self.reset()
-            several = controllers if isinstance(controllers, list | tuple) else [controllers]
+            given = controllers if isinstance(controllers, list | tuple) else [controllers]
+            several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
+                       for each in given]  # fmt: skip
             start = self._initial.time
             self._use(Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None)
         end = self.end if until is None else min(until, self.end)
