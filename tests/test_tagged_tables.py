@@ -87,7 +87,7 @@ def problem(kind, place, content):
 
 def test_all_tagged_tables_are_found():
     places = {".".join(case.values[1]) for case in TAGS}
-    members = {f"{table}.some.type" for table in ("body", "joint", "load", "path", "sensor")}
+    members = {f"{table}.some.type" for table in ("body", "controller", "joint", "load", "path", "sensor")}
     assert places == members | {"path.type", "sensor.some.axis"}
     others = {".".join(case.values[1]) for case in CASES if not case.values[3]}
     assert {"sampling.kind", "search.method", "objective.over", "study.after", "vary.some.scale"} < others

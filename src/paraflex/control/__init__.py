@@ -1,22 +1,8 @@
-"""Simulations one can step, sampled controllers, and laws for them."""
+"""Simulations one can step, sampled controllers, and laws for them.
 
-from paraflex.control.chain import SampledController
-from paraflex.control.controllers import Controller, Plant
-from paraflex.control.described import ControllerDescription, PIDDescription, StateSpaceDescription
-from paraflex.control.loop import ControllerRecord
-from paraflex.control.runs import ControlledMotion, ControlledTracking
-from paraflex.control.simulation import Saved, Simulation
+Names are imported when they are first used: model files with controllers are read without what runs them.
+"""
 
-__all__ = [
-    "ControlledMotion",
-    "ControlledTracking",
-    "Controller",
-    "ControllerDescription",
-    "ControllerRecord",
-    "PIDDescription",
-    "Plant",
-    "SampledController",
-    "Saved",
-    "Simulation",
-    "StateSpaceDescription",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,6 +10,7 @@ from paraflex.control.described import LAWS, TABLE, ControllerDescription, check
 from paraflex.errors import InputError
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components
+from paraflex.files.said import fields_said
 from paraflex.files.schema import ControllerTable, ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.loads import InTime
@@ -62,8 +63,6 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
     InputError
         A reference that a file has no words for.
     """
-    from paraflex.files.tables import fields_said
-
     said = {"type": one.law.kind} | fields_said(one.law) | fields_said(one, "name", "law")
     if isinstance(one.reference, Mapping):
         try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields
 from enum import Enum
 from itertools import count
 from numbers import Integral
@@ -15,6 +14,7 @@ from paraflex.errors import InputError
 from paraflex.files.controllers import controller_table
 from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
+from paraflex.files.said import fields_said
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
@@ -143,17 +143,6 @@ def _laws(
         for sensor, law in one.reference.items() if isinstance(one.reference, Mapping) else ():
             if isinstance(law, AngleLaw):
                 yield f"controller.{one.name}.reference.{sensor}", law
-
-
-def fields_said(given: Any, *left_out: str) -> dict[str, Any]:
-    """The fields of a dataclass that are not as they are by default."""
-    out = {}
-    for field in fields(given):
-        value = getattr(given, field.name)
-        default = field.default if field.default_factory is MISSING else field.default_factory()
-        if field.name not in left_out and (default is MISSING or value != default):
-            out[field.name] = value
-    return out
 
 
 def _plain(value: Any, field: str) -> Any:
