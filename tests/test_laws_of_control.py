@@ -215,7 +215,7 @@ def test_feedback_of_a_rate_damps_a_rotor():
         (lambda: ComputedTorque(10.0), "there is no planned motion"),
         (lambda: RateFeedback({}), "gains: no gains"),
         (lambda: RateFeedback({"tau": {"hub": np.nan}}), r"gains\.tau\.hub: not a finite number"),
-        (lambda: RateFeedback({"tau": {"hob": 1.0}}), "sensors: unknown sensor"),
+        (lambda: RateFeedback({"tau": {"hob": 1.0}}), "inputs: unknown sensor"),
     ],
 )
 def test_bad_laws(make, said):

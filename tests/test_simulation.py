@@ -285,8 +285,8 @@ def test_a_controller_that_fails_ends_the_run(value, said):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ({"inputs": ["hob"]}, r'sensors: unknown sensor.*did you mean "hub"'),
-        ({"outputs": ["tao"]}, r'motors: unknown motor.*did you mean "tau"'),
+        ({"inputs": ["hob"]}, r'inputs: unknown sensor.*did you mean "hub"'),
+        ({"outputs": ["tao"]}, r'outputs: unknown motor.*did you mean "tau"'),
         ({"period": 0.0}, "period: must be positive"),
         ({"period": None}, "period: is missing"),
         ({"delay": -1e-3}, "delay: must be positive"),

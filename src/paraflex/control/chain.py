@@ -152,10 +152,10 @@ class SampledController:
             Other names, or numbers that make no sense.
         """
         return Chain(
-            _by_name(self.quantise, inputs, "quantise", _positive),
+            _by_name(self.quantise, inputs, "quantise", _resolution),
             _by_name(self.filters, inputs, "filters", _transfer_function),
             _by_name(self.limits, outputs, "limits", _range),
-            _by_name(self.rates, outputs, "rates", _positive),
+            _by_name(self.rates, outputs, "rates", _pace),
         )
 
     def start(self, plant: Plant) -> None:
@@ -352,12 +352,12 @@ def _by_name(given: Any, names: Sequence[str], field: str, take: Callable[[Any, 
     return [take(given[name], f"{field}.{name}") if name in given else None for name in names]
 
 
-def _positive(value: Any, field: str) -> float:
+def _positive(value: Any, field: str, unit: str = "s") -> float:
     if value is None:
         raise InputError("is missing", field=field, remedy="give it in seconds")
     if not isinstance(value, int | float | np.floating | np.integer):
         raise InputError("is no number", field=field, value=value, remedy="give one above zero")
-    positive(float(value), field, "its unit")
+    positive(float(value), field, unit)
     return float(value)
 
 
@@ -367,13 +367,21 @@ def _not_negative(value: Any, field: str) -> float:
     return _positive(value, field)
 
 
+def _resolution(value: Any, field: str) -> float:
+    return _positive(value, field, "the unit of the reading")
+
+
+def _pace(value: Any, field: str) -> float:
+    return _positive(value, field, "N m/s or N/s")
+
+
 def _range(value: Any, field: str) -> tuple[float, float]:
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) and len(value) == 2:
         low, high = float(value[0]), float(value[1])
         if not low < high:
             raise InputError("the lowest must be below the highest", field=field, value=value, remedy="exchange them")
         return low, high
-    most = _positive(value, field)
+    most = _positive(value, field, "N m or N")
     return -most, most
 
 
@@ -382,7 +390,7 @@ def _transfer_function(value: Any, field: str) -> tuple[Array, Array]:
     if all(hasattr(value, name) for name in ("num", "den")):
         value = (np.ravel(value.num), np.ravel(value.den))
     if isinstance(value, int | float):
-        rate = 2.0 * np.pi * _positive(value, field)
+        rate = 2.0 * np.pi * _positive(value, field, "Hz")
         return np.array([rate]), np.array([1.0, rate])
     try:
         numerator, denominator = (np.trim_zeros(np.atleast_1d(np.asarray(each, dtype=float)), "f") for each in value)

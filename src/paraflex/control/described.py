@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.control.chain import DiscreteModel, SampledController
-from paraflex.control.laws import JointPID, gains_of
-from paraflex.control.loop import check_name, multiple_of
+from paraflex.control.together import check_name, multiple_of
 from paraflex.errors import InputError
 from paraflex.mechanism import AngleLaw, Mechanism
 from paraflex.mechanism.loads import InTime
-from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import known
+
+if TYPE_CHECKING:
+    from paraflex.control.chain import DiscreteModel, SampledController
+    from paraflex.control.laws import JointPID
 
 # Where a model file has controllers; and the word for none of them.
 TABLE, NONE = "controller", "none"
@@ -74,6 +75,8 @@ class PIDDescription(CheckedFields):
 
     def check(self, inputs: Sequence[str], outputs: Sequence[str], motors: Sequence[str]) -> None:
         """See `DescribedLaw`."""
+        from paraflex.control.laws import gains_of
+
         for name, gain in self._gains(motors, only=False).items():
             gains_of(gain, motors, name)
         self.made(motors, 1.0)
@@ -85,6 +88,8 @@ class PIDDescription(CheckedFields):
 
     def made(self, outputs: Sequence[str], period: float) -> JointPID:
         """See `DescribedLaw`."""
+        from paraflex.control.laws import JointPID
+
         return JointPID(**self._gains(outputs), project=self.project, cutoff=self.cutoff)
 
     def _gains(self, motors: Sequence[str], *, only: bool = True) -> dict[str, Any]:
@@ -138,6 +143,8 @@ class StateSpaceDescription(CheckedFields):
         return self._model(period)
 
     def _model(self, period: float) -> DiscreteModel:
+        from paraflex.control.chain import DiscreteModel
+
         D, n = np.array(self.D), len(self.A)
         A, B, C = (np.reshape(rows, shape) if n else np.zeros(shape) for rows, shape in (
             (self.A, (n, n)), (self.B, (n, D.shape[1])), (self.C, (D.shape[0], n))))  # fmt: skip
@@ -196,6 +203,8 @@ class ControllerDescription(CheckedFields):
         InputError
             A sensor or a motor that the mechanism does not have, a number that makes no sense.
         """
+        from paraflex.linear.linearise import measured_sensors
+
         motors = [motor.name for motor in mechanism.motors]
         sensors = [sensor.name for sensor in measured_sensors(mechanism)]
         try:
@@ -240,6 +249,8 @@ class ControllerDescription(CheckedFields):
         return self._sampled(self.law.made(outputs, self.period), chosen)
 
     def _sampled(self, law: Any, chosen: Mapping[str, Any]) -> SampledController:
+        from paraflex.control.chain import SampledController
+
         more = {name: getattr(self, name) for name in ("limits", "rates", "quantise", "filters")} | dict(chosen)
         return SampledController(
             law, period=self.period, delay=self.delay, inputs=self.inputs, outputs=self.outputs, name=self.name, **more

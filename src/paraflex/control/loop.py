@@ -12,11 +12,9 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
+from paraflex.control.together import SAME as _SAME, check_name, multiple_of
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
-
-# Instants closer than this part of the shortest period are one.
-_SAME = 1e-9
 
 
 class Due(NamedTuple):
@@ -269,9 +267,9 @@ def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -
         controller: Controller = given
     else:
         controller = SampledController(as_law(given))
-    for names, among, what in ((controller.inputs, sensors, "sensor"), (controller.outputs, motors, "motor")):
-        for name in names:
-            known(name, among, f"{getattr(given, 'name', 'controller')}.{what}s", what)
+    for field_name, among, what in (("inputs", sensors, "sensor"), ("outputs", motors, "motor")):
+        for name in getattr(controller, field_name):
+            known(name, among, f"{getattr(given, 'name', 'controller')}.{field_name}", what)
     return controller
 
 
@@ -285,36 +283,6 @@ def _bounds(controller: Controller, outputs: int) -> tuple[str, Array, Array]:
     if isinstance(controller, SampledController):
         return controller.title, *controller.bounds
     return type(controller).__name__, np.tile([-np.inf, np.inf], (outputs, 1)), np.full(outputs, np.inf)
-
-
-def multiple_of(name: str, period: float, shortest: float) -> int:
-    """How many shortest periods [s] the period of a controller is [s].
-
-    Raises
-    ------
-    InputError
-        It is no multiple of them.
-    """
-    times = period / shortest
-    if abs(times - round(times)) > _SAME * times:
-        raise InputError(
-            f"is no multiple of the shortest period, {shortest:g} s", field=f"{name}.period", value=period,
-            remedy=f"say {round(times) * shortest:g}",
-        )  # fmt: skip
-    return round(times)
-
-
-def check_name(name: Any) -> None:
-    """Check that a controller's name can stand in files of results, and in names of fields.
-
-    Raises
-    ------
-    InputError
-        It cannot.
-    """
-    if not isinstance(name, str) or not name or set(name) & set("./"):
-        raise InputError("is no name of a controller", field="name", value=name,
-                         remedy="give a text without dots and slashes")  # fmt: skip
 
 
 def _names(controllers: Sequence[Controller]) -> list[str]:
