@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from paraflex.tracking import TrackingTask
 
 
+# Torques below this share of the largest are rounding.
+_ROUNDING = 1e-9
+
+
 class _PlainConsole(Console):
     """A console on which names from files do nothing: their control characters stand as escapes."""
 
@@ -124,18 +128,28 @@ def _after_table(summaries: Mapping[str, Any], task: TrackingTask) -> Table:
 def controllers(
     console: Console, runs: Sequence[tuple[Sequence[str], Mapping[str, Any]]], texts: Sequence[str] = ()
 ) -> None:
-    """A table of controllers of runs, each with words for its first columns; none where there were none."""
+    """A table of controllers of runs, along paths with words for first columns; nothing where there were none."""
     rows = []
     for names, run in runs:
-        internal = number(run.get("internal_torque_max"), ".2g")
+        internal = number(_unless_rounding(run.get("internal_torque_max"), run.get("peak_torque", {})), ".2g")
         for name, one in run.get("controllers", {}).items():
             most = max((each["given_max"] or 0.0 for each in one["torques"].values()), default=0.0)
             share = "" if one["saturated_share"] is None else f"{100.0 * one['saturated_share']:.3g}"
             times = (f"{1e3 * one[key]:.4g}" for key in ("period", "delay"))
-            rows.append([*names, name, one["law"], *times, f"{most:.3g}", share, internal])
+            rows.append([*names, name, one["law"], *times, f"{most:.3g}", share, *([internal] if texts else [])])
     if rows:
-        numbers = ("period\n[ms]", "delay\n[ms]", "largest\ntorque", "limited\n[%]", "internal\ntorque")
+        numbers = ["period\n[ms]", "delay\n[ms]", "largest\ntorque", "limited\n[%]"]
+        numbers += ["internal\ntorque"] if texts else []
         console.print(plain_table(*texts, "controller", "law", numbers=numbers, rows=rows, title="Controllers"))
+
+
+def _unless_rounding(value: float | None, beside: Mapping[str, float | None]) -> float | None:
+    """A value, or zero where it is the rounding of those that it is a part of."""
+    return (
+        0.0
+        if value is not None and value < _ROUNDING * max((x or 0.0 for x in beside.values()), default=0.0)
+        else value
+    )
 
 
 def plain_table(

@@ -48,12 +48,19 @@ def controller_tables(data: xr.Dataset) -> list[tuple[str, str]]:
         ])
         for mode, name, one in rows
     ]  # fmt: skip
-    internal = {mode: one["internal_torque_max"] for mode, one in figures.items() if "internal_torque_max" in one}
     note = "Limited: samples at which a limit of torques or of their rates was met."
-    known = [f"{number(most)} N m{f' in mode {mode}' if several else ''}" for mode, most in internal.items() if most]
+    known = [f"{most}{f' in mode {mode}' if several else ''}" for mode, most in _internal(figures)]
     if known:
         note += f" Largest internal torque, which only strains links: {', '.join(known)}."
     return [("Controllers", table(heads, cells, caption="Controllers", note=note))]
+
+
+def _internal(figures: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+    """Modes with controllers, and the largest internal torque of each in words."""
+    for mode, one in figures.items():
+        if CONTROLLERS in one and one.get("internal_torque_max") is not None:
+            efforts = [each["given_max"] or 0.0 for of in one[CONTROLLERS].values() for each in of["torques"].values()]
+            yield mode, f"{number(one['internal_torque_max'], beside=max(efforts))} N m"
 
 
 def _limits(torques: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -96,7 +103,7 @@ def _charts(one: ControllerData, runs: Sequence[str]) -> Iterator[Chart]:
             if np.isfinite(given[r, :, p]).any():
                 acts, law = _stairs(times + one.delay, given[r, :, p]), _stairs(times, wanted[r, :, p])
                 dotted = Look(look(p).colour, DOTTED)
-                curves.append(Curve(text_symbol(motor), acts[1], acts[0], look(p), run=r, shown=(r,)))
+                curves.append(Curve(text_symbol(motor), acts[1], acts[0], Look(look(p).colour), run=r, shown=(r,)))
                 curves.append(Curve("wanted", law[1], law[0], dotted, run=r, shown=(r,), quiet=True))
     yield replace(torques, curves=curves)
     for k, unit in enumerate(dict.fromkeys(one.units[name] for name in names_of(few, INPUT))):
