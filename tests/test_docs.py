@@ -33,10 +33,14 @@ import documented  # noqa: E402
         ("stresses.md", 2),
         ("quick-return.md", 4),
         ("linear-models.md", 3),
+        ("shaping.md", 3),
         ("reduction.md", 5),
         ("reduced-runs.md", 1),
+        ("regulators.md", 2),
+        ("learning.md", 4),
         ("statics.md", 3),
         ("flexures.md", 6),
+        ("control.md", 3),
     ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):

@@ -114,3 +114,28 @@ def test_second_order_spin_up(run):
     assert f"deepest {found['deepest']:.4f} m" in printed
     assert "linear: beam bends to a slope of" in printed
     assert "the motion diverges" in printed
+
+
+def test_closed_loop(run):
+    """What feedback is there for: a payload that learning did not know of. Errors and vibrations in mm."""
+    example, found, printed = run("closed_loop")
+    rigid, learned, fed_back = (
+        {name: found[law, name] for name in ("as designed", "20 % more payload")}
+        for law in ("rigid torques", "learned torques", "learned and LQG")
+    )
+    assert rigid["as designed"][0] > 0.6
+    assert learned["as designed"][0] < 0.003
+    assert learned["20 % more payload"][0] > 1.0
+    assert fed_back["as designed"][0] < 0.006
+    assert fed_back["20 % more payload"][0] < 0.14
+    for name, (_, vibration) in fed_back.items():
+        assert vibration < 0.1 * rigid[name][1], name  # 20 dB
+    assert f"{fed_back['20 % more payload'][0]:.4f}, {fed_back['20 % more payload'][1]:.4f}" in printed
+    assert found["robust"]["radius"] < 0.9932
+    assert found["robust"]["gain"] == pytest.approx(1.385, abs=2e-3)
+    assert found["robust"]["delay"] == pytest.approx(1.986, abs=2e-3)
+    # Steps of 1 ms are fine enough for that: error control agrees.
+    task = pf.plan(example.manipulator(0.12), pf.load("raparm_i").paths["square"], duration=0.7)
+    planned = pf.plan(example.manipulator(0.1), task.path, duration=0.7)
+    finely = planned.remodelled(task.mechanism).simulate("++++", method="esdirk4")
+    assert example.figures(finely)[0] == pytest.approx(rigid["20 % more payload"][0], rel=2e-3)

@@ -16,9 +16,15 @@ import paraflex as pf
 from made_up import STUDY, made_up, write_study
 from paraflex import plots
 from paraflex.cli.app import app
+from paraflex.control import (
+    ControllerDescription,
+    PIDDescription,
+    StateSpaceDescription,
+    simulate_controlled,
+    simulate_controlled_motion,
+)
 from paraflex.errors import InputError
 from paraflex.mechanism import Motor
-from paraflex.motion import simulate_motion
 from paraflex.plots.catalogue import CATALOGUE, homes
 from paraflex.plots.designs import undominated
 from paraflex.plots.labels import axis_label, logarithmic_number, metric_name
@@ -113,7 +119,8 @@ def _runs(folder: Path) -> None:
     models = [pf.linearise(model, mode=mode) for mode in ("++", None)]
     along = [pf.poses_along(task, 4, mode=mode) for mode in ("++", None)]
     save_results(pf.reduction_dataset(models, 16, along=along), folder / "reduction" / "reduced.nc")
-    run = tracking_dataset([task.simulate("++")])
+    gentle = ControllerDescription("pd", PIDDescription(1.0), 1e-3, delay=1e-3, limits=1e-4)
+    run = tracking_dataset([simulate_controlled(task, "++", [gentle])])
     # A second mode by name; the first is all that the motors can do.
     data = xr.concat([run, run.assign_coords(mode=["+-"])], "mode", combine_attrs="override")
     (folder / "tracking").mkdir()
@@ -130,10 +137,9 @@ def _runs(folder: Path) -> None:
         pf.AccelerationSensor("felt", end, "y", body), pf.JointForceSensor("pull", joint, 0.3),
     )  # fmt: skip
     driven = replace(pendulum, motors=(Motor("drive", joint),), sensors=sensors)
-    save_results(
-        motion_dataset(simulate_motion(driven, 0.1, samples=21, torques={"drive": 0.1})),
-        folder / "motion" / "results.nc",
-    )
+    brake = ControllerDescription("brake", StateSpaceDescription([[-1e-3, -1e-3]]), 2e-3, inputs=("angle", "rate"))
+    run = simulate_controlled_motion(driven, 0.1, [brake], samples=21)
+    save_results(motion_dataset(run), folder / "motion" / "results.nc")
 
 
 def _two_models(data: xr.Dataset) -> xr.Dataset:

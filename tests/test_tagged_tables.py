@@ -23,6 +23,8 @@ FILES = {
 }
 # What stands for a name that the user chooses.
 NAME = "some"
+# What stands beside tables within tables.
+BESIDE = {"shaper": {"type": "line", "start": [0.0, 0.3], "end": [0.1, 0.3], "max_acceleration": 1.0}}
 
 
 def choices(schema, field, place=(), beside=None):
@@ -77,6 +79,7 @@ def problem(kind, place, content):
     data = copy.deepcopy(base)
     inner = data
     for part in place[:-1]:
+        inner.update(BESIDE.get(part, {}))
         inner = inner.setdefault(part, {})
     for name, value in content.items():
         inner[name] = value
@@ -87,8 +90,8 @@ def problem(kind, place, content):
 
 def test_all_tagged_tables_are_found():
     places = {".".join(case.values[1]) for case in TAGS}
-    members = {f"{table}.some.type" for table in ("body", "joint", "load", "path", "sensor")}
-    assert places == members | {"path.type", "sensor.some.axis"}
+    members = {f"{table}.some.type" for table in ("body", "controller", "joint", "load", "path", "sensor")}
+    assert places == members | {"path.type", "sensor.some.axis", "path.some.shaper.type", "path.shaper.type"}
     others = {".".join(case.values[1]) for case in CASES if not case.values[3]}
     assert {"sampling.kind", "search.method", "objective.over", "study.after", "vary.some.scale"} < others
 

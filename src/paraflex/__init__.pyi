@@ -94,6 +94,31 @@ from .reduction import reduced_mechanism as reduced_mechanism
 # Statics
 from .equilibria import statics as statics, Statics as Statics
 
+# Control
+from .control.simulation import Simulation as Simulation
+from .control.chain import SampledController as SampledController
+from .control.controllers import Controller as Controller, Plant as Plant
+from .control.laws import JointPID as JointPID, joint_gains as joint_gains, internal_torques as internal_torques
+from .control.computed_torque import ComputedTorque as ComputedTorque
+from .control.rates import RateFeedback as RateFeedback
+from .control.shaping import Shaper as Shaper, shaper as shaper
+from .control.shaped import ShapedPath as ShapedPath, shape_torques as shape_torques
+from .control.sampled import discretise as discretise, SampledPlant as SampledPlant
+from .control.regulators import lqr as lqr, lqg as lqg, Regulator as Regulator, LQGDesign as LQGDesign
+from .control.estimators import (
+    quantisation_noise as quantisation_noise,
+    Differentiator as Differentiator,
+    BackwardDifference as BackwardDifference,
+)
+from .control.closed_loops import (
+    closed_loop as closed_loop,
+    closed_loops as closed_loops,
+    spillover as spillover,
+    ClosedLoop as ClosedLoop,
+)
+from .control.margins import margins as margins, Margins as Margins
+from .control.environment import Environment as Environment
+
 # Studies
 from .campaign import Workers as Workers
 from .studies import (

@@ -271,6 +271,10 @@ class ConstraintDriftError(IntegrationError):
     """Constraints are violated by more than errors of integration explain."""
 
 
+class ControllerError(NumericalError):
+    """A controller raised an error, or returned what cannot be torques: the run has ended there."""
+
+
 class ParaflexWarning(UserWarning):
     """Base class of all warnings of paraflex: `warnings.simplefilter("error", ParaflexWarning)` raises them.
 

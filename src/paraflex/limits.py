@@ -44,6 +44,8 @@ SAMPLES = 1_000_000
 INSTANTS = 2_000_000
 # Points of a path: a curve of a metre with a point each tenth of a millimetre.
 PATH_POINTS = 10_000
+# Impulses of an input shaper: each is a copy of the motion with its knots, at which steps end; ZVDD of four modes.
+SHAPER_IMPULSES = 256
 # Designs of a study: at ten runs a second they take twelve days, and more than their table would fill the memory.
 DESIGNS = 10_000_000
 # What to do about numbers that cannot be computed with.

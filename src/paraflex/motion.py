@@ -58,6 +58,11 @@ class MotionRun(Shown):
     solution: Solution
 
     @property
+    def in_time(self) -> bool:
+        """Whether torques change in time."""
+        return any(isinstance(law, AngleLaw) for law in self.torques.values())
+
+    @property
     def applied(self) -> Array:
         """Torques (k, motors) at the times of the solution [N m]."""
         t = self.solution.t
@@ -133,25 +138,14 @@ def simulate_motion(
         The run could not be finished; it carries a MotionRun with what was computed.
     """
     given, mechanism = mechanism, Mechanism.made_of(mechanism)
-    if start is None and not isinstance(given, Mechanism):
-        start = given.start
-    if duration is None:
-        duration = getattr(getattr(given, "study", None), "duration", None)
-    if duration is None:
-        raise InputError("is missing", field="duration", remedy="give it in seconds, or in the model's [study]")
     options = choose(method, options)
-    check_times(duration, samples)
     names = [motor.name for motor in mechanism.motors]
     for name, torque in (torques or {}).items():
         known(name, names, "torques", "motor")
         if not isinstance(torque, AngleLaw) and not np.isfinite(torque):
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: (torques or {}).get(name, 0.0) for name in names}
-    system = build_system(mechanism)
-    if isinstance(start, State) and balanced:
-        raise InputError("a state is as it is", field="balanced", value=balanced, remedy="leave one of the two out")
-    state = start if isinstance(start, State) else _state(system, start, balanced)
-    times = np.linspace(state.time, state.time + duration, samples)
+    system, state, times = motion_start(given, duration, samples, start, balanced=balanced)
     end = float(times[-1])
     motors, own = _motor_signals(values, end)
     signals, knots = pack_signals(mechanism, motors, end)
@@ -168,6 +162,35 @@ def simulate_motion(
         warn(run.validity)
         warn_of(run.doubts, ResultWarning)
     return run
+
+
+def motion_start(
+    given: Mechanism | ModelWithPaths,
+    duration: float | None,
+    samples: int,
+    start: State | Start | str | None,
+    *,
+    balanced: bool,
+) -> tuple[System, State, Array]:
+    """System, start and times (samples,) of a run without a path: see `simulate_motion` for the arguments.
+
+    Raises
+    ------
+    InputError, AssemblyError
+        See there.
+    """
+    if start is None and not isinstance(given, Mechanism):
+        start = given.start
+    if duration is None:
+        duration = getattr(getattr(given, "study", None), "duration", None)
+    if duration is None:
+        raise InputError("is missing", field="duration", remedy="give it in seconds, or in the model's [study]")
+    check_times(duration, samples)
+    system = build_system(Mechanism.made_of(given))
+    if isinstance(start, State) and balanced:
+        raise InputError("a state is as it is", field="balanced", value=balanced, remedy="leave one of the two out")
+    state = start if isinstance(start, State) else _state(system, start, balanced)
+    return system, state, np.linspace(state.time, state.time + duration, samples)
 
 
 def _run(system: System, times: Array, torques: Mapping[str, InTime], solution: Solution) -> MotionRun:

@@ -239,6 +239,11 @@ class TrackingRun(Shown):
         """Torques of all motors at the task's sample times, or at the k reached ones if brakes held them [N m]."""
         return self.torques.evaluate(self.task.motion.t) if self.holding is None else self.holding
 
+    @property
+    def follows(self) -> bool:
+        """Whether torques drive it along the path."""
+        return self.holding is None or self.task.holds
+
     @cached_property
     def validity(self) -> Validity | None:
         """Validity of the model in the run; None for rigid bodies and finite segments."""
@@ -263,7 +268,7 @@ class TrackingRun(Shown):
         # The state at an event is a sample more than the task's times.
         k = solution.t.size - bool(solution.event)
         effector = task.mechanism.end_effector
-        if effector is None or (self.holding is not None and not task.holds) or not k:
+        if effector is None or not self.follows or not k:
             return None
         actual = marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0]
         return task.driven(self.mode.name, self.applied, self.condition[:k], actual)

@@ -178,8 +178,8 @@ def _mistyped(word: str) -> list[str]:
 
 # Units of fields of files, as their descriptions name them.
 FIELD_UNITS = (
-    "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad", "N s/m", "N m", "N/m", "m/s^2", "m^4", "m^2", "m/s",
-    "rad/s", "rad", "Pa", "Hz", "1/s", "m", "s", "N",
+    "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad/s", "N m/rad", "N s/m", "N m/s", "N m", "N/m/s", "N/m",
+    "N/s", "m/s^2", "m^4", "m^2", "m/s", "rad/s", "rad", "Pa", "Hz", "1/s", "m", "s", "N",
 )  # fmt: skip
 
 # What a travel, a torque, a stiffness or a speed at a joint is where the joint slides.

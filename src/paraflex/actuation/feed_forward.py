@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from math import factorial
+from math import comb, factorial
 
 import numpy as np
 import scipy
@@ -25,6 +25,8 @@ _ERROR_FALL = 32.0
 # Points of a smooth interval to begin with, at least, and seconds between them at most.
 _FEWEST_POINTS, _LONGEST_SPACING = 12, 2e-3
 _REFINEMENTS = 6
+# Delayed breaks nearer than this part of the run are one.
+_SAME_TIME = 1e-12
 _IN_TIME = ("t", "q", "v", "a", "basis")
 
 
@@ -56,6 +58,52 @@ class FeedForward:
             x = t - signal.breaks[piece]
             columns.append(sum(signal.coefficients[piece, power] * x**power for power in range(_DEGREE + 1)))
         return np.column_stack(columns)
+
+    def shaped(self, delays: Array, weights: Array) -> FeedForward:
+        """The sum of these torques at earlier times, each with its weight; before the first instant its torque holds.
+
+        Parameters
+        ----------
+        delays, weights : (i,) arrays
+            Delays from zero [s]; the torques end when they did, whatever is left of those delayed.
+        """
+        return FeedForward(
+            self.mode,
+            tuple(_shaped(signal, delays, weights) for signal in self.signals),
+            _delayed(self.knots, delays),
+            _delayed(self.times, delays),
+        )
+
+
+def _delayed(times: Array, delays: Array) -> Array:
+    """Times (k,) with each delay added, in order; those that are one to rounding once, and none after the last."""
+    end = times[-1]
+    every = np.unique(np.minimum(times[:, None] + delays, end))
+    apart = np.diff(every, prepend=-np.inf) > _SAME_TIME * (end - times[0])
+    return np.append(every[apart & (every < end - _SAME_TIME * (end - times[0]))], end)
+
+
+def _shaped(signal: InputSignals, delays: Array, weights: Array) -> InputSignals:
+    """The sum of delayed copies of a piecewise polynomial, exact: pieces between all delayed breaks."""
+    breaks = _delayed(signal.breaks, delays)
+    middle, coefficients = 0.5 * (breaks[1:] + breaks[:-1]), np.zeros((breaks.size - 1, _DEGREE + 1))
+    for delay, weight in zip(delays, weights, strict=True):
+        piece = np.searchsorted(signal.breaks, middle - delay, side="right") - 1
+        inside = piece >= 0
+        piece = np.minimum(piece, len(signal.coefficients) - 1)[inside]
+        moved = breaks[:-1][inside] - delay - signal.breaks[piece]
+        coefficients[inside] += weight * _about(signal.coefficients[piece], moved)
+        coefficients[~inside, 0] += weight * signal.coefficients[0, 0]
+    return InputSignals(breaks, coefficients)
+
+
+def _about(coefficients: Array, places: Array) -> Array:
+    """Coefficients (k, 6) of polynomials about other places (k,)."""
+    out = np.zeros_like(coefficients)
+    for power in range(_DEGREE + 1):
+        for order in range(power + 1):
+            out[:, order] += comb(power, order) * coefficients[:, power] * places ** (power - order)
+    return out
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from paraflex.actuation import actuation_condition
+from paraflex.control.shaped import ShapedPath
 from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import ActuationError, AssemblyError, InputError, NumericalError, UnreachablePathError
 from paraflex.files import Model
@@ -184,6 +185,8 @@ def _few_samples(model: Model) -> Iterator[Finding]:
 def _turns(place: str, path: Path, orientation: float) -> Iterator[Finding]:
     """Angles of a path and of the end-effector that are in degrees."""
     angles = {"study.orientation": (orientation, 1.0)}
+    if isinstance(path, ShapedPath):
+        path = path.path
     if isinstance(path, Circle):
         angles |= {f"{place}.start_angle": (path.start_angle, 1.0), f"{place}.sweep": (path.sweep, _TURNS)}
     for where, (angle, most) in angles.items():

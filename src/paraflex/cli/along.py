@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from rich.console import Console
@@ -19,7 +20,7 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import check_stops, model_parameters
 from paraflex.cli.reduced import asked_reduction, kept_coordinates
-from paraflex.cli.request import at_fault, plan_study
+from paraflex.cli.request import acting_controllers, at_fault, controllers_said, plan_study
 from paraflex.cli.tables import (
     below_tolerance,
     failures,
@@ -33,6 +34,7 @@ from paraflex.cli.tables import (
 )
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels
+from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import Model
@@ -71,6 +73,7 @@ def run_along(
     console = plain_console(stderr=True)
     if request.segments is None:
         check_stops(mechanism, options, request.stop_at)
+    controllers = acting_controllers(model, request)
     stiff = request.rigid or request.ked or request.segments is not None
     compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
     began = time.perf_counter()
@@ -84,9 +87,9 @@ def run_along(
         kept, full = kept_coordinates(request, model.study), None
         if kept is not None:
             full, task = task, task.remodelled(asked_reduction(request, task, kept, modes))
-        parameters = _parameters(model, name, modes, task, how, request)
+        parameters = _parameters(model, name, modes, task, how, request, controllers)
         doubts = check_planned(model, task, name, modes, request.plan.assembly)
-        method, error = _method(request, options), model.study.error
+        method, error = _method(request, options, controllers), model.study.error
         study = TrackingStudy(
             task, modes, options, parameters, method, error, warning=False, findings=doubts, full=full
         )
@@ -169,10 +172,14 @@ def _draw(console: Console, request: RunRequest, along: _Along, result: StudyRes
         failures(console, result, along.whose)
 
 
-def _method(request: RunRequest, options: IntegrationOptions) -> Simulator | None:
+def _method(
+    request: RunRequest, options: IntegrationOptions, controllers: Sequence[ControllerDescription]
+) -> Simulator | None:
     """How each mode is run where it is not by the study's own way."""
     if request.ked:
         return simulate_ked
+    if controllers:
+        return partial(simulate_controlled, controllers=controllers, options=options, balanced=request.balanced)
     if not request.balanced:
         return None
 
@@ -191,7 +198,13 @@ def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
 
 
 def _parameters(
-    model: Model, path: str, modes: list[ActuationMode], task: TrackingTask, how: dict, request: RunRequest
+    model: Model,
+    path: str,
+    modes: list[ActuationMode],
+    task: TrackingTask,
+    how: dict,
+    request: RunRequest,
+    controllers: Sequence[ControllerDescription],
 ) -> dict:
     return {
         "model": dict(model.parameters),
@@ -204,6 +217,7 @@ def _parameters(
             "samples": int(task.motion.t.size),
             "after": task.after.value,
             "error": model.study.error,
+            "controllers": controllers_said(model, controllers),
         }
         | model_parameters(request, task.mechanism, kept_coordinates(request, model.study))
         | how,

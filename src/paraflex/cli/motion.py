@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -21,15 +22,18 @@ from paraflex.cli.integration import model_parameters
 from paraflex.cli.reduced import asked_reduction, kept_coordinates
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
+    acting_controllers,
     at_fault,
+    controllers_said,
     of_assembly,
 )
-from paraflex.cli.tables import loads, plain_console, reduction, validity
+from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
+from paraflex.control import ControllerDescription, simulate_controlled_motion
 from paraflex.dynamics import State, build_system
 from paraflex.dynamics.state import nearest_state
-from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning, ValidityWarning
+from paraflex.errors import AssemblyError, ControllerError, InputError, IntegrationError, ResultWarning, ValidityWarning
 from paraflex.files import Model, StudyDefaults
 from paraflex.findings import DONE_STATUSES
 from paraflex.folders import RUN, ResultsFolder
@@ -86,13 +90,14 @@ def _run_held(
     console, study = plain_console(stderr=True), model.study
     compile_kernels_for(mechanism, console.print)
     began = time.perf_counter()
-    full = _simulate(console, model, mechanism, options, balanced=request.balanced)
+    controllers = acting_controllers(model, request)
+    full = _simulate(console, model, mechanism, options, controllers, balanced=request.balanced)
     run, kept = full, kept_coordinates(request, study)
     # What did not get to its end has nothing to be compared with.
     if kept is not None and full.solution.status in DONE_STATUSES:
         few = asked_reduction(request, full, kept)
         start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
-        run = _simulate(console, model, few, options, start=start)
+        run = _simulate(console, model, few, options, controllers, start=start)
     parameters = {
         "model": dict(model.parameters),
         "run": {
@@ -100,6 +105,7 @@ def _run_held(
             "set": dict(model.settings),
             "duration": study.duration,
             "samples": study.samples,
+            "controllers": controllers_said(model, controllers),
         }
         | model_parameters(request, mechanism, kept)
         | how,
@@ -130,6 +136,7 @@ def _simulate(
     model: Model,
     mechanism: Mechanism,
     options: IntegrationOptions,
+    controllers: Sequence[ControllerDescription],
     *,
     balanced: bool = False,
     start: State | None = None,
@@ -148,6 +155,11 @@ def _simulate(
             # The table and the summary say what the run doubts.
             warnings.simplefilter("ignore", ValidityWarning)
             warnings.simplefilter("ignore", ResultWarning)
+            if controllers:
+                return simulate_controlled_motion(
+                    mechanism, study.duration, controllers, samples=study.samples, start=begun, options=options,
+                    on_progress=report,
+                )  # fmt: skip
             return simulate_motion(
                 mechanism,
                 study.duration,
@@ -157,7 +169,7 @@ def _simulate(
                 options=options,
                 on_progress=report,
             )
-    except IntegrationError as error:
+    except (IntegrationError, ControllerError) as error:
         return error.partial
     except AssemblyError as error:
         raise of_assembly(error, model) from error
@@ -202,6 +214,7 @@ def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
         out.print(summary["message"], soft_wrap=True)
     reduction(out, summary)
     loads(out, {"": summary["loads"]})
+    controllers(out, [((), summary)])
     out.print("at the end:")
     # Points that segments made by the program hang together at are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}

@@ -14,10 +14,11 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import integration_options
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.reduced import asked_reduction, kept_coordinates
-from paraflex.cli.request import asked_model, find_path, plan_study
+from paraflex.cli.request import acting_controllers, asked_model, find_path, plan_study
 from paraflex.cli.run import asked_mechanism
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
+from paraflex.control import simulate_controlled, simulate_controlled_motion
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.mechanism import parse_mode, proportional_segments
@@ -82,9 +83,16 @@ def _runs(
 ) -> Iterator[TrackingRun | MotionRun]:
     mechanism, options = asked_mechanism(model, request), integration_options(request, model.study)
     compile_kernels_for(mechanism, plain_console(stderr=True).print)
+    controllers = acting_controllers(model, request)
     if path is None:
         study = own_motion(model, request.plan)
         start = start_of(model, mechanism, study.assembly, balanced=request.balanced) or study.assembly
+        if controllers:
+            assert study.duration is not None
+            yield simulate_controlled_motion(
+                mechanism, study.duration, controllers, samples=study.samples, start=start, options=options
+            )
+            return
         yield simulate_motion(
             mechanism, study.duration, samples=study.samples, torques=study.torques, start=start, options=options
         )
@@ -97,4 +105,7 @@ def _runs(
         chosen = [parse_mode(mechanism, mode) for mode in modes]
         task = task.remodelled(asked_reduction(request, task, kept, chosen))
     for mode in modes:
-        yield simulate(task, mode, options=options, warning=False)
+        if controllers:
+            yield simulate_controlled(task, mode, controllers, options=options, balanced=request.balanced)
+        else:
+            yield simulate(task, mode, options=options, warning=False)

@@ -8,6 +8,8 @@ from dataclasses import asdict
 
 from paraflex.cli.commands.options import FramesChoice, ModelChoice, PlanChoice
 from paraflex.cli.commands.requests import flags
+from paraflex.cli.commands.runs import RunRequest
+from paraflex.control.described import NONE, ControllerDescription
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.files import Model, load, load_path
 from paraflex.files.overlay import value_of
@@ -78,6 +80,31 @@ def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
     return list(modes)
 
 
+def acting_controllers(model: Model, request: RunRequest) -> tuple[ControllerDescription, ...]:
+    """The controllers asked for, or the study's."""
+    try:
+        found = model.acting(request.controllers)
+    except InputError as error:
+        raise (error.at("--controller") if error.field == "controllers" else error.in_file(model.source)) from None
+    if found and request.ked:
+        raise InputError(
+            "means nothing with --ked, which holds motors on the rigid motion", field="--controller",
+            value=found[0].name, remedy=f"say --controller {NONE}",
+        )  # fmt: skip
+    if found and not model.paths and not request.paths and model.study.torques:
+        raise InputError(
+            "given torques and controllers are for one or the other run", field="study.torques",
+            value=", ".join(model.study.torques), remedy=f"leave one of them out, or say --controller {NONE}",
+            source=model.source,
+        )  # fmt: skip
+    return found
+
+
+def controllers_said(model: Model, acting: Sequence[ControllerDescription]) -> list[str]:
+    """Controllers of a run as --controller says them."""
+    return [one.name for one in acting] or ([NONE] if model.study.controllers else [])
+
+
 def find_mode(model: Model, names: list[str]) -> ActuationMode:
     """Of the modes asked for, or the study's, the one with most motors."""
     return max(find_modes(model, names), key=lambda mode: len(mode.motors))
@@ -115,6 +142,7 @@ def at_fault(error: InputError, model: Model) -> InputError:
         "duration": "--duration",
         "samples": "--samples",
         "tolerance": "--tol",
+        "method": "--method",
         "assembly": "--assembly",
         "after": "--after",
         "events": "--stop-at",

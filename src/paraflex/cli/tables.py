@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     # With what they import they take as long as all of `paraflex info`.
     from paraflex.studies import StudyResult
     from paraflex.tracking import TrackingTask
+
+
+# Torques below this share of the largest are rounding.
+_ROUNDING = 1e-9
 
 
 class _PlainConsole(Console):
@@ -60,6 +64,7 @@ def print_studies(console: Console, summaries: Mapping[str, Any], task: Tracking
     console.print(_study_table(summaries, task, model))
     if any(mode.get("tracking_rms_after") is not None for _, mode in _runs(summaries)):
         console.print(_after_table(summaries, task))
+    controllers(console, [(names, mode) for names, mode in _runs(summaries)], _texts(summaries))
     for names, mode in _runs(summaries):
         if mode["status"] == "stopped":
             *path, name = names
@@ -112,10 +117,39 @@ def _after_table(summaries: Mapping[str, Any], task: TrackingTask) -> Table:
         motors = "held all the time"
     keys = {"motion\n[m]": "tracking_rms_motion", "after\n[m]": "tracking_rms_after", "drift\n[m/s]": "drift_speed",
             "vibration\n[m]": "residual_vibration"} | ({"brakes\n[J]": "brake_energy"} if held else {})  # fmt: skip
+    if any("controllers" in mode for _, mode in _runs(summaries)):
+        keys |= {"settling\n[s]": "settling_time", "overshoot\n[m]": "overshoot"}
     ran = ((names, mode) for names, mode in _runs(summaries) if "steps" in mode)
     rows = ([*names, *(number(mode[key], ".2e") for key in keys.values())] for names, mode in ran)
     title = f"Tracking error during the motion and after it, the motors {motors}"
     return plain_table(*_texts(summaries), numbers=keys, rows=rows, title=title)
+
+
+def controllers(
+    console: Console, runs: Sequence[tuple[Sequence[str], Mapping[str, Any]]], texts: Sequence[str] = ()
+) -> None:
+    """A table of controllers of runs, along paths with words for first columns; nothing where there were none."""
+    rows = []
+    for names, run in runs:
+        internal = number(_unless_rounding(run.get("internal_torque_max"), run.get("peak_torque", {})), ".2g")
+        for name, one in run.get("controllers", {}).items():
+            most = max((each["given_max"] or 0.0 for each in one["torques"].values()), default=0.0)
+            share = "" if one["saturated_share"] is None else f"{100.0 * one['saturated_share']:.3g}"
+            times = (f"{1e3 * one[key]:.4g}" for key in ("period", "delay"))
+            rows.append([*names, name, one["law"], *times, f"{most:.3g}", share, *([internal] if texts else [])])
+    if rows:
+        numbers = ["period\n[ms]", "delay\n[ms]", "largest\ntorque", "limited\n[%]"]
+        numbers += ["internal\ntorque"] if texts else []
+        console.print(plain_table(*texts, "controller", "law", numbers=numbers, rows=rows, title="Controllers"))
+
+
+def _unless_rounding(value: float | None, beside: Mapping[str, float | None]) -> float | None:
+    """A value, or zero where it is the rounding of those that it is a part of."""
+    return (
+        0.0
+        if value is not None and value < _ROUNDING * max((x or 0.0 for x in beside.values()), default=0.0)
+        else value
+    )
 
 
 def plain_table(

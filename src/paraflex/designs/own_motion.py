@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from paraflex.control import ControllerDescription, simulate_controlled_motion
 from paraflex.dynamics import State, build_system
 from paraflex.errors import InputError
 from paraflex.files import Model
@@ -27,6 +28,8 @@ class OwnMotion:
     samples : int
     torques : mapping of str to float or AngleLaw
         Of motors by name.
+    controllers : sequence of ControllerDescription
+        In place of torques.
     """
 
     mechanism: Mechanism
@@ -34,9 +37,15 @@ class OwnMotion:
     duration: float
     samples: int
     torques: Mapping[str, InTime]
+    controllers: Sequence[ControllerDescription] = ()
 
     def simulate(self, options: IntegrationOptions, watch: Callable[[float], None] | None) -> MotionRun:
         """Integrate it; `watch` is called with the time reached [s]."""
+        if self.controllers:
+            return simulate_controlled_motion(
+                self.mechanism, self.duration, self.controllers, samples=self.samples, start=self.start,
+                options=options, on_progress=watch,
+            )  # fmt: skip
         return simulate_motion(
             self.mechanism, self.duration, samples=self.samples, torques=self.torques, start=self.start,
             options=options, on_progress=watch, warning=False,
@@ -57,7 +66,9 @@ def own_motion(
     """
     study = model.study.filled(duration=duration, samples=samples, assembly=assembly)
     start = state_at(build_system(model.mechanism), model.start, study.assembly, balanced=balanced)
-    return OwnMotion(model.mechanism, start, own_duration(model, duration), study.samples, study.torques)
+    return OwnMotion(
+        model.mechanism, start, own_duration(model, duration), study.samples, study.torques, model.acting()
+    )
 
 
 def own_duration(model: Model, duration: float | None) -> float:

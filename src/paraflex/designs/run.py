@@ -11,12 +11,14 @@ import xarray as xr
 
 from paraflex.campaign import Row
 from paraflex.compilation import compile_kernels_for
+from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.designs.measure import Runs, coarseness, measure
 from paraflex.designs.own_motion import OwnMotion, own_motion
 from paraflex.designs.own_statics import OwnStatics, own_statics
 from paraflex.designs.setting import Setting, digest, versions
 from paraflex.equilibria.result import Statics
 from paraflex.errors import InputError, NumericalError
+from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.motion import MotionRun
@@ -31,8 +33,17 @@ if TYPE_CHECKING:
 STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID = "complete", "failed", "invalid"
 STATUSES = (STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID)
 _ID_DIGITS = 16
+
+
+class UnderControl(NamedTuple):
+    """A planned motion, and the controllers that act beside its torques."""
+
+    task: TrackingTask
+    controllers: tuple[ControllerDescription, ...]
+
+
 # What is ready to be run.
-Planned = TrackingTask | OwnMotion | OwnStatics
+Planned = TrackingTask | UnderControl | OwnMotion | OwnStatics
 
 
 class Task(NamedTuple):
@@ -120,9 +131,10 @@ def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
     InputError, NumericalError
         Numbers that cannot be, a path out of reach, or loops that do not close.
     """
-    if setting.has_path:
-        return plan_task(setting, task)
     model, options = setting.design(task.values)
+    if setting.has_path:
+        planned, controllers = _planned(setting, model, task), model.acting()
+        return (UnderControl(planned, controllers) if controllers else planned), options
     _compile(model.mechanism)
     if setting.statics:
         return own_statics(model, setting.assembly), options
@@ -131,7 +143,7 @@ def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
 
 
 def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOptions]:
-    """The planned motion of a design along its path, and the integration options of its runs.
+    """The planned motion of a design along its path, and the integration options of its runs without controllers.
 
     Raises
     ------
@@ -139,6 +151,10 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
         Numbers that cannot be, or a path out of reach.
     """
     model, options = setting.design(task.values)
+    return _planned(setting, model, task), options
+
+
+def _planned(setting: Setting, model: Model, task: Task) -> TrackingTask:
     _compile(model.mechanism)
     planned = model.plan(
         task.path, duration=setting.duration, samples=setting.samples, assembly=setting.assembly, warning=False
@@ -146,7 +162,7 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
     if model.study.reduced:
         # Chosen anew for each design, from its plan alone: no run with all coordinates is needed.
         planned = planned.remodelled(reduced_mechanism(planned, model.study.reduced, modes=setting.modes))
-    return planned, options
+    return planned
 
 
 def table_schema(setting: Setting, members: Members) -> pa.Schema:
@@ -224,6 +240,8 @@ def run_mode(planned: Planned, mode: str, options: IntegrationOptions, watch: Ca
         return planned.found()
     if isinstance(planned, OwnMotion):
         run = planned.simulate(options, watch)
+    elif isinstance(planned, UnderControl):
+        run = simulate_controlled(planned.task, mode, planned.controllers, options=options, on_progress=watch)
     else:
         run = simulate(planned, mode, options=options, on_progress=watch, warning=False)
     if run.solution.status == "interrupted":

@@ -15,7 +15,7 @@ import scipy
 
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.contacts import sliding_joints
-from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate
+from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, marker_position
 from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
 from paraflex.dynamics.points import marker_motion
 from paraflex.dynamics.sections import section_at
@@ -82,6 +82,31 @@ class _Local(NamedTuple):
         return MotionSamples(*(values[:, own] for values, own in zip(given, self.columns, strict=True)))
 
 
+class SensorReader:
+    """Readings of some sensors of a system, for one call after another.
+
+    Parameters
+    ----------
+    system : System
+    sensors : sequence of Sensor, optional
+        By default those of the mechanism.
+
+    Raises
+    ------
+    InputError
+        A sensor of what the mechanism does not have.
+    """
+
+    def __init__(self, system: System, sensors: Sequence[Sensor] | None = None) -> None:
+        self._locals: list[_Local] = _locals(system, sensors)
+
+    def __call__(self, q: Numbers, v: Numbers, a: Numbers, multipliers: Numbers, torques: Numbers) -> Numbers:
+        """See `sensor_readings`."""
+        given = MotionSamples(q, v, a, multipliers, torques)
+        readings = [each.read(each.taken(given)) for each in self._locals]
+        return np.stack(readings, axis=1) if readings else np.zeros((len(q), 0))
+
+
 def sensor_readings(
     system: System,
     q: Numbers,
@@ -108,9 +133,7 @@ def sensor_readings(
     InputError
         A sensor of what the mechanism does not have.
     """
-    given = MotionSamples(q, v, a, multipliers, torques)
-    readings = [each.read(each.taken(given)) for each in _locals(system, sensors)]
-    return np.stack(readings, axis=1) if readings else np.zeros((len(q), 0))
+    return SensorReader(system, sensors)(q, v, a, multipliers, torques)
 
 
 def sensor_rows(
@@ -225,10 +248,11 @@ def _of_point(system: System, sensor: PointSensor) -> Callable[[MotionSamples], 
     frame = None if sensor.body == GROUND else system.body(sensor.body)
 
     def read(at: MotionSamples) -> Numbers:
-        motion = marker_motion(system, marker, at.q, at.v, at.a)
         if isinstance(sensor, PositionSensor):
-            vector = motion.position if frame is None else motion.position - at.q[:, frame.position]
+            vector = marker_position(system, marker, at.q)
+            vector = vector if frame is None else vector - at.q[:, frame.position]
         else:
+            motion = marker_motion(system, marker, at.q, at.v, at.a)
             vector = motion.velocity if isinstance(sensor, VelocitySensor) else motion.acceleration
         if frame is None:
             return ex * vector[:, 0] + ey * vector[:, 1]

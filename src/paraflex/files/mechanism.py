@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from typing import Any
 
+from paraflex.control.shaped import ShapedPath
+from paraflex.control.shaping import Shaper, ShaperKind
 from paraflex.errors import InputError
 from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters
@@ -17,6 +19,7 @@ from paraflex.files.schema import (
     PathTable,
     PrescribedTable,
     SequenceTable,
+    ShaperTable,
     TabulatedPathTable,
     TorqueTable,
 )
@@ -199,7 +202,7 @@ def read_path(table: PathTable, others: Mapping[str, Path] | None = None) -> Pat
     InputError
         Numbers that make no path, or unknown names.
     """
-    said = {name: value for name, value in table if name != "type"}
+    said = {name: value for name, value in table if name not in ("type", "shaper")}
     if isinstance(table, SequenceTable):
         for name in table.paths:
             known(name, others or {}, "paths", "path")
@@ -213,7 +216,16 @@ def read_path(table: PathTable, others: Mapping[str, Path] | None = None) -> Pat
         said["points"] = [row[:2] for row in rows]
         said["times"] = [row[2] for row in rows] if rows and len(rows[0]) > 2 else None
     try:
-        return PATHS[table.type](**said)
+        path = PATHS[table.type](**said)
     except InputError as error:
         at_table = isinstance(table, TabulatedPathTable) and error.field in ("points", "times")
         raise (error.at("table") if at_table else error) from None
+    return path if table.shaper is None else ShapedPath(path, _shaper(table.shaper))
+
+
+def _shaper(table: ShaperTable) -> Shaper:
+    said = {name: value for name, value in table if name != "type" and value is not None}
+    try:
+        return Shaper(ShaperKind(table.type), **said)
+    except InputError as error:
+        raise error.within("shaper") from None

@@ -8,8 +8,10 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.control.described import NONE, ControllerDescription, check_periods
 from paraflex.equilibria.given import StaticsDefaults, conditions
 from paraflex.errors import InputError, suggestion
+from paraflex.files.controllers import read_controllers
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
 from paraflex.files.mechanism import read_mechanism, read_path, read_paths, read_torques
@@ -24,6 +26,7 @@ from paraflex.files.tables import model_tables
 from paraflex.findings import warn_of
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode
+from paraflex.mechanism.quantities import known
 from paraflex.tracking import Ending, TrackingTask, plan_tracking
 from paraflex.validity import doubtful_numbers
 from paraflex.writing import write_text
@@ -51,6 +54,8 @@ class Model(CheckedFields):
         What `load` has set in place of what the file says, by field.
     statics : StaticsDefaults
         What `paraflex.statics` finds unless asked otherwise.
+    controllers : mapping of str to ControllerDescription
+        Those that runs may have, by name: see `acting`.
     """
 
     mechanism: Mechanism
@@ -62,6 +67,7 @@ class Model(CheckedFields):
     text: str = field(default="", repr=False, compare=False)
     settings: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     statics: StaticsDefaults = field(default_factory=StaticsDefaults)
+    controllers: Mapping[str, ControllerDescription] = field(default_factory=dict)
 
     def _repr_html_(self) -> str:
         """In notebooks."""
@@ -115,6 +121,24 @@ class Model(CheckedFields):
         """
         wanted = names or self.study.modes or [mode.name for mode in self.mechanism.modes]
         return tuple(dict.fromkeys(parse_mode(self.mechanism, name) for name in wanted))
+
+    @checked_arguments()
+    def acting(self, names: Sequence[str] = ()) -> tuple[ControllerDescription, ...]:
+        """Controllers by name, else those of the study; "none" alone for none of them.
+
+        Raises
+        ------
+        InputError
+            An unknown controller, or periods that are no multiples of the shortest.
+        """
+        wanted = list(dict.fromkeys(names or self.study.controllers))
+        if wanted == [NONE]:
+            return ()
+        for name in wanted:
+            known(name, self.controllers, "controllers", "controller")
+        found = tuple(self.controllers[name] for name in wanted)
+        check_periods(found)
+        return found
 
     @checked_arguments()
     def duration(self, path: Path | str, chosen: float | None = None) -> float:
@@ -363,6 +387,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
         "modes": tuple(table.study.modes),
         "orientation": table.study.orientation or 0.0,
         "torques": read_torques(table),
+        "controllers": tuple(table.study.controllers),
     }
     study = StudyDefaults(**said)
     check_study(mechanism, paths, study)
@@ -373,10 +398,15 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
             remedy='name "angle" among the coordinates of [end_effector], or leave it out',
         )  # fmt: skip
     start = None if table.start is None else read_start(table.start, mechanism)
-    return Model(
+    model = Model(
         mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start, text=text,
-        statics=_statics(table, mechanism),
+        statics=_statics(table, mechanism), controllers=read_controllers(table, mechanism),
     )  # fmt: skip
+    try:
+        model.acting()
+    except InputError as error:
+        raise (error.at("study.controllers") if error.field == "controllers" else error) from None
+    return model
 
 
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
@@ -415,7 +445,9 @@ def _carrier(model: Model) -> tuple[Any, ...]:
 
 
 def _tables(model: Model, **options: Any) -> dict[str, Any]:
-    return model_tables(model.mechanism, model.paths, model.study, model.start, model.statics, **options)
+    return model_tables(
+        model.mechanism, model.paths, model.study, model.start, model.statics, model.controllers, **options
+    )
 
 
 def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:

@@ -522,7 +522,26 @@ class PayloadTable(_Table):
     )
 
 
-class PolygonTable(_Table):
+class ShaperTable(_Table):
+    """An input shaper, by which a path leaves modes of vibration at rest."""
+
+    type: Literal["zv", "zvd", "zvdd", "ei"] = Field(description='the kind: "zv", "zvd", "zvdd" or "ei"')
+    frequencies: Number | list[Number] = Field(
+        description="the undamped natural frequencies of the modes in Hz, one number or a list"
+    )
+    damping: Number | list[Number] = Field(
+        default=0.0, description="the damping ratio of all modes, or a list with one for each"
+    )
+    tolerance: Number | None = Field(
+        default=None, description='of "ei", the residual at its frequency as a fraction, by default 0.05'
+    )
+
+
+class _PathTable(_Table):
+    shaper: ShaperTable | None = Field(default=None, description="the input shaper of the path: none by default")
+
+
+class PolygonTable(_PathTable):
     """Straight segments from corner to corner."""
 
     type: Literal["polygon"]
@@ -531,7 +550,7 @@ class PolygonTable(_Table):
     closed: Yes = Field(default=True, description="whether the path returns to start")
 
 
-class LineTable(_Table):
+class LineTable(_PathTable):
     """A straight line."""
 
     type: Literal["line"]
@@ -540,7 +559,7 @@ class LineTable(_Table):
     max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
 
 
-class CircleTable(_Table):
+class CircleTable(_PathTable):
     """A circle or arc."""
 
     type: Literal["circle"]
@@ -551,7 +570,7 @@ class CircleTable(_Table):
     sweep: Number = Field(default=6.283185307179586, description="the angle swept in rad, positive counter-clockwise")
 
 
-class PointsTable(_Table):
+class PointsTable(_PathTable):
     """A smooth motion through points."""
 
     type: Literal["points"]
@@ -561,7 +580,7 @@ class PointsTable(_Table):
     motion_time: Number = Field(description="the time from the first point to the last in s")
 
 
-class TabulatedPathTable(_Table):
+class TabulatedPathTable(_PathTable):
     """A smooth curve through many points, such as those of a file."""
 
     type: Literal["table"]
@@ -575,7 +594,7 @@ class TabulatedPathTable(_Table):
     max_speed: Number | None = Field(default=None, description="the largest speed along the path in m/s")
 
 
-class SequenceTable(_Table):
+class SequenceTable(_PathTable):
     """Paths one after another in one motion."""
 
     type: Literal["sequence"]
@@ -609,6 +628,79 @@ TorqueEntry = Annotated[
 ]
 
 
+# Of all motors or by motor, and of all sensors or by sensor.
+NumbersOf = Number | dict[str, Number]
+Matrix = list[list[Number]]
+
+
+ReferenceEntry = Annotated[
+    Annotated[Literal["plan"], Tag("word[plan]")] | Annotated[dict[str, FunctionOfTime], Tag("ReferenceTable")],
+    Discriminator(lambda value: "ReferenceTable" if isinstance(value, dict) else "word[plan]"),
+]
+
+
+class ControllerTable(_Table):
+    """A sampled controller: what stands around its law."""
+
+    period: Number = Field(description="the time between samples in s")
+    delay: Number = Field(default=0.0, description="the time from a sample until its torques act in s")
+    inputs: list[Text] = Field(
+        default=[],
+        description='sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the '
+        "encoders of its motors",
+    )
+    outputs: list[Text] = Field(default=[], description="motors; by default all of a mode")
+    reference: ReferenceEntry | None = Field(
+        default=None,
+        description='what is taken off the readings: "plan", or by sensor a number or an expression of the time t, in '
+        'the unit of the sensor; by default "plan" with "pid", nothing with "state-space"',
+    )
+    limits: Number | Pair | dict[str, Number | Pair] | None = Field(
+        default=None,
+        description="the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all "
+        "motors or by motor",
+    )
+    rates: NumbersOf | None = Field(
+        default=None, description="the largest change of torques in N m/s or N/s, of all motors or by motor"
+    )
+    quantise: NumbersOf | None = Field(
+        default=None, description="the resolution of readings, in the unit of the sensor, of all or by sensor"
+    )
+    filters: dict[str, Number | list[list[Number]]] = Field(
+        default={},
+        description="by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients "
+        "of numerator and denominator in descending powers of s",
+    )
+
+
+class PIDTable(ControllerTable):
+    """A PID law of the angles of motors."""
+
+    type: Literal["pid"]
+    stiffness: NumbersOf = Field(description="the proportional gain in N m/rad or N/m, of all motors or by motor")
+    damping: NumbersOf = Field(
+        default=0.0, description="the derivative gain in N m s/rad or N s/m, of all motors or by motor"
+    )
+    integral: NumbersOf = Field(
+        default=0.0, description="the integral gain in N m/rad/s or N/m/s, of all motors or by motor"
+    )
+    project: Yes = Field(default=True, description="whether torques that only strain links are taken out")
+    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+
+
+class StateSpaceTable(ControllerTable):
+    """A discrete model from readings to torques."""
+
+    type: Literal["state-space"]
+    D: Matrix = Field(description="rows of the matrix from readings to torques")
+    A: Matrix = Field(default=[], description="rows of the matrix of states; none without states")
+    B: Matrix = Field(default=[], description="rows of the matrix from readings to states")
+    C: Matrix = Field(default=[], description="rows of the matrix from states to torques")
+
+
+AnyControllerTable = Annotated[PIDTable | StateSpaceTable, Field(discriminator="type")]
+
+
 class StudyDefaultsTable(_Table):
     """What `paraflex run` does unless asked otherwise."""
 
@@ -624,6 +716,9 @@ class StudyDefaultsTable(_Table):
     torques: dict[str, TorqueEntry] = Field(
         default={},
         description="torques of motors in N m, without a path: numbers, expressions of the time t, or tables",
+    )
+    controllers: list[Text] = Field(
+        default=[], description="names of [controller.NAME] tables that act, beside the torques planned along a path"
     )
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
@@ -722,6 +817,7 @@ class ModelTable(_WithGroups):
     )
     mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
     path: dict[str, PathTable] = Field(default={})
+    controller: dict[str, AnyControllerTable] = Field(default={})
     start: StartTable | None = None
     study: StudyDefaultsTable = StudyDefaultsTable()
     statics: StaticsTable = StaticsTable()

@@ -46,6 +46,8 @@ class StudyDefaults:
         Flexible coordinates that runs keep of all bodies together; all where None or 0.
     error : str
         Which tracking error ranks modes: that of the "motion", or of the "whole" run.
+    controllers : tuple of str
+        Names of the model's controllers that act, beside the torques planned along a path.
     """
 
     path: str | None = None
@@ -62,6 +64,7 @@ class StudyDefaults:
     after: str = "free"
     reduced: int | None = None
     error: str = "motion"
+    controllers: tuple[str, ...] = ()
 
     @property
     def first_path(self) -> str | None:

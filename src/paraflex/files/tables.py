@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields
 from enum import Enum
 from itertools import count
 from numbers import Integral
 from typing import Any
 
+from paraflex.control.described import ControllerDescription
+from paraflex.control.shaped import ShapedPath
 from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import InputError
+from paraflex.files.controllers import controller_table
 from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
+from paraflex.files.said import fields_said
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
@@ -51,6 +54,7 @@ def model_tables(
     study: StudyDefaults,
     start: Start | None,
     statics: StaticsDefaults,
+    controllers: Mapping[str, ControllerDescription],
     *,
     file: Mapping[str, Any] | None = None,
     before: Mechanism | None = None,
@@ -60,7 +64,7 @@ def model_tables(
 
     Parameters
     ----------
-    mechanism, paths, study, start, statics
+    mechanism, paths, study, start, statics, controllers
     file : mapping, optional
         Data of a file whose names for sections, materials and lumps are kept.
     before : Mechanism, optional
@@ -85,9 +89,9 @@ def model_tables(
         "description": mechanism.description,
         "geometry": "" if mechanism.geometry.value == "second-order" else mechanism.geometry.value,
         **{key: value for key, value in shared.items() if value != _SHARED[key]},
-        "parameters": law_parameters(_laws(mechanism, study)),
+        "parameters": law_parameters(_laws(mechanism, study, controllers)),
         "section": {name: _section(one, name, file or {}) for name, one in names["section"].values.items()},
-        "material": {name: _fields(material) for name, material in names["material"].values.items()},
+        "material": {name: fields_said(material) for name, material in names["material"].values.items()},
         "lump": {name: {"mass": mass, "inertia": inertia} for name, (mass, inertia) in names["lump"].values.items()},
         "ground": mechanism.ground,
         "gravity": [] if tuple(mechanism.gravity) == (0.0, 0.0) else mechanism.gravity,
@@ -96,13 +100,14 @@ def model_tables(
         "motor": {motor.name: motor.joint for motor in mechanism.motors},
         "prescribed": {each.name: _prescribed(each, mechanism) for each in mechanism.prescribed},
         **_forces(mechanism),
-        "end_effector": {} if mechanism.end_effector is None else _fields(mechanism.end_effector),
+        "end_effector": {} if mechanism.end_effector is None else fields_said(mechanism.end_effector),
         "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
         "mode": {mode.name: mode.motors for mode in mechanism.modes},
         "path": {name: _path(path, name, paths) for name, path in paths.items()},
+        "controller": {name: controller_table(one) for name, one in controllers.items()},
         "start": {} if start is None else _start(start),
-        "study": _fields(study) | ({"torques": _torques(study)} if study.torques else {}),
-        "statics": _fields(statics),
+        "study": fields_said(study) | ({"torques": _torques(study)} if study.torques else {}),
+        "statics": fields_said(statics),
     }
     return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
 
@@ -125,25 +130,20 @@ def _member(member: Any) -> dict[str, Any]:
             return {"point": member.point} | components_table(member.components, member.kind)
         except InputError as error:
             raise error.within(f"load.{member.name}") from None
-    return pairs | _fields(member, "name", *(name for names in together.values() for name in names))
+    return pairs | fields_said(member, "name", *(name for names in together.values() for name in names))
 
 
-def _laws(mechanism: Mechanism, study: StudyDefaults) -> Iterator[tuple[str, AngleLaw]]:
+def _laws(
+    mechanism: Mechanism, study: StudyDefaults, controllers: Mapping[str, ControllerDescription]
+) -> Iterator[tuple[str, AngleLaw]]:
     """Laws in time of a mechanism, each with its place in a file."""
     yield from ((f"prescribed.{one.name}.law", one.law) for one in mechanism.prescribed)
     yield from ((f"load.{load.name}.{load.kind}", law) for load in mechanism.loads for law in load.laws)
     yield from ((f"study.torques.{name}", law) for name, law in study.torques.items() if isinstance(law, AngleLaw))
-
-
-def _fields(given: Any, *left_out: str) -> dict[str, Any]:
-    """The fields of a dataclass that are not as they are by default."""
-    out = {}
-    for field in fields(given):
-        value = getattr(given, field.name)
-        default = field.default if field.default_factory is MISSING else field.default_factory()
-        if field.name not in left_out and (default is MISSING or value != default):
-            out[field.name] = value
-    return out
+    for one in controllers.values():
+        for sensor, law in one.reference.items() if isinstance(one.reference, Mapping) else ():
+            if isinstance(law, AngleLaw):
+                yield f"controller.{one.name}.reference.{sensor}", law
 
 
 def _plain(value: Any, field: str) -> Any:
@@ -250,13 +250,13 @@ def _section(section: Section, name: str, file: Mapping[str, Any]) -> dict[str, 
     """The table of a section; a rectangle says so where the file's does."""
     shape = section.shape
     if shape is None:
-        return _fields(section)
+        return fields_said(section)
     said = shape.kind != "rectangle" or "shape" in file.get("section", {}).get(name, {})
-    return ({"shape": shape.kind} if said else {}) | _fields(shape)
+    return ({"shape": shape.kind} if said else {}) | fields_said(shape)
 
 
 def _body(body: Body, names: Mapping[str, _Names], shared: Mapping[str, str]) -> dict[str, Any]:
-    out: dict[str, Any] = {"type": _BODIES[type(body)]} | _fields(body, "name", *_SHARED)
+    out: dict[str, Any] = {"type": _BODIES[type(body)]} | fields_said(body, "name", *_SHARED)
     if isinstance(body, FlexibleBeam):
         out |= {key: getattr(body, key) for key in _SHARED if key not in shared}
     if isinstance(body, FlexibleBeam | AssumedModesBeam):
@@ -298,19 +298,26 @@ def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, 
 
 
 def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
+    if isinstance(path, ShapedPath):
+        said = _path(path.path, name, paths)
+        if "shaper" in said:
+            raise _unwritable(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
+        return said | {"shaper": {"type": path.shaper.kind.value} | fields_said(path.shaper, "kind")}
     if isinstance(path, SequencePath):
         names = [next((other for other, one in paths.items() if one == part), "") for part in path.paths]
         if not all(names):
             raise _unwritable(f"path.{name}.paths", "a path without a name", "put each of its paths among the model's")
-        return {"type": "sequence", "paths": names} | _fields(path, "paths")
+        return {"type": "sequence", "paths": names} | fields_said(path, "paths")
     if isinstance(path, TabulatedPath):
         columns = [*zip(*path.points, strict=True), *([] if path.times is None else [path.times])]
-        return {"type": "table", "table": [*zip(*columns, strict=True)]} | _fields(path, "points", "times")
+        return {"type": "table", "table": [*zip(*columns, strict=True)]} | fields_said(path, "points", "times")
     for kind, made in PATHS.items():
         if type(path) is made:
-            return {"type": kind} | _fields(path)
+            return {"type": kind} | fields_said(path)
     raise _unwritable(
-        f"path.{name}", type(path).__name__, "give a Polygon, Line, Circle, PointPath, TabulatedPath or SequencePath"
+        f"path.{name}",
+        type(path).__name__,
+        "give a Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath",
     )
 
 
@@ -336,10 +343,11 @@ def _start(start: Start) -> dict[str, Any]:
     velocity = {"angular": start.angular, "point": start.point}
     said = {
         "deflection": {
-            body: {point: _fields(each) for point, each in points.items()} for body, points in start.deflection.items()
+            body: {point: fields_said(each) for point, each in points.items()}
+            for body, points in start.deflection.items()
         },
         "velocity": {key: value for key, value in velocity.items() if value},
-        "coordinates": {body: _fields(each) for body, each in start.coordinates.items()},
-        "rates": {body: _fields(each) for body, each in start.rates.items()},
+        "coordinates": {body: fields_said(each) for body, each in start.coordinates.items()},
+        "rates": {body: fields_said(each) for body, each in start.rates.items()},
     }
     return {key: value for key, value in said.items() if value}

@@ -41,7 +41,7 @@ class BeamEnds:
     """
 
     def __init__(self, system: System, start: State) -> None:
-        self._left: list[Leaving] = []
+        self._left: tuple[Leaving, ...] = ()
         within = []
         for function in beam_end_functions(system):
             if function.inside(start.q[None])[0] > 0.0:
@@ -49,7 +49,7 @@ class BeamEnds:
             elif function.ends_run:
                 raise _off_at_start(function, start.time, start.q)
             else:
-                self._left.append(Leaving(function, start.time))
+                self._left += (Leaving(function, start.time),)
         self.functions: tuple[EventFunction, ...] = tuple(within)
 
     def pass_over(
@@ -58,7 +58,7 @@ class BeamEnds:
         """The events left after a crossing, and the crossing in the same step that ends the run, or None."""
         left, found = tuple(functions), crossing
         while found is not None and not found.function.ends_run:
-            self._left.append(Leaving(found.function, found.t))
+            self._left += (Leaving(found.function, found.t),)
             left = tuple(function for function in left if function is not found.function)
             found = first_crossing(left, found.before, found.after)
         return left, found

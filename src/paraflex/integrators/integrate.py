@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +29,7 @@ from paraflex.integrators.events import BeamEnd
 from paraflex.integrators.method import NativeMethod
 from paraflex.integrators.options import IntegrationOptions, loose_tolerance, refuse_tolerance
 from paraflex.integrators.pace import Pace, too_slow
-from paraflex.integrators.run import Problem, Run, make_problem
+from paraflex.integrators.run import Instant, Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
 from paraflex.integrators.watch import Breakdown, bent_too_far, come_apart, least_norm
 from paraflex.kernel.packed import Signals
@@ -116,63 +118,181 @@ def integrate(
         A tolerance beyond the size of the mechanism; times that do not ascend from the start; events that the mechanism
         cannot have, or a start beyond one, or off the end of a beam.
     """
-    began = time.perf_counter()
-    options = options or IntegrationOptions()
-    refuse_tolerance(options.tolerance, system.size)
-    loose = loose_tolerance(options.tolerance, system.size)
-    own = isinstance(options.method, NativeMethod)
-    between = with_between(np.asarray(times, dtype=float), system.n) if samples and own else None
-    problem = make_problem(system, signals, initial, times if between is None else between.times, knots)
-    ends, crossing = BeamEnds(system, initial), None
-    functions = (*event_functions(system, initial.q, options.events), *ends.functions)
-    run = prepare(problem, options)
-    status, message, bent, drift, slow = "complete", "", None, None, None
-    window = _WINDOW if own else _WINDOW_OUTSIDE
-    pace = Pace(initial.time, float(problem.times[-1]), options.max_steps, window)
-    code, limits = PAUSED, (run.dependent_rows, options.tolerance, options.treatment)
-    most = pace.most - (0 if begun is None else begun.steps + begun.rejected)
+    integration = Integration(
+        system, signals, initial, times, knots=knots, options=options, begun=begun, samples=samples
+    )
     try:
-        run.start()
-        while code == PAUSED:
-            if run.attempts >= most:
-                break
-            code, crossing = advance(run, functions, min(_SLICE, most - run.attempts))
+        integration.start()
+        integration.march(on_progress=on_progress)
+    except KeyboardInterrupt:
+        integration.interrupt()
+    return integration.solution()
+
+
+class Kept(NamedTuple):
+    """State of an integration: the arrays of its run, and what is noted beside them."""
+
+    arrays: tuple[np.ndarray, ...]
+    more: dict[str, Any]
+
+
+# What an integration notes beside the arrays of its run.
+_KEPT = ("status", "message", "_code", "_drifts", "_broken", "_crossing", "_functions", "_looked")
+
+
+class Integration:
+    """An integration in progress, marched to one time after another: see `integrate` for what it is made of.
+
+    Attributes
+    ----------
+    run : Run
+    status, message : str
+        See `Solution`.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        signals: Signals,
+        initial: State,
+        times: Array,
+        *,
+        knots: Array | None = None,
+        options: IntegrationOptions | None = None,
+        begun: Solution | None = None,
+        samples: int | None = None,
+    ) -> None:
+        self._began, self._begun, self._samples = time.perf_counter(), begun, samples
+        self._system, self._options = system, options or IntegrationOptions()
+        options = self._options
+        refuse_tolerance(options.tolerance, system.size)
+        self._loose = loose_tolerance(options.tolerance, system.size)
+        own = isinstance(options.method, NativeMethod)
+        self._between = with_between(np.asarray(times, dtype=float), system.n) if samples and own else None
+        problem = make_problem(system, signals, initial, times if self._between is None else self._between.times, knots)
+        self._ends = BeamEnds(system, initial)
+        self._crossing: Crossing | None = None
+        self._functions = (*event_functions(system, initial.q, options.events), *self._ends.functions)
+        self.run: Run = prepare(problem, options)
+        self.status: str = "complete"
+        self.message: str = ""
+        self._code, self._drifts = FINISHED, False
+        self._broken: Breakdown | None = None
+        self._looked = 0
+        window = _WINDOW if own else _WINDOW_OUTSIDE
+        self._pace = Pace(initial.time, float(problem.times[-1]), options.max_steps, window)
+        self._most = self._pace.most - (0 if begun is None else begun.steps + begun.rejected)
+
+    @property
+    def time(self) -> float:
+        """The time reached [s]."""
+        return self.run.time
+
+    def start(self) -> None:
+        """Find accelerations and multipliers, and take the first sample."""
+        self.run.start()
+
+    def resume(self) -> None:
+        """Find accelerations and multipliers once more, as something given has changed at this time."""
+        native.resume(self.run)
+
+    def march(self, until: float | None = None, *, on_progress: Callable[[float], None] | None = None) -> None:
+        """Go on to a time [s], at which a step ends, or to the end; less far to an event, or where it cannot go on.
+
+        Only own methods go on to a time before the end.
+        """
+        run = self.run if until is None else native.until(self.run, until)
+        self._code = PAUSED
+        if self.status == "interrupted":
+            self.status, self.message = "complete", ""
+        while self._code == PAUSED and run.attempts < self._most:
+            self._code, crossing = advance(run, self._functions, min(_SLICE, self._most - run.attempts))
             if crossing is not None:
-                functions, crossing = ends.pass_over(crossing, functions)
+                self._functions, crossing = self._ends.pass_over(crossing, self._functions)
             if crossing is not None:
-                status, message = "stopped", crossing.message
-                break
+                self.status, self.message, self._crossing = "stopped", crossing.message, crossing
+                return
             now = run.now()
-            bent, drift = bent_too_far(system, now.q), come_apart(system, signals, now.t, now.q, *limits)
-            if bent or drift:
-                break
-            if code == PAUSED and pace.look(run.attempts, now.t):
-                slow = too_slow(system, now, initial.q, pace, problem.jumps)
-                break
+            if self._breaks(now):
+                return
             if on_progress is not None:
                 on_progress(now.t)
-    except KeyboardInterrupt:
-        status, message = "interrupted", f"interrupted at t = {run.now().t:.6g} s"
-    solution = _solution(run, options, time.perf_counter() - began, status, message, crossing)
-    whole, solution = solution, solution if between is None else between.kept(solution)
-    few = samples_too_few(system, whole, solution, samples) if samples else None
-    solution = replace(solution, findings=(*ends.findings(solution.q), *filter(None, [loose, few])))
-    _refuse_beam_end(solution, crossing)
-    if (code == FINISHED and not (bent or drift)) or status in ("interrupted", "stopped"):
-        return solution
-    cause, remedy = bent or drift or slow or _breakdown(code, options, pace.most)
-    now = run.now()
-    # Near a singular position it may be Newton or the error test that gives up first.
-    lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and not (bent or drift) else []
-    error = ConstraintDriftError if drift and not bent else IntegrationError
-    if len(lost) > run.dependent_rows:
-        error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)}),"
-        remedy = f"prescribe motions within the mechanism's reach, or {_PASSING_METHODS}"
-    elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
-        error, cause = SingularPositionError, _before_singular(options.method.name, run.singular_ahead)
-        remedy = _PASSING_METHODS
-    moment = Moment(now.t, solution.steps + (0 if begun is None else begun.steps))
-    raise _failed(error(cause, moment, solution, remedy))
+
+    def interrupt(self) -> None:
+        """Keep what is there, as the user has it."""
+        self.status, self.message = "interrupted", f"interrupted at t = {self.time:.6g} s"
+
+    def saved(self) -> Kept:
+        """All that it goes on from, to the bit; of own methods only."""
+        more = {name: getattr(self, name) for name in _KEPT}
+        return Kept(native.arrays_of(self.run), more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
+
+    def restore(self, kept: Kept) -> None:
+        """Go back to what `saved` gave, of this integration or of one made of the same."""
+        # Into the arrays that are there: how they lie in memory must not change, as rounding may depend on it.
+        for own, array in zip(native.arrays_of(self.run, copies=False), kept.arrays, strict=True):
+            own[...] = array
+        for name, value in kept.more.items():
+            setattr(self, name, value)
+        self._ends, self._pace = copy.copy(self._ends), self._pace.copy()
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether it has come as far as it was to, and nothing speaks against going on."""
+        return self.status == "complete" and self._code == FINISHED and self._broken is None
+
+    def solution(self) -> Solution:
+        """What there is so far.
+
+        Raises
+        ------
+        IntegrationError
+            It cannot go on: see `integrate`.
+        """
+        run, system, options = self.run, self._system, self._options
+        elapsed = time.perf_counter() - self._began
+        whole = _solution(run, options, elapsed, self.status, self.message, self._crossing)
+        solution = whole if self._between is None else self._between.kept(whole)
+        few = samples_too_few(system, whole, solution, self._samples) if self._samples else None
+        findings = (*self._ends.findings(solution.q), *filter(None, [self._loose, few]))
+        solution = replace(solution, findings=findings)
+        _refuse_beam_end(solution, self._crossing)
+        if self.goes_on or self.status in ("interrupted", "stopped"):
+            return solution
+        raise _failed(self._error(solution))
+
+    def _breaks(self, now: Instant) -> bool:
+        """Whether something has come apart, or is too slow."""
+        run, options, problem = self.run, self._options, self.run.problem
+        # Marched to one time soon after another it is looked at as seldom as in one go.
+        if self._code == FINISHED and run.attempts < self._looked + _SLICE and now.t < problem.times[-1]:
+            return False
+        self._looked = run.attempts
+        limits = (run.dependent_rows, options.tolerance, options.treatment)
+        bent = bent_too_far(self._system, now.q)
+        drift = come_apart(self._system, problem.signals, now.t, now.q, *limits)
+        self._broken, self._drifts = bent or drift, drift is not None and bent is None
+        if self._broken is None and self._code == PAUSED and self._pace.look(run.attempts, now.t):
+            self._broken = too_slow(self._system, now, problem.initial.q, self._pace, problem.jumps)
+            return True
+        return self._broken is not None
+
+    def _error(self, solution: Solution) -> IntegrationError:
+        """Why it cannot go on."""
+        run, system, options, code = self.run, self._system, self._options, self._code
+        cause, remedy = self._broken or _breakdown(code, options, self._pace.most)
+        now = run.now()
+        # Near a singular position it may be Newton or the error test that gives up first.
+        lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and self._broken is None else []
+        error = ConstraintDriftError if self._drifts else IntegrationError
+        if len(lost) > run.dependent_rows:
+            error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)}),"
+            remedy = f"prescribe motions within the mechanism's reach, or {_PASSING_METHODS}"
+        elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
+            error, cause = SingularPositionError, _before_singular(options.method.name, run.singular_ahead)
+            remedy = _PASSING_METHODS
+        moment = Moment(now.t, solution.steps + (0 if self._begun is None else self._begun.steps))
+        return error(cause, moment, solution, remedy)
 
 
 def _failed(error: IntegrationError) -> IntegrationError:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, inputs_of
+from paraflex.errors import InputError
 from paraflex.integrators.method import NativeMethod, Treatment
 from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, MEMORY, Figures, Instant, Problem, empty_samples
+from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, MEMORY, Figures, Instant, Problem, Run, empty_samples
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Workspace
@@ -20,6 +22,7 @@ from paraflex.kernel.run_state import (
     BAUMGARTE,
     DPHI_MAX,
     ENERGY_0,
+    FACTOR_B,
     FACTORS,
     FINISHED,
     GGL,
@@ -35,6 +38,7 @@ from paraflex.kernel.run_state import (
     SAMPLE,
     STEP,
     STEPS,
+    STOP,
     TIME,
     WEIGHT_0,
     WORK,
@@ -45,6 +49,8 @@ from paraflex.kernel.run_state import (
     make_march,
 )
 
+# What a jump leaves as it is.
+_KEPT = [ENERGY_0, WEIGHT_0, FACTOR_B]
 # How long a velocity error that Newton leaves is taken to last, as a fraction of the run: it must count for more
 # than its share of one step, since it is of one sign while a factor is in use.
 _NEWTON_MEMORY = 0.02
@@ -82,6 +88,9 @@ class NativeRun:
     workspace: Workspace
     slow: Workspace
     samples: Samples
+    # For first stages after a jump, so that the factor in the workspace stays.
+    aside: Workspace
+    nothing: Samples
 
     @property
     def dependent_rows(self) -> int:
@@ -117,15 +126,20 @@ class NativeRun:
         jumps, now = self.problem.jumps, self.state.clock[TIME]
         # The last call may have ended there; until now the run had the values before the jump.
         if np.any(jumps == now):
-            self._resume()
-        ahead = jumps[jumps > now]
+            self.resume()
         stops = self.problem.stops
+        ahead = jumps[(jumps > now) & (jumps < stops[-1])]
         if ahead.size:
             stops = stops[stops <= ahead[0]]
         given = (self.problem.system.packed, self.problem.signals_from(now))
         arguments = (*given, self.scheme, self.controls, stops, attempts)
         code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
         return PAUSED if code == FINISHED and ahead.size else code
+
+    @property
+    def time(self) -> float:
+        """See `Run`."""
+        return float(self.state.clock[TIME])
 
     def now(self) -> Instant:
         """See `Run`."""
@@ -154,12 +168,70 @@ class NativeRun:
             passages=state.passages[:, : state.counts[PASSAGES]],
         )
 
-    def _resume(self) -> None:
+    def resume(self) -> None:
         """A first stage after a jump; energies and work continue."""
-        kept = self.state.clock[[ENERGY_0, WEIGHT_0]]
+        kept = self.state.clock[_KEPT]
         arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
-        start(*arguments, self.state, self.workspace, empty_samples(np.zeros(0), self.problem.system))
-        self.state.clock[[ENERGY_0, WEIGHT_0]] = kept
+        self.aside.redundant[:] = self.workspace.redundant
+        start(*arguments, self.state, self.aside, self.nothing)
+        self.state.clock[_KEPT] = kept
+
+
+def until(run: Run, time: float) -> Run:
+    """The same run, whose steps end at a time before its end, where it pauses.
+
+    Raises
+    ------
+    InputError
+        It is by another program's solver, which steps on over any time that it was not told at the start.
+    """
+    if not isinstance(run, NativeRun):
+        raise _not_in_parts()
+    before = run.problem.stops[run.problem.stops < time]
+    run.state.counts[STOP] = 0
+    return replace(run, problem=replace(run.problem, stops=np.append(before, time)))
+
+
+def resume(run: Run) -> None:
+    """See `NativeRun.resume`.
+
+    Raises
+    ------
+    InputError
+        See `until`.
+    """
+    if not isinstance(run, NativeRun):
+        raise _not_in_parts()
+    run.resume()
+
+
+def arrays_of(run: Run, *, copies: bool = True) -> tuple[np.ndarray, ...]:
+    """All arrays that a run of an own method goes on from, or copies of them; its samples among them.
+
+    Raises
+    ------
+    InputError
+        See `until`.
+    """
+    if not isinstance(run, NativeRun):
+        raise _not_in_parts()
+    found = tuple(_arrays((run.state, run.workspace, run.slow, run.samples)))
+    return tuple(one.copy() for one in found) if copies else found
+
+
+def _arrays(given: object) -> Iterator[np.ndarray]:
+    if isinstance(given, np.ndarray):
+        yield given
+    elif isinstance(given, tuple):
+        for one in given:
+            yield from _arrays(one)
+
+
+def _not_in_parts() -> InputError:
+    return InputError(
+        "goes on from time to time with own methods only", field="method",
+        remedy="choose one of paraflex's own, say esdirk5 or tr-bdf2",
+    )  # fmt: skip
 
 
 def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
@@ -212,4 +284,6 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         workspace=workspace,
         slow=system.workspace(),
         samples=empty_samples(problem.times, system),
+        aside=system.workspace(),
+        nothing=empty_samples(np.zeros(0), system),
     )

@@ -74,6 +74,11 @@ class OutsideRun:
                 return code
         return PAUSED
 
+    @property
+    def time(self) -> float:
+        """See `Run`."""
+        return self._instant.t
+
     def now(self) -> Instant:
         """See `Run`."""
         return self._instant

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from copy import copy
 
 import numpy as np
 
@@ -46,6 +47,12 @@ class Pace:
         self._start, self._end, self._most, self._window = start, end, most, window
         self._looks: deque[tuple[int, float]] = deque([(0, start)])
         self._usual = math.inf
+
+    def copy(self) -> Pace:
+        """The same pace, to go on from apart."""
+        other = copy(self)
+        other._looks = self._looks.copy()
+        return other
 
     @property
     def most(self) -> int:

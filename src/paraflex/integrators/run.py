@@ -113,6 +113,11 @@ class Run(Protocol):
         """Attempt a number of steps; a code of `kernel.run_state`."""
         ...
 
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        ...
+
     def now(self) -> Instant:
         """The state of the run."""
         ...

@@ -6,7 +6,7 @@ from math import ceil, sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import inlined, releases_lock, routine, unoptimised
+from paraflex.kernel.compiling import inlined, kernel, releases_lock, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
@@ -45,6 +45,7 @@ from paraflex.kernel.run_state import (
     STEPS,
     STOP,
     TIME,
+    TRIED,
     WEIGHT_0,
     WIDEST,
     WORK,
@@ -68,6 +69,8 @@ GROWING = 0.05
 LEAST_PART = 1e-11
 # A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
 SMALLEST_PART = 1e-4
+# Steps from one instant to the next that differ by less than this part of them, by rounding, are of one length.
+SAME_STEP = 1e-11
 
 
 @inlined
@@ -179,12 +182,14 @@ def enter(system, signals, t, controls, march, work):
     first_stage(system, signals, t, controls, march, work)
 
 
-@unoptimised
+@kernel
 def start(system, signals, tableau, controls, march, work, out):
     """First stage and first sample of a run."""
     t = march.clock[TIME]
     first_stage(system, signals, t, controls, march, work)
     a, lam = march.stage_a[1, 0], march.stage_lam[0]
+    # No starting guess reaches across a jump: what was before does not count as another time.
+    fill(march.stage_t[0], t)
     march.stage_t[1, 0] = t
     copy(march.q, march.stage_q[0])
     copy(march.v, march.stage_v[0])
@@ -287,6 +292,10 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
             h, landing = left, True
         elif left < 2.0 * h and controls.fixed_step == 0.0:
             h = 0.5 * left
+        # After a jump, but for rounding, the step before it: its factor still serves.
+        if march.clock[LAST_STEP] == 0.0 and abs(h - march.clock[TRIED]) <= SAME_STEP * h:
+            h = march.clock[TRIED]
+        march.clock[TRIED] = h
         cause, error = attempt(system, signals, tableau, controls, t, h, march, work, slow)
         if cause == ENTERS:
             enter(system, signals, t, controls, march, work)

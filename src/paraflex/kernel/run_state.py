@@ -26,6 +26,8 @@ PART_END, PART = range(15, 17)
 ROOT, ROOT_RATE, WIDEST = range(12, 15)
 # and the b of the iteration matrix that root and the largest part are in.
 ROOT_B = 17
+# The length of the last step attempted.
+TRIED = 18
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
 # and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
@@ -131,7 +133,7 @@ def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGA
     """Allocate the state of a run with n coordinates and m constraint rows."""
     stage_v = apart((stages, n))
     return March(
-        clock=apart(18),
+        clock=apart(19),
         counts=apart(17, np.int64),
         q=apart(n),
         v=apart(n),

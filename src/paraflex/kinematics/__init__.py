@@ -1,6 +1,7 @@
 """Paths of the end-effector, and the joint motion that follows them."""
 
 from paraflex.kinematics.closure import (
+    PathFollower as PathFollower,
     RigidMotion as RigidMotion,
     follow_path as follow_path,
     path_follower as path_follower,
@@ -18,5 +19,6 @@ from paraflex.kinematics.paths import (
     SequencePath as SequencePath,
     TabulatedPath as TabulatedPath,
     length_fraction as length_fraction,
+    turning_of as turning_of,
 )
 from paraflex.kinematics.reach import Shortfall as Shortfall

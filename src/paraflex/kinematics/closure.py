@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -25,7 +25,7 @@ from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, U
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
-from paraflex.kinematics.paths import Path, PathMotion
+from paraflex.kinematics.paths import Path, PathMotion, turning_of
 from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.limits import INSTANTS, solvable
 from paraflex.mechanism import Assembly, Body, Mechanism, PointRef
@@ -141,7 +141,7 @@ def path_follower(
     *,
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
-) -> Callable[[Sequence[float] | Array], RigidMotion]:
+) -> PathFollower:
     """`follow_path` for several sets of times, with a common preparation.
 
     Parameters
@@ -153,17 +153,38 @@ def path_follower(
 
     Returns
     -------
-    callable
-        The motion at times (k,), ascending [s].
+    PathFollower
+        Gives the motion at times (k,), ascending [s].
     """
-    closure, assembled = _assembled(mechanism, path, end, assembly, orientation)
+    return PathFollower(*_assembled(mechanism, path, end, assembly, orientation), path)
 
-    def follow(times: Sequence[float] | Array) -> RigidMotion:
+
+@dataclass(frozen=True)
+class PathFollower:
+    """The motion of the rigid mechanism along a path, at any times.
+
+    Attributes
+    ----------
+    closure : PathClosure
+    assembled : (n,) array
+        Pose of the assembly from which the path is approached.
+    path : Path
+    """
+
+    closure: PathClosure
+    assembled: Array
+    path: Path
+
+    def __call__(self, times: Sequence[float] | Array) -> RigidMotion:
+        """The motion at times (k,), ascending [s]; see `follow_path` for its errors."""
         times = np.ascontiguousarray(times, dtype=float)
         grid, keep = _no_long_steps(times)
-        return closure.walk(path, closure.approach(path, assembled, times[0], times[-1]), grid, keep)
+        pose = self.closure.approach(self.path, self.assembled, times[0], times[-1])
+        return self.closure.walk(self.path, pose, grid, keep)
 
-    return follow
+    def along(self, path: Path) -> PathFollower:
+        """That along another path, in the same assembly and orientation."""
+        return replace(self, path=path)
 
 
 def _assembled(
@@ -175,7 +196,7 @@ def _assembled(
     closure = PathClosure(mechanism.rigid(), orientation, end)
     chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
     closure.check_degrees_of_freedom(chosen)
-    if _turning(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
+    if turning_of(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
         raise InputError(
             "the path gives angles, the task has none", field="end_effector.coordinates",
             value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
@@ -287,7 +308,7 @@ class PathClosure:
 
     def target(self, path: Path, t: Array) -> Array:
         """(times, 3, tasks): the task coordinates chosen from x, y, angle."""
-        motion, turning = path.evaluate(t), _turning(path, t)
+        motion, turning = path.evaluate(t), turning_of(path, t)
         if turning is None:
             turning = np.zeros((3, t.size))
             turning[0] = self.orientation
@@ -414,12 +435,6 @@ def _places(body: Body) -> Array:
     """Named points of a body in its frame (points, 2) [m]."""
     places = [(place, 0.0) if isinstance(place, float) else place for place in body.points.values()]
     return np.array(places, dtype=float).reshape(-1, 2)
-
-
-def _turning(path: Path, t: Array) -> Array | None:
-    """Angle of the end-effector and its derivatives at times t (3, k), if the path prescribes it."""
-    says = getattr(path, "turning", None)
-    return None if says is None else says(t)
 
 
 def with_marker(system: System, ref: PointRef) -> tuple[PackedSystem, int]:

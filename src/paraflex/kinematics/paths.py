@@ -41,7 +41,8 @@ class PathMotion(NamedTuple):
 
 @given_as(
     "a path",
-    "a path: Polygon, Line, Circle, PointPath, TabulatedPath or SequencePath, or one that paraflex.load_path reads",
+    "a path: Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath, or one that "
+    "paraflex.load_path reads",
 )
 @runtime_checkable
 class Path(Protocol):
@@ -489,7 +490,7 @@ class SequencePath(CheckedFields):
                     value=f"({start.position[0, 0]:g}, {start.position[0, 1]:g})",
                     remedy=f"let it start at ({x:.9g}, {y:.9g}), or put a line between them",
                 )  # fmt: skip
-        turning = [self._angle(path, np.zeros(1)) is not None for path in self.paths]
+        turning = [turning_of(path, np.zeros(1)) is not None for path in self.paths]
         if any(turning) and not all(turning):
             raise InputError(
                 "some of its paths give angles of the end-effector and some do not", field="paths",
@@ -526,11 +527,11 @@ class SequencePath(CheckedFields):
     def turning(self, t: Array) -> Array | None:
         """Angle [rad] of the end-effector, its rate and acceleration at times t (3, k); None without angles."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
-        if self._angle(self.paths[0], t[:1]) is None:
+        if turning_of(self.paths[0], t[:1]) is None:
             return None
         out = np.zeros((3, t.size))
         for here, path, time in self._each(t):
-            out[:, here] = self._angle(path, time)
+            out[:, here] = turning_of(path, time)
         return out
 
     def _each(self, t: Array) -> Iterator[tuple[NDArray[np.bool_], Path, Array]]:
@@ -540,10 +541,11 @@ class SequencePath(CheckedFields):
             if np.any(which == k):
                 yield which == k, path, t[which == k] - self._starts[k]
 
-    @staticmethod
-    def _angle(path: Path, t: Array) -> Array | None:
-        turning = getattr(path, "turning", None)
-        return None if turning is None else turning(t)
+
+def turning_of(path: Path, t: Array) -> Array | None:
+    """Angle of the end-effector and its two derivatives at times t (3, k); None if the path does not prescribe it."""
+    turning = getattr(path, "turning", None)
+    return None if turning is None else turning(t)
 
 
 @checked_arguments()

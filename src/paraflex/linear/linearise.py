@@ -26,16 +26,15 @@ from paraflex.linear.model import LinearModel
 from paraflex.linear.points import planned_point, resting_point, run_point
 from paraflex.mechanism import (
     ActuationMode,
-    Encoder,
     Mechanism,
     PointRef,
-    PositionSensor,
     Sensor,
     Start,
     in_frames,
     parse_mode,
 )
 from paraflex.mechanism.checks import known_point
+from paraflex.mechanism.measured import measured_sensors
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
 
@@ -234,18 +233,7 @@ def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], p
     for point in points:
         known_point(mechanism, point, "forces")
     # Of beams in several frames the sensors are on the parts.
-    return Ports(mode, points, tuple(prescribed), _sensors(in_frames(mechanism)))
-
-
-def _sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:
-    """An encoder of every motor's joint, the end-effector's place, then the mechanism's own sensors, each name once."""
-    joints = dict.fromkeys(motor.joint for motor in mechanism.motors)
-    found: list[Sensor] = [Encoder(joint, joint) for joint in joints]
-    effector = mechanism.end_effector
-    if effector is not None:
-        found += [PositionSensor(axis, effector.point, axis) for axis in ("x", "y") if axis in effector.coordinates]
-    taken = {sensor.name for sensor in mechanism.sensors}
-    return (*(sensor for sensor in found if sensor.name not in taken), *mechanism.sensors)
+    return Ports(mode, points, tuple(prescribed), measured_sensors(in_frames(mechanism)))
 
 
 class Moving(NamedTuple):

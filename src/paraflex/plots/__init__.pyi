@@ -5,6 +5,7 @@ from .agreement import (
     compared_paths as compared_paths,
     model_distances as model_distances,
 )
+from .controlled import controllers as controllers
 from .derivatives import elasticities as elasticities
 from .drawing import mechanism_drawing as mechanism_drawing
 from .driving import (

@@ -103,6 +103,13 @@ _RUN = (
     CatalogueFigure(
         "sensors", "measured", "reading of every sensor, a panel for each unit", "mode", variables=("sensor_reading",)
     ),
+    CatalogueFigure(
+        "controllers",
+        "controlled",
+        "torques of controllers, wanted and given, and their readings",
+        "mode",
+        "controllers",
+    ),
     CatalogueFigure("link_deflections", "time_series", "transverse displacement of the ends of all links", "mode"),
     CatalogueFigure(
         "point_motions",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure, homes
 from paraflex.plots.selection import default_mode, names_of, place_of, point_number, prototype_pair
+from paraflex.results.controllers import controller_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +49,7 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
         run["status"] == "complete" for method in found["methods"].values() for run in method["runs"]
     ),
     "link_deflections": lambda found: bool(found["tip_transverse"].any()),
+    "controllers": lambda found: bool(controller_names(found)),
     "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
 

@@ -11,6 +11,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.findings import DONE_STATUSES
 from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
+from paraflex.report.controllers import controller_panels, controller_tables
 from paraflex.report.curves import TIPS, bending, energies, energy_scale, followed, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables, load_tiles
@@ -44,7 +45,7 @@ def motion_page(data: xr.Dataset) -> Page:
         facts=common_facts(data),
         command=run_command_line(asked(data)),
         figures=_figures(data),
-        more=[*load_tables(data), *reduction_tables(data), ("Integration", _table(data))],
+        more=[*controller_tables(data), *load_tables(data), *reduction_tables(data), ("Integration", _table(data))],
         panels=_panels(few),
         time=few["time"].values,
         runs=_ALONE,
@@ -112,7 +113,12 @@ def _panels(data: xr.Dataset) -> list[Panel]:
     panels = [Panel("Motion", motion), Panel("Energies", [energies(run, _ALONE)])]
     if data.sizes["joint"]:
         panels.append(Panel("Joints", [_joint_forces(data)]))
-    return [*panels, *load_panel(run, _ALONE), Panel("Coordinates", [_coordinates(data, bodies)])]
+    return [
+        *panels,
+        *controller_panels(run, _ALONE),
+        *load_panel(run, _ALONE),
+        Panel("Coordinates", [_coordinates(data, bodies)]),
+    ]
 
 
 def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:

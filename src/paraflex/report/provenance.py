@@ -91,6 +91,7 @@ def run_command_line(run: dict[str, Any]) -> str:
     words = ["paraflex", "run", *model_words(run)]
     if "path" in run:
         words += ["--path", run["path"], *_modes(run.get("modes", []))]
+    words += [word for name in run.get("controllers") or () for word in ("--controller", name)]
     for name, flag in _GIVEN.items():
         if run.get(name) is not None:
             words += [flag, str(run[name])]

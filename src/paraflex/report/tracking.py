@@ -13,6 +13,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.findings import DONE_STATUSES
 from paraflex.plots.labels import display_unit, text_symbol
 from paraflex.plots.selection import default_mode, names_of, samples
+from paraflex.report.controllers import controller_panels, controller_tables
 from paraflex.report.curves import (
     DOTTED,
     ERRORS,
@@ -37,6 +38,7 @@ from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
+from paraflex.results.controllers import controller_names
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
 from paraflex.results.formulas import during_motion
@@ -74,11 +76,12 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         figures=_figures(data),
         more=[
             ("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {})),
+            *controller_tables(data),
             *load_tables(data, default_mode(data)),
             *reduction_tables(data),
             ("Integration", solver_table(data)),
         ],
-        panels=[*_panels(few, runs), *load_panel(few, runs)],
+        panels=[*_panels(few, runs), *controller_panels(few, runs), *load_panel(few, runs)],
         time=few["time"].values,
         runs=runs,
         selected=runs.index(default_mode(data)),
@@ -126,6 +129,8 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     note = f"Error and largest: {words}. "
     if after:
         note += "Error after: RMS, after the motion; drift: mean speed then; vibration: RMS about the drift. "
+        if controller_names(data):
+            note += "Settling: until within 5 % of the largest error; overshoot: beyond the end of the path. "
     note += f"{kind}: peak and, below it, RMS. Deflection: from a link's chord. Strain energy: peak."
     if not whole:
         note += " Of a mode that did not get to its end: until then."
@@ -171,6 +176,7 @@ def _after_columns(data: xr.Dataset) -> list[tuple[str, str, NDArray[np.float64]
         ("error after", "tracking_rms_after", "m"),
         ("drift", "drift_speed", "m"),
         ("vibration", "residual_vibration", "m"),
+        *((("settling", "settling_time", "s"), ("overshoot", "overshoot", "m")) if controller_names(data) else ()),
     ):
         values = data[key].values
         if np.isfinite(values).any():

@@ -4,6 +4,7 @@ from .following import (
     peak_torque as peak_torque,
     residual_vibration as residual_vibration,
     rms_torque as rms_torque,
+    settling_times as settling_times,
     tracking_error as tracking_error,
 )
 from .kinds import kind_of as kind_of

@@ -9,11 +9,13 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.control.laws import internal_torques
 from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.results.acting import load_variables
+from paraflex.results.controllers import INTERNAL, with_controllers
 from paraflex.results.doubts import MODE, keep_findings
 from paraflex.results.following import KEPT_METRICS, ErrorSpan, Part, metric_variables, too_short
 from paraflex.results.labelled import (
@@ -62,6 +64,7 @@ def tracking_dataset(
     xarray.Dataset
         Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end, section, drive, load,
         sensor;
+        of each controller NAME sample_NAME, input_NAME and output_NAME (see `results.controllers`);
         units and signs in the attributes of every variable. `shape` and what else drawings are made from is float32.
     """
     if not runs:
@@ -75,6 +78,9 @@ def tracking_dataset(
         for name, (dims, _) in frames[0].items()
     }
     data |= load_variables(mechanism, motion.t)
+    if any(one.controllers for one in records):
+        internal = [padded(internal_torques(one.task, one.mode, one.torque), motion.t.size) for one in records]
+        data[INTERNAL] = (("mode", "time", "motor"), np.stack(internal))
     desired = motion.desired
     angles = [motion.system.body(body.name).angle for body in mechanism.bodies]
     twins = {
@@ -102,6 +108,7 @@ def tracking_dataset(
         "path_length_run": length_fraction(task.path, float(motion.t[-1])),
         "error": as_enum(ErrorSpan, error, "error").value,
     }
+    out = with_controllers(out, [one.controllers for one in records], [motor.name for motor in mechanism.motors])
     keep_findings(out, [*findings, *_findings(records)])
     return out
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.folders import added_to
+from paraflex.results.controllers import SAMPLE, controller_names, controller_variables, dimension
 from paraflex.results.kinds import kind_of
 from paraflex.results.parquet import read_parquet, write_parquet
 from paraflex.results.spreadsheet import spreadsheet_table
@@ -55,9 +56,9 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     dict of str to pandas.DataFrame
         `time_series`: a row a model (of a verification), mode and time; a variable of more dimensions makes a column
         for each of their labels, `torque_tau1` or `joint_force_B1_x`; of equilibria it is `steps`, of reduced models
-        `frequencies`. `figures`: a row a model and mode. `shapes`: a
-        row a model, mode, time and drawn point; `sections`: a row a model, mode, time and place along a beam. Their
-        `attrs` hold `units` and `meanings` of columns.
+        `frequencies`. `figures`: a row a model and mode. `shapes`: a row a model, mode, time and drawn point;
+        `sections`: a row a model, mode, time and place along a beam; `controller_NAME`: a row a mode and sample of a
+        controller. Their `attrs` hold `units` and `meanings` of columns.
     """
     if kind_of(data) == "linear":
         raise InputError(
@@ -69,8 +70,12 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     dim, first = _ALONG.get(kind_of(data), ("time", TIME_SERIES))
     rows = (*_ROW_DIMENSIONS, dim)
     along = [name for name in data.data_vars if dim in data[name].dims and name not in (*drawn, *forces)]
-    single = [name for name in data.data_vars if name not in (*drawn, *forces, *along)]
+    controlled = {name: controller_variables(name) for name in controller_names(data)}
+    others = {*drawn, *forces, *along, *(name for names in controlled.values() for name in names)}
+    single = [name for name in data.data_vars if name not in others]
     tables = {first: _table(data, along, rows), FIGURES_TABLE: _table(data, single, _ROW_DIMENSIONS)}
+    for name, own in controlled.items():
+        tables[f"controller_{name}"] = _table(data, own, (*_ROW_DIMENSIONS, dimension(SAMPLE, name)))
     if shapes and drawn:
         stations = data.assign_coords(station=np.arange(data.sizes["station"]))
         tables[SHAPES] = _table(stations, ["station_body", *drawn], (*rows, "station"))
@@ -201,9 +206,11 @@ def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
     text. `attributes` says where results come from.
     """
     struct: dict[str, Any] = {"units": {}, "dims": {}, "meaning": {}}
+    samples = [dimension(SAMPLE, name) for name in controller_names(data)]
+    along = ("time", *(dim for dim, _ in _ALONG.values()), *samples)
     for name in (*data.coords, *data.data_vars):
         array, field = data[name], matlab_name(str(name))
-        first = [dim for dim in ("time", *(dim for dim, _ in _ALONG.values())) if dim in array.dims]
+        first = [dim for dim in array.dims if dim in along]
         last = [dim for dim in ("mode", "model") if dim in array.dims]
         array = array.transpose(*first, *(dim for dim in array.dims if dim not in (*first, *last)), *last)
         struct[field] = _matlab_value(array.values)

@@ -11,9 +11,9 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.findings import Finding
-from paraflex.results.formulas import SAME_TIME
+from paraflex.results.formulas import SAME_TIME, settling_time
 from paraflex.results.kinds import check_kind
-from paraflex.results.metrics import METRICS
+from paraflex.results.metrics import METRICS, Metric
 from paraflex.results.traces import data_traces
 
 # Variables of a dataset from which metrics are computed.
@@ -53,6 +53,34 @@ def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
     return metric_variables(data, motion_end=motion_end)["residual_vibration"]
 
 
+@checked_arguments()
+def settling_times(data: xr.Dataset, band: float | None = None, motion_end: float | None = None) -> xr.DataArray:
+    """Time from the end of the motion until every run's end-effector stays within a band of its desired place [s].
+
+    NaN of runs that do not, or have no samples after the motion.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    band : float, optional
+        [m]; by default 5 % of the largest tracking error of the run, as the metric `settling_time` has it.
+    motion_end : float, optional
+        End of the motion along the path [s]; that of the dataset by default.
+
+    Raises
+    ------
+    InputError
+        A band that is not positive.
+    """
+    from paraflex.mechanism.quantities import positive
+
+    if band is not None:
+        positive(band, "band", "m")
+    metric = Metric("settling_time", "time until it stays within a band of its desired place", "s",
+                    lambda x, _: settling_time(x.t, x.distance, x.motion_end, band), "settling time")  # fmt: skip
+    return _of_runs(data, [metric], motion_end)["settling_time"]
+
+
 # Metrics that are variables of datasets; and those of tracking.
 KEPT_METRICS = tuple(metric.name for metric in METRICS.values() if metric.kept)
 FOLLOWING = tuple(name for name in KEPT_METRICS if not METRICS[name].each)
@@ -70,13 +98,17 @@ def metric_variables(
     motion_end : float, optional
         End of the motion along the path [s]; that of the dataset by default.
     """
+    return _of_runs(data, [METRICS[name] for name in names], motion_end)
+
+
+def _of_runs(data: xr.Dataset, metrics: Sequence[Metric], motion_end: float | None) -> dict[str, xr.DataArray]:
     check_kind(data, "tracking", "verification")
     runs = data[_TRACES]
     dims = [str(dim) for dim in runs["end_effector"].dims if dim not in ("time", "axis")]
     shape = tuple(runs.sizes[dim] for dim in dims)
     traces = [data_traces(runs.isel(dict(zip(dims, at, strict=True))), motion_end) for at in np.ndindex(*shape)]
     out = {}
-    for metric in map(METRICS.__getitem__, names):
+    for metric in metrics:
         own = [*dims, "motor"] if metric.each else dims
         values = np.array([metric.value(one) for one in traces]).reshape([runs.sizes[dim] for dim in own])
         about = {"long_name": metric.label, "units": metric.unit, "comment": metric.meaning}

@@ -13,6 +13,10 @@ SAME_TIME = 1e-9
 _DRIFT_DEGREE = 2
 # Fewer samples after the motion do not distinguish a vibration from a drift.
 _FEWEST_SAMPLES = 3 * (_DRIFT_DEGREE + 1)
+# The band about the desired place that a run settles into, as a share of its largest tracking error.
+SETTLED = 0.05
+# A desired place so near to the end of the path, as a share of its way, says nothing of where it comes from.
+_NEAR_END = 1e-6
 
 
 def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
@@ -24,6 +28,11 @@ def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
 def length(vectors: NDArray[Any]) -> NDArray[Any]:
     """Length of vectors (k, 2)."""
     return np.sqrt(vectors[:, 0] ** 2 + vectors[:, 1] ** 2)
+
+
+def largest_norm(vectors: NDArray[Any]) -> float:
+    """Largest Euclidean norm of vectors (k, n); NaN for none."""
+    return float(np.max(np.linalg.norm(vectors, axis=1))) if len(vectors) else np.nan
 
 
 def rms(values: NDArray[Any]) -> Any:
@@ -61,6 +70,54 @@ def vibration(t: NDArray[Any], position: NDArray[Any]) -> Any:
         return np.nan
     basis, coefficients, _ = _drift(t, position)
     return np.sqrt(np.mean(np.sum((position - basis @ coefficients) ** 2, axis=1)))
+
+
+def settling_time(t: NDArray[Any], distance: NDArray[Any], motion_end: float, band: float | None = None) -> float:
+    """Time from the end of the motion until distances (k,) at times t (k,) stay within a band [s].
+
+    Distances between samples are taken for straight lines. 0 where they are within it from the end on; NaN where the
+    last is not, and where there are no samples after the motion.
+
+    Parameters
+    ----------
+    t, distance : (k,) arrays
+        [s], [m]
+    motion_end : float
+        [s]
+    band : float, optional
+        [m]; by default the share `SETTLED` of the largest distance.
+    """
+    moving = during_motion(t, motion_end)
+    if moving.all() or not np.isfinite(distance).all():
+        return np.nan
+    band = SETTLED * float(distance.max()) if band is None else band
+    first = max(int(np.sum(moving)) - 1, 0)
+    times, rest = t[first:], distance[first:]
+    outside = np.flatnonzero(rest > band)
+    if not outside.size:
+        return 0.0
+    last = int(outside[-1])
+    if last == rest.size - 1:
+        return np.nan
+    part = (rest[last] - band) / (rest[last] - rest[last + 1])
+    return max(float(times[last] + part * (times[last + 1] - times[last])) - motion_end, 0.0)
+
+
+def overshoot(position: NDArray[Any], desired: NDArray[Any], moving: NDArray[np.bool_]) -> float:
+    """How far positions (k, 2) go beyond the end of their desired path (k, 2), in the direction it comes from [m].
+
+    Of the samples after the motion; 0 where they do not, NaN where there are none, or no direction.
+    """
+    if moving.all() or not moving.any() or not np.isfinite(position).all():
+        return np.nan
+    end = desired[moving][-1]
+    way = end - desired[moving]
+    sizes = length(way)
+    coming = np.flatnonzero(sizes > _NEAR_END * sizes.max())
+    if not coming.size:
+        return np.nan
+    direction = way[coming[-1]] / sizes[coming[-1]]
+    return max(float(np.max((position[~moving] - end) @ direction)), 0.0)
 
 
 def _drift(t: NDArray[Any], position: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], Any]:

@@ -40,6 +40,7 @@ UNITS = (
         "end_effector_velocity": ("end-effector velocity", "m/s"),
         "end_effector_acceleration": ("end-effector acceleration", "m/s^2"),
         "torque": ("motor torque", "N m"),
+        "internal_torque": ("part of the motor torques that does not act on the rigid motion", "N m"),
         "motor_speed": ("rate of a motor's joint", "rad/s"),
         "motor_power": ("power of a motor", "W"),
         "motor_energy": ("integral of the magnitude of a motor's power, from the samples", "J"),
@@ -130,6 +131,7 @@ _COMMENTS = {
         "constraints depend on one another"
     ),
     "torque": "on the joint's second body: positive turns it anticlockwise or moves it along the axis",
+    "internal_torque": "it only strains links against one another",
     "applied_torque": "as `torque` of a run along a path",
     "angle": "of the body frame's x axis against the ground's, anticlockwise",
     "tip_transverse": "across the tangent at the first end of the link, positive to its left: anticlockwise",
@@ -143,7 +145,7 @@ _COMMENTS = {
 
 
 # Variables that are forces where all motors, or prescribed motions, slide.
-_TORQUES = ("torque", "peak_torque", "rms_torque", "applied_torque")
+_TORQUES = ("torque", "internal_torque", "peak_torque", "rms_torque", "applied_torque")
 
 
 def link_variables(links: Links, mechanism: Mechanism) -> Variables:

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paraflex.results.formulas import drift_speed, integral, rms, vibration
+from paraflex.results.formulas import drift_speed, integral, largest_norm, overshoot, rms, settling_time, vibration
 from paraflex.results.traces import Trace
 from paraflex.units import WHERE_IT_SLIDES
+
+if TYPE_CHECKING:
+    from paraflex.control.loop import ControllerRecord
 
 # Kinds of runs.
 PATH, MOTION, STATICS = "path", "motion", "statics"
@@ -100,6 +103,12 @@ def sliding(each: str) -> str:
 def metric_unit(column: str, members: Members) -> str:
     """Unit of a column, of a mechanism with these members."""
     return METRICS[column.partition(".")[0]].unit_of(column, members)
+
+
+def _saturated_share(controllers: Sequence[ControllerRecord]) -> float:
+    """The share of samples at which a limit was met; 0 without controllers."""
+    samples = sum(one.t.size for one in controllers)
+    return sum(int(np.sum(one.limited)) for one in controllers) / samples if samples else 0.0
 
 
 def _as_it_is(formula: Callable[[Any], Any]) -> Formula:
@@ -230,6 +239,13 @@ _ALL = (
            _as_it_is(lambda x: vibration(*x.after)), "residual vibration", kept=True, runs=(PATH,)),
     Metric("drift_speed", "mean speed of the end-effector's drift after the motion", "m/s",
            _as_it_is(lambda x: drift_speed(*x.after)), "drift after the motion", kept=True, runs=(PATH,)),
+    Metric("settling_time", "time from the end of the motion until the end-effector stays as near to its desired place "
+           "as 5 % of the largest tracking error", "s",
+           _as_it_is(lambda x: settling_time(x.t, x.distance, x.motion_end)), "settling time", smooth=False, kept=True,
+           runs=(PATH,), kept_of=()),
+    Metric("overshoot", "how far the end-effector goes beyond the end of its path, in the direction of arrival", "m",
+           _as_it_is(lambda x: overshoot(x.position, x.desired, x.moving)), "overshoot", smooth=False, kept=True,
+           runs=(PATH,), kept_of=()),
     Metric("deflection_max", "largest deflection of any body from its chord, the line between its ends", "m",
            _largest_magnitude(lambda x: x.deflection), "largest deflection", runs=_ANY),
     Metric("peak_torque_max", "largest magnitude of any motor's torque", "N m",
@@ -247,6 +263,11 @@ _ALL = (
            _motor_energy, "energy of the motors", of_motors=True),
     Metric("motor_power_max", "largest magnitude of any motor's power", "W",
            _largest_magnitude(lambda x: x.power), "largest motor power", of_motors=True),
+    Metric("internal_torque_max", "largest Euclidean norm of the part of the torques that only strains links", "N m",
+           _as_it_is(lambda x: largest_norm(x.internal_torque)), "largest internal torque", smooth=False,
+           runs=(PATH,), of_motors=True, kept_of=()),
+    Metric("saturated_share", "share of the samples of controllers at which a limit of torques was met", "1",
+           _as_it_is(lambda x: _saturated_share(x.controllers)), smooth=False, of_motors=True, kept_of=()),
     Metric("drive_torque_max", "largest magnitude of the torque or force of each prescribed motion", "N m",
            _largest_of_each(lambda x: x.drive_torque), "largest torque", each=DRIVE),
     Metric("drive_power_max", "largest magnitude of the power of each prescribed motion", "W",

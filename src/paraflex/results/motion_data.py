@@ -10,12 +10,13 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.control.runs import ControlledMotion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of
-from paraflex.mechanism import AngleLaw
 from paraflex.motion import MotionRun
 from paraflex.results.acting import load_variables
+from paraflex.results.controllers import controller_figures, with_controllers
 from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import (
@@ -63,7 +64,8 @@ def motion_dataset(
     -------
     xarray.Dataset
         Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end, section, drive, load,
-        sensor; units and signs in the attributes of every variable.
+        sensor; of each controller NAME sample_NAME, input_NAME and output_NAME (see `results.controllers`); units and
+        signs in the attributes of every variable.
     """
     system, solution, mechanism = run.system, run.solution, run.system.described
     q, v = solution.q, solution.v
@@ -80,7 +82,7 @@ def motion_dataset(
     data |= load_variables(mechanism, run.times)
     data |= {name: getattr(solution, name) for name in RUN_FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
-    if any(isinstance(law, AngleLaw) for law in run.torques.values()):
+    if run.in_time:
         data["applied_torque"] = (("time", "motor"), padded(torques, run.times.size))
     else:
         data["applied_torque"] = (("motor",), np.array(list(run.torques.values()), dtype=float))
@@ -91,6 +93,8 @@ def motion_dataset(
         "kind": "motion",
         "singular_positions": json.dumps(solution.singular_positions),
     }
+    if isinstance(run, ControlledMotion):
+        out = with_controllers(out, [run.controllers], [motor.name for motor in mechanism.motors])
     beyond = [] if run.validity is None or run.validity.holds else [run.validity.finding()]
     keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *run.doubts])
     return out
@@ -114,6 +118,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "validity": validity_summary(data),
         **sensor_figures(data),
         **reduction_figures(data),
+        **controller_figures(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]) if reached.size else None,

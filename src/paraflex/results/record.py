@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import given_as
+from paraflex.control.loop import ControllerRecord
+from paraflex.control.runs import ControlledTracking
 from paraflex.dynamics.points import PointMotion, point_motion
 from paraflex.findings import Finding
 from paraflex.results.links import Links, system_links
@@ -59,6 +61,8 @@ class Record(Links):
         How far it is within what its model can describe.
     doubts : tuple of Finding
         What of its results is not plausible.
+    controllers : tuple of ControllerRecord
+        What each did, where torques were those of controllers.
     """
 
     task: TrackingTask
@@ -70,6 +74,7 @@ class Record(Links):
     figures: Mapping[str, Any] = field(default_factory=dict)
     validity: Validity | None = None
     doubts: tuple[Finding, ...] = ()
+    controllers: tuple[ControllerRecord, ...] = ()
 
 
 def record(run: TrackingRun) -> Record:
@@ -92,4 +97,5 @@ def record(run: TrackingRun) -> Record:
         figures={name: getattr(solution, name) for name in (*RUN_FIGURES, BRAKE_ENERGY)},
         validity=run.validity,
         doubts=run.doubts,
+        controllers=run.controllers if isinstance(run, ControlledTracking) else (),
     )

@@ -9,6 +9,9 @@ from typing import Generic, TypeVar, overload
 
 import numpy as np
 
+from paraflex.control.laws import internal_torques
+from paraflex.control.loop import ControllerRecord
+from paraflex.control.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import drive_torques, joint_parts, load_in
 from paraflex.dynamics.points import point_motion
@@ -89,6 +92,11 @@ class SolutionTraces(Generic[R]):
         """Rate of every joint's angle [rad/s], or travel [m/s] (k, joints)."""
         return self._of_joints([joint.name for joint in self.system.described.joints])
 
+    @property
+    def controllers(self) -> tuple[ControllerRecord, ...]:
+        """What controllers did; none where there were none."""
+        return self.run.controllers if isinstance(self.run, ControlledTracking | ControlledMotion) else ()
+
     def _of_joints(self, names: list[str]) -> Trace:
         """Rates of joints by name (k, joints)."""
         solution = self.solution
@@ -117,6 +125,16 @@ class RunTraces(Traces, SolutionTraces[TrackingRun]):
     def condition(self) -> Trace:
         """Condition number of the actuation matrix (k,)."""
         return self.run.condition
+
+    @property
+    def desired(self) -> Trace:
+        """Desired places of the end-effector (k, 2) [m]."""
+        return self.run.task.motion.desired.position[: len(self.t)]
+
+    @cached_property
+    def internal_torque(self) -> Trace:
+        """Part of the torques (samples, motors) that only strains links [N m], or [N] of motors that slide."""
+        return internal_torques(self.run.task, self.run.mode, self.torque)
 
 
 @dataclass(frozen=True)

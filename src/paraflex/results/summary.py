@@ -8,6 +8,7 @@ from typing import Any
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.results.controllers import controller_figures
 from paraflex.results.doubts import verdict_of
 from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import check_kind
@@ -47,7 +48,8 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         `modes.<mode>` with tracking errors during the motion, after it and over all, vibration and drift, peak_torque
         and rms_torque per motor, end_effector_final, the solver's figures, validity (None of rigid bodies), `loads`
         (see `loads.load_figures`) and, where the mechanism has sensors, `sensors` (see `sensors.sensor_figures`), where
-        its bodies are reduced, `reduction` (see `reduced_runs.reduction_figures`);
+        its bodies are reduced, `reduction` (see `reduced_runs.reduction_figures`), where controllers acted,
+        `controllers` and internal_torque_max [N m] (see `controllers.controller_figures`);
         `error`, which of the errors ranks the modes; `verdict`, with the level and all findings; `after`, what the
         motors do after the path; `part`, how much of the path a run did that was too short for all of it, else None;
         `parameters`; `version`. A figure not reached is None.
@@ -73,7 +75,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         numbers["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
         numbers["validity"] = validity_summary(run)
         numbers["loads"] = load_figures(run)
-        numbers |= sensor_figures(run) | reduction_figures(run)
+        numbers |= sensor_figures(run) | reduction_figures(run) | controller_figures(run)
         modes[str(name)] = numbers
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}

@@ -69,6 +69,11 @@ class DataTraces(Traces):
         return self.data["deflection"].values
 
     @property
+    def desired(self) -> Trace:
+        """Desired places of the end-effector (k, 2) [m]."""
+        return self.data["end_effector_desired"].transpose("time", "axis").values
+
+    @property
     def condition(self) -> Trace:
         """Condition number of the actuation matrix (samples,)."""
         return self.data["actuation_condition"].values

@@ -15,7 +15,8 @@ import xarray as xr
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
 from paraflex.campaign import THREADS, OnProgress, Progress, Result, Study, Workers, hold_for
-from paraflex.errors import InputError, IntegrationError, NumericalError
+from paraflex.control import ControllerDescription, simulate_controlled
+from paraflex.errors import ControllerError, InputError, IntegrationError, NumericalError
 from paraflex.findings import Finding
 from paraflex.folders import RUN
 from paraflex.integrators import IntegrationOptions
@@ -99,6 +100,8 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
     full : TrackingTask, optional
         The task with all flexible coordinates, where bodies of the other are reduced: each mode is run with it too, and
         how far off the reduced run is stands in the results.
+    controllers : sequence of ControllerDescription
+        They act in every mode beside its planned torques.
     """
 
     _own = ("method",)
@@ -111,6 +114,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
     warning: bool = True
     findings: Iterable[Finding] = ()
     full: TrackingTask | None = None
+    controllers: Sequence[ControllerDescription] = ()
 
     def run(
         self,
@@ -131,6 +135,9 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
         if self.method is not None and not callable(self.method):
             remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in a way of its own"
             raise refused(self.method, "method", "a function", remedy)
+        if self.method is not None and self.controllers:
+            raise InputError("a function runs modes in a way of its own, without controllers", field="controllers",
+                             remedy="leave one of the two out")  # fmt: skip
         workers = workers or Workers()
         if workers.engine != THREADS:
             raise InputError("modes run in threads", field="workers", value=workers.engine, remedy="leave it out")
@@ -176,8 +183,10 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
         try:
             if self.method is not None:
                 return self.method(task, mode, on_progress=report)
+            if self.controllers:
+                return simulate_controlled(task, mode, self.controllers, options=self.options, on_progress=report)
             return simulate(task, mode, options=self.options, on_progress=report, warning=False)
-        except IntegrationError as error:
+        except (IntegrationError, ControllerError) as error:
             return error.partial
         except NumericalError as error:
             return str(error)
@@ -221,7 +230,7 @@ def run_study(
     Parameters
     ----------
     task, modes, **details
-        Fields of `TrackingStudy`: options, parameters, method, error, warning, findings.
+        Fields of `TrackingStudy`: options, parameters, method, error, warning, findings, controllers.
     workers : int, optional
         Threads; as many as there are processors by default. The results do not depend on it.
     on_progress : callable, optional

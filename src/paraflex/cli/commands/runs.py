@@ -44,6 +44,15 @@ class RunRequest:
             help="Actuation mode: signs (+-+-) or motor names (tau1,tau5); repeatable. Default: the study's.",
         ),
     ] = field(default_factory=list)
+    controllers: Annotated[
+        list[str],
+        Option(
+            "--controller",
+            metavar="NAME",
+            help="A controller of the model, beside planned torques; repeatable; none for none of them. Default: the "
+            "study's.",
+        ),
+    ] = field(default_factory=list)
     tolerance: Annotated[
         float | None, Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 1e-5.")
     ] = None

@@ -13,6 +13,7 @@ from paraflex.actuation import Effort, FeedForward, required_effort
 from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
 from paraflex.arrays import Numbers
+from paraflex.control.shaped import ShapedPath
 from paraflex.designs.derivatives.plans import Given
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
 from paraflex.designs.derivatives.steps import Stepped, complex_step, part, stepped, with_fields
@@ -225,7 +226,7 @@ class Change:
         path, here = self.there.path, self.planned.path
         duration = self.planned.path.duration
         turning = getattr(here, "turning", None)
-        if isinstance(here, Polygon | Circle):
+        if isinstance(here.path if isinstance(here, ShapedPath) else here, Polygon | Circle):
             return KnownPath(path.evaluate(times), None, duration)
         t, d_times = np.real(times), part(times)
         moved = [(near.path, t + place * d_times) for near, place in zip(self.near, self.stencil.places, strict=True)]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.designs.derivatives.changes import Change, ModeChange
-from paraflex.designs.derivatives.plans import Given, check_has_path, check_not_reduced, given, size_of
+from paraflex.designs.derivatives.plans import Given, check_has_path, check_open_and_whole, given, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
 from paraflex.designs.derivatives.steps import part, stepped
 from paraflex.designs.measure import measure, metric_columns, metric_values, smooth_metrics
@@ -87,7 +87,7 @@ def metric_gradients(
 def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] | None = None) -> list[ModeGradients]:
     """See `metric_gradients`."""
     check_has_path(setting)
-    check_not_reduced(setting.design(task.values)[0])
+    check_open_and_whole(setting.design(task.values)[0])
     planned, options = plan_task(setting, task)
     check_differentiable(options)
     if planned.holds:

@@ -105,8 +105,13 @@ def check_has_path(setting: Setting) -> None:
         )  # fmt: skip
 
 
-def check_not_reduced(model: Model) -> None:
-    """Check that runs of a design keep all flexible coordinates: few are chosen anew for each design."""
+def check_open_and_whole(model: Model) -> None:
+    """Check that runs of a design have no controllers and keep all flexible coordinates, which are chosen for each."""
+    if model.acting():
+        raise InputError(
+            "derivatives are of runs without controllers", field="study.controllers",
+            value=", ".join(model.study.controllers), remedy="leave them out",
+        )  # fmt: skip
     if model.study.reduced:
         raise InputError(
             "derivatives are of runs with all flexible coordinates", field="study.reduced", value=model.study.reduced,
@@ -135,7 +140,7 @@ def check_differentiable_study(setting: Setting, values: Sequence[float], column
     check_smooth(tuple(column.partition(".")[0] for column in columns))
     model, options = setting.design(tuple(values))
     check_differentiable(options)
-    check_not_reduced(model)
+    check_open_and_whole(model)
     for k in range(len(setting.names)):
         size_of(setting, Task(0, 0, tuple(values), setting.paths[0]), k, 1.0)
 

@@ -1,0 +1,408 @@
+"""What stands between a mechanism and a control law in a real controller, in this order.
+
+Sample, quantise, filter, law, saturate, limit the rate, delay, hold: the last two are of the loop that runs it.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.control.controllers import Plant
+from paraflex.control.references import Reference, references
+from paraflex.errors import InputError
+from paraflex.mechanism.quantities import known, positive
+
+# A transfer function: the time constant's inverse as a cut-off frequency [Hz] of first order, or coefficients of
+# numerator and denominator in descending powers of s.
+Filter = float | tuple[Sequence[float], Sequence[float]]
+Limit = float | tuple[float, float]
+
+
+class ChainSample(NamedTuple):
+    """One sample of a controller with its chain.
+
+    Attributes
+    ----------
+    readings : (inputs,) array
+        Quantised and filtered: what the law is given, before references are taken off.
+    wanted : (outputs,) array
+        Torques of the law.
+    given : (outputs,) array
+        Those within the limits, which act after the delay.
+    """
+
+    readings: Array
+    wanted: Array
+    given: Array
+
+
+class Chain(NamedTuple):
+    """What stands around a law, of each sensor and motor; None where there is nothing.
+
+    Attributes
+    ----------
+    resolution : list of float or None
+        Of readings.
+    filters : list of pair of arrays or None
+        Coefficients of numerator and denominator.
+    limits : list of pair of float or None
+        Lowest and highest torque [N m, N].
+    rates : list of float or None
+        [N m/s, N/s]
+    """
+
+    resolution: list[Any]
+    filters: list[Any]
+    limits: list[Any]
+    rates: list[Any]
+
+
+class SampledController:
+    """A control law with what a real controller has around it: a `Controller`.
+
+    At every sample its sensors are read, the readings quantised and filtered, references taken off; then come the law,
+    limits of the torques and of their rates.
+
+    Parameters
+    ----------
+    law : object
+        A discrete model of python-control or SciPy, from readings to torques; a function of (k, t, y), with y (inputs,)
+        the readings of sample k at time t, that returns torques (outputs,); or an object with such a method `step`. It
+        may have `start(plant)`, which is called first, `limited(torques)`, which is told the torques within the limits,
+        and any of the attributes below.
+    period : float, optional
+        Of sampling [s].
+    delay : float
+        From a sample until its torques act [s].
+    inputs : sequence of str, optional
+        Sensors. By default the law's own, or the names of a model's inputs, else the encoders of the mode's motors.
+    outputs : sequence of str, optional
+        Motors. By default the law's own, or the names of a model's outputs, else all of the mode.
+    reference : mapping of str to float or callable, or "plan", optional
+        What is taken off the readings of sensors: numbers, functions of time, or the values on the planned motion of
+        all that it tells: angles and travels of joints, their rates, and the end-effector's coordinates. By default the
+        law's own.
+    quantise : float or mapping of str to float, optional
+        Resolution of readings, of all or by sensor: they are rounded to its multiples.
+    filters : mapping of str to Filter, optional
+        By sensor: cut-off frequency of a low-pass of first order [Hz], or coefficients (numerator, denominator) in
+        descending powers of s. It starts settled at the first reading, and takes readings for straight lines between
+        samples.
+    limits : float, pair or mapping of str to either, optional
+        Of torques, of all or by motor: their largest magnitude, or (lowest, highest) [N m, N].
+    rates : float or mapping of str to float, optional
+        Largest change of torques in a second [N m/s, N/s].
+    name : str
+        In results and errors.
+
+    Raises
+    ------
+    InputError
+        A number that makes no sense, a continuous model, or one with other numbers of inputs and outputs. Of names that
+        the mechanism does not have as it starts.
+    """
+
+    @checked_arguments()
+    def __init__(
+        self,
+        law: Any,
+        *,
+        period: float | None = None,
+        delay: float | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        reference: Mapping[str, Any] | str | None = None,
+        quantise: float | Mapping[str, float] | None = None,
+        filters: Mapping[str, Any] | None = None,
+        limits: Any = None,
+        rates: float | Mapping[str, float] | None = None,
+        name: str = "controller",
+    ) -> None:
+        self.name: str = name
+        self.law: Any = as_law(law)
+        period = getattr(self.law, "period", None) if period is None else period
+        self.period: float = _positive(period, "period")
+        delay = getattr(self.law, "delay", 0.0) if delay is None else delay
+        self.delay: float = _not_negative(delay, "delay")
+        self.inputs: tuple[str, ...] = tuple(getattr(self.law, "inputs", ()) if inputs is None else inputs)
+        self.outputs: tuple[str, ...] = tuple(getattr(self.law, "outputs", ()) if outputs is None else outputs)
+        own = getattr(self.law, "reference", None)
+        self.reference: Mapping[str, Any] | str | None = own if reference is None else reference
+        self.quantise: Any = quantise
+        self.filters: Mapping[str, Any] = filters or {}
+        self.limits: Any = limits
+        self.rates: Any = rates
+        self.last: ChainSample | None = None
+        if isinstance(self.law, DiscreteModel):
+            self.law.check(self.inputs, self.outputs, self.period)
+
+    def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> Chain:
+        """What stands around the law, for sensors and motors.
+
+        Raises
+        ------
+        InputError
+            Other names, or numbers that make no sense.
+        """
+        return Chain(
+            _by_name(self.quantise, inputs, "quantise", _resolution),
+            _by_name(self.filters, inputs, "filters", _transfer_function),
+            _by_name(self.limits, outputs, "limits", _range),
+            _by_name(self.rates, outputs, "rates", _pace),
+        )
+
+    def start(self, plant: Plant) -> None:
+        """See `Controller`.
+
+        Raises
+        ------
+        InputError
+            Names that the plant does not have.
+        """
+        self._references: list[Reference | None] = references(self.reference, plant)
+        self._resolution, filters, limits, rates = self.check(plant.inputs, plant.outputs)
+        self._filters = [None if given is None else _SettledFilter(given, plant.period) for given in filters]
+        self._lowest = np.array([-np.inf if one is None else one[0] for one in limits])
+        self._highest = np.array([np.inf if one is None else one[1] for one in limits])
+        self._most = np.array([np.inf if one is None else one * plant.period for one in rates])
+        self._given: Array = np.zeros(len(plant.outputs))
+        if hasattr(self.law, "start"):
+            self.law.start(plant)
+
+    @property
+    def title(self) -> str:
+        """What its law is, in a few words."""
+        return str(getattr(self.law, "title", type(self.law).__name__))
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest torques (outputs, 2), and their largest changes in a second (outputs,), once started."""
+        return np.stack([self._lowest, self._highest], axis=1), self._most / self.period
+
+    def step(self, k: int, t: float, y: Array) -> Any:
+        """See `Controller`."""
+        y = np.array(y, dtype=float)
+        for i, (resolution, filtered) in enumerate(zip(self._resolution, self._filters, strict=True)):
+            if resolution is not None:
+                y[i] = resolution * np.round(y[i] / resolution)
+            if filtered is not None:
+                y[i] = filtered(y[i])
+        errors = y.copy()
+        for i, reference in enumerate(self._references):
+            if reference is not None:
+                errors[i] -= reference(t)
+        said = self.law.step(k, t, errors)
+        try:
+            wanted = np.array(said, dtype=float)
+        except (TypeError, ValueError):
+            return said  # The loop says what is wrong with it.
+        if wanted.shape != self._given.shape or not np.all(np.isfinite(wanted)):
+            return wanted
+        given = np.clip(wanted, self._lowest, self._highest)
+        given = np.clip(given, self._given - self._most, self._given + self._most)
+        self._given = given
+        if hasattr(self.law, "limited"):
+            self.law.limited(given)
+        self.last = ChainSample(y, wanted, given)
+        return given
+
+
+class DiscreteModel:
+    """x_k+1 = A x_k + B y_k, torques C x_k + D y_k: a law.
+
+    Parameters
+    ----------
+    A, B, C, D : arrays
+    period : float or None
+        [s]; None where the model does not say it.
+    inputs, outputs : tuple of str
+        Names, where the model has any.
+    """
+
+    title = "state space"
+
+    def __init__(
+        self,
+        A: Array,
+        B: Array,
+        C: Array,
+        D: Array,
+        period: float | None,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+    ) -> None:
+        self.A, self.B, self.C, self.D = A, B, C, D
+        self.period = period
+        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
+        self.x: Array = np.zeros(len(A))
+
+    def check(self, inputs: Sequence[str], outputs: Sequence[str], period: float) -> None:
+        """Compare its size and its period with what it is to have.
+
+        Raises
+        ------
+        InputError
+            They differ.
+        """
+        if inputs:
+            _check_count(inputs, self.B.shape[1], "inputs")
+        if outputs:
+            _check_count(outputs, self.C.shape[0], "outputs")
+        if self.period is not None and abs(period - self.period) > 1e-9 * period:
+            raise InputError(f"the model is sampled every {self.period:g} s", field="period", value=period,
+                             remedy="leave it out")  # fmt: skip
+
+    def start(self, plant: Plant) -> None:
+        """Set its states to zero."""
+        _check_count(plant.inputs, self.B.shape[1], "inputs")
+        _check_count(plant.outputs, self.C.shape[0], "outputs")
+        self.x = np.zeros(len(self.A))
+
+    def step(self, k: int, t: float, y: Array) -> Array:
+        """Torques of this sample; its states go on to the next."""
+        torques = self.C @ self.x + self.D @ y
+        self.x = self.A @ self.x + self.B @ y
+        return torques
+
+
+def _check_count(names: Sequence[str], count: int, field: str) -> None:
+    if len(names) != count:
+        raise InputError(f"the model has {count}", field=field, value=", ".join(names), remedy="name as many")
+
+
+class _Function:
+    """A function as a law."""
+
+    def __init__(self, function: Callable[[int, float, Array], Any]) -> None:
+        self.step = function
+        name = getattr(function, "__name__", "")
+        self.title: str = name if name.isidentifier() else "function"
+
+
+def as_law(given: Any) -> Any:
+    """A law from what is taken for one: see `SampledController`.
+
+    Raises
+    ------
+    InputError
+        Anything else, or a continuous model.
+    """
+    if callable(getattr(given, "step", None)):
+        return given
+    if all(hasattr(given, name) for name in ("A", "B", "C", "D", "dt")):
+        return _discrete_model(given)
+    if callable(given) and not inspect.isclass(given):
+        return _Function(given)
+    raise InputError(
+        "is no control law", field="law", value=given,
+        remedy="give a function of (k, t, y), an object with a method step, or a discrete model in state space",
+    )  # fmt: skip
+
+
+def _discrete_model(given: Any) -> DiscreteModel:
+    dt = given.dt
+    if dt is None or (dt is not True and not dt > 0.0):
+        raise InputError("is a continuous model", field="law", value=given,
+                         remedy="discretise it, say model.sample(1e-3)")  # fmt: skip
+    A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (given.A, given.B, given.C, given.D))
+    if A.size == 0:
+        A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
+    labels = [_own_names(getattr(given, name, None)) for name in ("input_labels", "output_labels")]
+    return DiscreteModel(A, B, C, D, None if dt is True else float(dt), *labels)
+
+
+def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:
+    """Names that somebody gave: python-control calls others u[0], u[1] and y[0], y[1]."""
+    names = tuple(labels or ())
+    return () if any(name[:2] in ("u[", "y[") for name in names) else names
+
+
+class _SettledFilter:
+    """A transfer function of a sampled signal, settled at its first value."""
+
+    def __init__(self, given: tuple[Array, Array], period: float) -> None:
+        continuous = scipy.signal.tf2ss(*given)
+        self._A, self._B, self._C, self._D, _ = scipy.signal.cont2discrete(continuous, period, method="foh")
+        self._x: Array | None = None
+
+    def __call__(self, value: float) -> float:
+        if self._x is None:
+            rest = np.eye(len(self._A)) - self._A
+            self._x = np.linalg.solve(rest, self._B * value)
+        filtered = float((self._C @ self._x + self._D * value).item())
+        self._x = self._A @ self._x + self._B * value
+        return filtered
+
+
+def _by_name(given: Any, names: Sequence[str], field: str, take: Callable[[Any, str], Any]) -> list[Any]:
+    """What is given for all, or by name, in the order of the names; None for the others."""
+    if given is None:
+        return [None] * len(names)
+    if not isinstance(given, Mapping):
+        return [take(given, field)] * len(names)
+    for name in given:
+        known(name, names, field, "name")
+    return [take(given[name], f"{field}.{name}") if name in given else None for name in names]
+
+
+def _positive(value: Any, field: str, unit: str = "s") -> float:
+    if value is None:
+        raise InputError("is missing", field=field, remedy="give it in seconds")
+    if not isinstance(value, int | float | np.floating | np.integer):
+        raise InputError("is no number", field=field, value=value, remedy="give one above zero")
+    positive(float(value), field, unit)
+    return float(value)
+
+
+def _not_negative(value: Any, field: str) -> float:
+    if value == 0.0:
+        return 0.0
+    return _positive(value, field)
+
+
+def _resolution(value: Any, field: str) -> float:
+    return _positive(value, field, "the unit of the reading")
+
+
+def _pace(value: Any, field: str) -> float:
+    return _positive(value, field, "N m/s or N/s")
+
+
+def _range(value: Any, field: str) -> tuple[float, float]:
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) and len(value) == 2:
+        low, high = float(value[0]), float(value[1])
+        if not low < high:
+            raise InputError("the lowest must be below the highest", field=field, value=value, remedy="exchange them")
+        return low, high
+    most = _positive(value, field, "N m or N")
+    return -most, most
+
+
+def _transfer_function(value: Any, field: str) -> tuple[Array, Array]:
+    """Coefficients of numerator and denominator, in descending powers of s."""
+    if all(hasattr(value, name) for name in ("num", "den")):
+        value = (np.ravel(value.num), np.ravel(value.den))
+    if isinstance(value, int | float):
+        rate = 2.0 * np.pi * _positive(value, field, "Hz")
+        return np.array([rate]), np.array([1.0, rate])
+    try:
+        numerator, denominator = (np.trim_zeros(np.atleast_1d(np.asarray(each, dtype=float)), "f") for each in value)
+    except (TypeError, ValueError):
+        numerator = denominator = np.zeros(0)
+    proper = 0 < numerator.size <= denominator.size and denominator.size > 1
+    if not proper or not np.all(np.isfinite([*numerator, *denominator])):
+        raise InputError(
+            "is no filter", field=field, value=value,
+            remedy="give a cut-off frequency in Hz, or coefficients (numerator, denominator) in descending powers of s",
+        )  # fmt: skip
+    if np.any(np.roots(denominator).real >= 0.0):
+        raise InputError("is not stable", field=field, value=value,
+                         remedy="give a denominator whose roots have negative real parts")  # fmt: skip
+    return numerator, denominator

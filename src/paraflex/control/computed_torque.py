@@ -1,0 +1,120 @@
+"""Computed torque of the rigid mechanism in task space.
+
+tau = B^+ Z^T (M a + h - F) with the accelerations a of the end-effector's x'' = x_d'' - Kv (x' - x_d') - Kp (x - x_d):
+its place x and its velocity follow from the encoders by the rigid mechanism's kinematics, of redundant encoders in the
+sense of least squares. Torques are those of least norm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paraflex.actuation import required_effort
+from paraflex.actuation.allocation import Effort
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.control.controllers import Plant
+from paraflex.control.estimators import BackwardDifference
+from paraflex.control.references import planned_motion
+from paraflex.dynamics import joint_coordinate
+from paraflex.errors import InputError
+from paraflex.kernel.closure import LOOPS_CLOSED
+from paraflex.kinematics import RigidMotion
+from paraflex.kinematics.closure import PathClosure
+from paraflex.mechanism.quantities import positive
+
+# A place is found when it moves by less than this part of the mechanism's size, in so many iterations.
+_FOUND, _ITERATIONS = 1e-11, 20
+
+
+class ComputedTorque:
+    """Computed torque in task space: a law for `SampledController`. It gives the whole torque: no feed-forward besides.
+
+    Parameters
+    ----------
+    frequency : float
+        Of the end-effector's error, as of an oscillator [Hz]: Kp = (2 pi frequency)^2.
+    damping_ratio : float
+        Of it: Kv = 2 damping_ratio 2 pi frequency.
+    cutoff : float, optional
+        Of the low-pass filter of rates, which are differences of readings over the period [Hz].
+
+    Raises
+    ------
+    InputError
+        A frequency, damping ratio or cut-off that is not positive; as it starts, no plan, or readings of other joints
+        than those of motors.
+    """
+
+    @checked_arguments()
+    def __init__(self, frequency: float, damping_ratio: float = 0.7, *, cutoff: float | None = None) -> None:
+        positive(frequency, "frequency", "Hz")
+        positive(damping_ratio, "damping_ratio", "parts of the critical one")
+        omega = 2.0 * np.pi * frequency
+        self._Kp, self._Kv = omega**2, 2.0 * damping_ratio * omega
+        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
+
+    def start(self, plant: Plant) -> None:
+        """See `Controller`."""
+        self._plan = planned_motion(plant)
+        self._start, self._period = plant.state.time, plant.period
+        mechanism = self._plan.mechanism
+        joints = [motor.joint for motor in mechanism.motors]
+        for name in plant.inputs:
+            if name not in joints:
+                raise InputError("is no encoder of a motor", field="inputs", value=name,
+                                 remedy=f"choose from {', '.join(dict.fromkeys(joints))}")  # fmt: skip
+        self._joints = plant.inputs
+        self._motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in plant.outputs]
+        self._closure = PathClosure(mechanism, 0.0, float(self._plan.t[-1]))
+        self._wanted = self._closure.target(self._plan.path, self._plan.t)
+        self._rates = BackwardDifference(plant.period, self._cutoff)
+        self._pose = self._plan.q[0]
+
+    def step(self, k: int, t: float, y: Array) -> Array:
+        """See `Controller`; y are angles and travels of joints."""
+        sample = min(max(round((t - self._start) / self._period), 0), len(self._plan.t) - 1)
+        place = self._closure.task(self._plan.q[sample])
+        _, rate, acceleration = self._wanted[sample]
+        found = self._found(y, place)
+        velocity = found.rows @ self._rates.step(y)[1]
+        command = acceleration - self._Kv * (velocity - rate) - self._Kp * (found.place - place)
+        effort = required_effort(self._motion(t, found.place, velocity, command))
+        return self._least_norm(effort)
+
+    def _least_norm(self, effort: Effort) -> Array:
+        return np.linalg.pinv(effort.matrix[0][:, self._motors]) @ effort.required[0]
+
+    def _found(self, y: Array, place: Array) -> _Found:
+        """The end-effector's place (tasks,) at which joints read y, as nearly as they can."""
+        size = self._closure.system.size
+        for _ in range(_ITERATIONS):
+            motion = self._motion(0.0, place, np.zeros_like(place), np.zeros_like(place))
+            each = [joint_coordinate(motion.system, joint, motion.q) for joint in self._joints]
+            read = np.array([one.value[0] for one in each])
+            rows = np.linalg.pinv(np.stack([one.rows[0] for one in each]) @ motion.basis[0])
+            change = rows @ (y - read)
+            place = place + change
+            if np.max(np.abs(change)) < _FOUND * size:
+                return _Found(place, rows)
+        raise ArithmeticError("the rigid mechanism has no pose near the readings of its encoders")
+
+    def _motion(self, t: float, place: Array, velocity: Array, acceleration: Array) -> RigidMotion:
+        """The rigid mechanism with its end-effector there and moving so, near the last pose."""
+        target = np.ascontiguousarray(np.stack([place, velocity, acceleration])[None])
+        status, _, _, (q, v, a, basis) = self._closure.run(np.zeros(1), target, self._pose)
+        if status != LOOPS_CLOSED:
+            raise ArithmeticError("the rigid mechanism cannot take the pose that its encoders read")
+        self._pose = q[0]
+        plan = self._plan
+        return RigidMotion(plan.mechanism, plan.system, plan.path, np.array([t]), q, v, a, basis)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A place (tasks,), and what maps rates of joints to its velocity (tasks, joints)."""
+
+    place: Array
+    rows: Array

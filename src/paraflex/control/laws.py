@@ -1,0 +1,208 @@
+"""Laws of joints: proportional, derivative and integral ones, projected where motors are redundant.
+
+With e the errors of the active motors' angles, tau = -P (Kp e + Kd e' + Ki integral of e). Encoders of redundant motors
+contradict one another, by deflections of links and by quantisation; without P = B^+ B, which keeps of torques what acts
+on the motion, each contradiction makes torques that only strain links against one another. B is the rigid actuation
+matrix on the planned motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from paraflex.actuation import Effort, required_effort
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.control.controllers import Plant
+from paraflex.control.estimators import BackwardDifference
+from paraflex.control.references import PLAN, AtSamples, planned_motion
+from paraflex.dynamics.state import mass_matrix
+from paraflex.errors import InputError
+from paraflex.mechanism import ActuationMode
+from paraflex.mechanism.quantities import known, positive
+from paraflex.tracking import TrackingTask
+
+Gain = float | Sequence[float] | Mapping[str, float] | Array
+
+
+class JointGains(NamedTuple):
+    """Gains of a PD law of joints: stiffness [N m/rad] and damping [N m s/rad]."""
+
+    stiffness: float
+    damping: float
+
+
+class JointPID:
+    """PID of the angles of a mode's motors: a law for `SampledController`.
+
+    The rate is the difference of two readings over the period, low-pass filtered if a cut-off is given. Where torques
+    were limited, the integral is brought back towards what the limits leave, within the time Kp/Ki.
+
+    Parameters
+    ----------
+    stiffness : float, sequence or mapping of str to float
+        Kp, of all motors or each [N m/rad, N/m].
+    damping : likewise
+        Kd [N m s/rad, N s/m].
+    integral : likewise
+        Ki [N m/(rad s), N/(m s)].
+    project : bool
+        Whether torques that do not act on the rigid motion are taken out, where there is a plan; else see
+        `internal_torques`.
+    cutoff : float, optional
+        Of the low-pass filter of rates [Hz].
+
+    Raises
+    ------
+    InputError
+        Gains that are negative or no numbers; as it starts, gains of other motors or readings of other joints than the
+        mode's.
+    """
+
+    title = "PID of joints"
+    reference: str | None = PLAN
+
+    @checked_arguments()
+    def __init__(
+        self,
+        stiffness: Gain,
+        damping: Gain = 0.0,
+        integral: Gain = 0.0,
+        *,
+        project: bool = True,
+        cutoff: float | None = None,
+    ) -> None:
+        self._gains = {"stiffness": stiffness, "damping": damping, "integral": integral}
+        self._project = project
+        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
+
+    def start(self, plant: Plant) -> None:
+        """See `Controller`."""
+        if len(plant.inputs) != len(plant.outputs):
+            raise InputError(
+                f"{len(plant.inputs)} readings for {len(plant.outputs)} motors", field="inputs",
+                value=", ".join(plant.inputs), remedy="give the encoder of each motor, in their order",
+            )  # fmt: skip
+        gains = (gains_of(gain, plant.outputs, field) for field, gain in self._gains.items())
+        self._Kp, self._Kd, self._Ki = gains
+        self._period = plant.period
+        self._rates = BackwardDifference(plant.period, self._cutoff)
+        self._sum = np.zeros(len(plant.outputs))
+        self._wanted = np.zeros(len(plant.outputs))
+        self._projector = projectors(plant) if self._project and plant.task is not None else None
+
+    def step(self, k: int, t: float, y: Array) -> Array:
+        """See `Controller`; y are errors of angles."""
+        self._sum = self._sum + self._Ki * self._period * y
+        torques = -(self._Kp * y + self._Kd * self._rates.step(y)[1] + self._sum)
+        if self._projector is not None:
+            torques = self._projector(t) @ torques
+        self._wanted = torques
+        return torques
+
+    def limited(self, torques: Array) -> None:
+        """Bring the integral back where torques were limited."""
+        excess = self._wanted - torques
+        if np.any(excess):
+            pace = np.divide(self._Ki * self._period, self._Kp, out=np.ones_like(excess), where=self._Kp > 0.0)
+            self._sum = self._sum + np.minimum(pace, 1.0) * excess * (self._Ki > 0.0)
+
+
+def projectors(plant: Plant) -> AtSamples:
+    """P = B^+ B (outputs, outputs) of a plant's motors on its planned motion, at the samples of its controller.
+
+    Raises
+    ------
+    InputError
+        There is no plan.
+    """
+    return AtSamples(plant, torque_projectors(required_effort(planned_motion(plant)), plant.outputs))
+
+
+def torque_projectors(effort: Effort, motors: Sequence[str]) -> Array:
+    """P = B^+ B (k, motors, motors) of some motors along a motion."""
+    own = [motor.name for motor in effort.motion.mechanism.motors]
+    B = effort.matrix[:, :, [own.index(name) for name in motors]]
+    return np.linalg.pinv(B) @ B
+
+
+def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Array) -> Array:
+    """The part (I - P) tau (k, motors) of torques (k, motors) that only strains links, at the first samples of a task.
+
+    Parameters
+    ----------
+    task : TrackingTask
+    mode : str or ActuationMode
+    torques : (k, motors) array
+        Of all motors, those outside of the mode zero [N m, N].
+    """
+    names = [motor.name for motor in task.mechanism.motors]
+    active = [name for name in names if name in task.mode(mode).motors]
+    columns = [names.index(name) for name in active]
+    P = torque_projectors(task.effort, active)[: len(torques)]
+    out = np.zeros_like(torques)
+    out[:, columns] = torques[:, columns] - np.einsum("kij,kj->ki", P, torques[:, columns])
+    return out
+
+
+@checked_arguments()
+def joint_gains(
+    task: TrackingTask, mode: str | ActuationMode, frequency: float, damping_ratio: float = 0.7
+) -> JointGains:
+    """Gains of a PD law of joints that give the rigid mechanism a natural frequency and a damping ratio.
+
+    One stiffness k for all motors makes the task stiffness k B B^T; of M^-1 k B B^T, with M = Z^T M Z the rigid
+    mechanism's inertia, the mean of the eigenvalues over task coordinates and path is omega^2.
+
+    Parameters
+    ----------
+    task : TrackingTask
+    mode : str or ActuationMode
+    frequency : float
+        [Hz]
+    damping_ratio : float
+
+    Raises
+    ------
+    InputError
+        A frequency or a ratio that is not positive.
+    """
+    positive(frequency, "frequency", "Hz")
+    positive(damping_ratio, "damping_ratio", "parts of the critical one")
+    omega = 2.0 * np.pi * frequency
+    B = task.effort.matrix[:, :, task.effort.active(task.mode(mode))]
+    ratio = np.linalg.solve(task_inertia(task.effort), B @ np.swapaxes(B, 1, 2))
+    stiffness = omega**2 / float(np.mean(np.trace(ratio, axis1=1, axis2=2)) / ratio.shape[1])
+    return JointGains(stiffness, 2.0 * damping_ratio * stiffness / omega)
+
+
+def task_inertia(effort: Effort) -> Array:
+    """Z^T M Z (k, tasks, tasks) of the rigid mechanism along a motion."""
+    motion = effort.motion
+    masses = np.array([mass_matrix(motion.system, q) for q in motion.q])
+    return np.swapaxes(motion.basis, 1, 2) @ masses @ motion.basis
+
+
+def gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
+    """A gain for each motor (motors,), from one for all or by motor.
+
+    Raises
+    ------
+    InputError
+        Unknown motors, or no numbers from zero on.
+    """
+    if isinstance(given, Mapping):
+        for name in given:
+            known(name, motors, field, "motor")
+        given = [given.get(name, 0.0) for name in motors]
+    try:
+        gains = np.broadcast_to(np.asarray(given, dtype=float), (len(motors),)).copy()
+    except (TypeError, ValueError):
+        gains = np.full(1, np.nan)
+    if not (np.all(np.isfinite(gains)) and np.all(gains >= 0.0)):
+        raise InputError(f"no gains of {len(motors)} motors", field=field, value=given,
+                         remedy="give one number from zero on, one for each motor, or numbers by motor")  # fmt: skip
+    return gains

@@ -1,0 +1,303 @@
+"""Controllers that act on a simulation, each at its own instants."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.control.chain import ChainSample, SampledController, as_law
+from paraflex.control.controllers import Controller, Plant
+from paraflex.control.together import SAME as _SAME, check_name, multiple_of
+from paraflex.errors import InputError
+from paraflex.mechanism.quantities import known
+
+
+class Due(NamedTuple):
+    """Torques (outputs,) of a controller, by its number, that act from an instant on."""
+
+    tick: int
+    part: float
+    controller: int
+    torques: Array
+
+
+@dataclass
+class Done:
+    """What a controller has done so far, at its samples: times, readings, torques wanted and given."""
+
+    t: list[float] = field(default_factory=list)
+    readings: list[Array] = field(default_factory=list)
+    wanted: list[Array] = field(default_factory=list)
+    given: list[Array] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class ControllerRecord:
+    """What a controller did in a run.
+
+    Attributes
+    ----------
+    name : str
+    period, delay : float
+        [s]
+    inputs, outputs : tuple of str
+        Sensors and motors.
+    input_units, output_units : tuple of str
+    t : (k,) array
+        Of its samples [s].
+    readings : (k, inputs) array
+        Quantised and filtered, where it has such a chain.
+    wanted : (k, outputs) array
+        Torques of the law.
+    given : (k, outputs) array
+        Those within the limits, which acted from t + delay on.
+    law : str
+        What it computes torques by, in a few words.
+    limits : (outputs, 2) array
+        Lowest and highest torque [N m, N]; infinite without.
+    rates : (outputs,) array
+        Largest change of torques in a second [N m/s, N/s]; infinite without.
+    """
+
+    name: str
+    period: float
+    delay: float
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    output_units: tuple[str, ...]
+    t: Array
+    readings: Array
+    wanted: Array
+    given: Array
+    law: str
+    limits: Array
+    rates: Array
+
+    @property
+    def limited(self) -> Array:
+        """At which samples (k,) a limit was met."""
+        return np.any(self.given != self.wanted, axis=1)
+
+
+class LawFailure(Exception):
+    """A controller that raised, or returned what cannot be torques; the cause in words."""
+
+
+class Loop:
+    """Controllers with their instants: multiples of the shortest period, and those plus delays.
+
+    Parameters
+    ----------
+    controllers : sequence
+        Each a `Controller`, or what `SampledController` takes for a law that says its period.
+    plant : callable
+        Gives the `Plant` of a controller's inputs, outputs, period and delay.
+    sensors, motors : tuple of str
+        In the order of readings and of torques.
+    start : float
+        Time of the first sample [s].
+
+    Raises
+    ------
+    InputError
+        A period that is no multiple of the shortest one, unknown sensors or motors, a name twice.
+    """
+
+    def __init__(
+        self,
+        controllers: Sequence[Any],
+        plant: Callable[[Controller], Plant],
+        sensors: tuple[str, ...],
+        motors: tuple[str, ...],
+        start: float,
+    ) -> None:
+        self.controllers: list[Controller] = [_controller(each, sensors, motors) for each in controllers]
+        self.names: list[str] = _names(self.controllers)
+        self._start, self._motors = start, len(motors)
+        self._plants: list[Plant] = []
+        for name, each in zip(self.names, self.controllers, strict=True):
+            try:
+                self._plants.append(plant(each))
+                each.start(self._plants[-1])
+            except InputError as error:
+                raise error.within(name) from None
+        # Names of the sensors that controllers read, in the order of the readings that `act` needs.
+        self.read: tuple[str, ...] = tuple(dict.fromkeys(name for plant in self._plants for name in plant.inputs))
+        self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self._plants]
+        self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self._plants]
+        self.period: float = min(each.period for each in self.controllers)
+        self._every = [multiple_of(name, each.period, self.period) for name, each in self._named()]
+        self._delays = [self._ticks(each.delay) for each in self.controllers]
+        # Number of the next sample of each, torques to come, and those of each that act.
+        self._next = [0] * len(self.controllers)
+        self._due: list[Due] = []
+        self._acting = np.zeros((len(self.controllers), len(motors)))
+        self.kept: list[Done] = [Done() for _ in self.controllers]
+
+    def _named(self) -> list[tuple[str, Controller]]:
+        return list(zip(self.names, self.controllers, strict=True))
+
+    def _ticks(self, time: float) -> tuple[int, float]:
+        """A time in whole shortest periods, and what is left as a part of one."""
+        whole = round(time / self.period)
+        if abs(time / self.period - whole) <= _SAME * max(1.0, whole):
+            return whole, 0.0
+        whole = int(np.floor(time / self.period))
+        return whole, time / self.period - whole
+
+    @property
+    def _instant(self) -> tuple[int, float]:
+        """The next instant, in shortest periods."""
+        samples = min(every * number for every, number in zip(self._every, self._next, strict=True))
+        return min([(samples, 0.0), *((due.tick, due.part) for due in self._due)])
+
+    @property
+    def next(self) -> float:
+        """Time of the next instant [s]."""
+        tick, part = self._instant
+        return self._start + (tick + part) * self.period
+
+    def act(self, readings: Callable[[], Array]) -> Array | None:
+        """Take the samples of this instant, then let torques act; those of all motors, None where nothing changes.
+
+        Parameters
+        ----------
+        readings : callable
+            Gives readings of the sensors in `read`.
+
+        Raises
+        ------
+        LawFailure
+            A controller that raises, or whose torques are no finite numbers, or too few or many.
+        """
+        tick, part = self._instant
+        sampled = [k for k, (every, number) in enumerate(zip(self._every, self._next, strict=True))
+                   if part == 0.0 and every * number == tick]  # fmt: skip
+        if sampled:
+            y = readings()
+            for k in sampled:
+                torques = self._step(k, self._next[k], self._start + tick * self.period, y[self._inputs[k]])
+                whole, rest = self._delays[k]
+                self._due.append(Due(tick + whole, rest, k, torques))
+                self._next[k] += 1
+        acting = [due for due in self._due if (due.tick, due.part) <= (tick, part)]
+        if not acting:
+            return None
+        self._due = [due for due in self._due if (due.tick, due.part) > (tick, part)]
+        for due in acting:
+            self._acting[due.controller, self._outputs[due.controller]] = due.torques
+        return self._acting.sum(axis=0)
+
+    def _step(self, k: int, number: int, t: float, y: Array) -> Array:
+        name, controller, outputs = self.names[k], self.controllers[k], self._plants[k].outputs
+        try:
+            given = controller.step(number, t, y)
+        except Exception as error:
+            said = " ".join(str(error).split())
+            raise LawFailure(f'controller "{name}" raised {type(error).__name__}: {said}') from error
+        try:
+            torques = np.atleast_1d(np.asarray(given, dtype=float))
+        except (TypeError, ValueError):
+            raise LawFailure(f'controller "{name}" returned {type(given).__name__}, no torques') from None
+        if torques.shape != (len(outputs),):
+            count = "one" if torques.size == 1 else f"{torques.size}"
+            raise LawFailure(f'controller "{name}" returned {count} in place of {len(outputs)} torques')
+        wrong = [motor for motor, value in zip(outputs, torques, strict=True) if not np.isfinite(value)]
+        if wrong:
+            raise LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(wrong)}')
+        kept, last = self.kept[k], getattr(controller, "last", None)
+        record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
+        kept.t.append(t)
+        kept.readings.append(record.readings)
+        kept.wanted.append(record.wanted)
+        kept.given.append(torques)
+        return torques
+
+    def records(self, units: Callable[[str], str]) -> tuple[ControllerRecord, ...]:
+        """What each controller has done."""
+        return tuple(self._record(k, units) for k in range(len(self.controllers)))
+
+    def _record(self, k: int, units: Callable[[str], str]) -> ControllerRecord:
+        controller, plant, kept = self.controllers[k], self._plants[k], self.kept[k]
+        law, limits, rates = _bounds(controller, len(plant.outputs))
+        return ControllerRecord(
+            name=self.names[k],
+            period=controller.period,
+            delay=controller.delay,
+            inputs=plant.inputs,
+            outputs=plant.outputs,
+            input_units=plant.input_units,
+            output_units=tuple(units(motor) for motor in plant.outputs),
+            t=np.array(kept.t),
+            readings=_columns(kept.readings, plant.inputs),
+            wanted=_columns(kept.wanted, plant.outputs),
+            given=_columns(kept.given, plant.outputs),
+            law=law,
+            limits=limits,
+            rates=rates,
+        )
+
+    def saved(self) -> Any:
+        """State of all controllers and of what is to come."""
+        state = [vars(each) for each in self.controllers]
+        own = (self._next, self._due, self._acting, self.kept)
+        # Plants, with tasks and mechanisms, stay what they are.
+        memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
+        return copy.deepcopy((state, own), memo)
+
+    def restore(self, saved: Any) -> None:
+        """Go back to what `saved` gave."""
+        memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
+        states, own = copy.deepcopy(saved, memo)
+        self._next, self._due, self._acting, self.kept = own
+        for controller, state in zip(self.controllers, states, strict=True):
+            vars(controller).clear()
+            vars(controller).update(state)
+
+
+def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -> Controller:
+    """A controller from itself, or from a law that says all that it needs."""
+    if all(hasattr(given, name) for name in ("period", "delay", "inputs", "outputs", "start", "step")):
+        controller: Controller = given
+    else:
+        controller = SampledController(as_law(given))
+    for field_name, among, what in (("inputs", sensors, "sensor"), ("outputs", motors, "motor")):
+        for name in getattr(controller, field_name):
+            known(name, among, f"{getattr(given, 'name', 'controller')}.{field_name}", what)
+    return controller
+
+
+def _columns(rows: Sequence[Array], names: Sequence[str]) -> Array:
+    """Rows (k, names) of samples, which may be none."""
+    return np.array(rows).reshape(len(rows), len(names))
+
+
+def _bounds(controller: Controller, outputs: int) -> tuple[str, Array, Array]:
+    """Words for a controller's law, limits (outputs, 2) and rates (outputs,) of its torques."""
+    if isinstance(controller, SampledController):
+        return controller.title, *controller.bounds
+    return type(controller).__name__, np.tile([-np.inf, np.inf], (outputs, 1)), np.full(outputs, np.inf)
+
+
+def _names(controllers: Sequence[Controller]) -> list[str]:
+    """Names of controllers, with numbers where they have none of their own."""
+    given = [getattr(each, "name", "controller") for each in controllers]
+    for name in given:
+        check_name(name)
+    if len(set(given)) == len(given):
+        return given
+    twice = [name for name in given if given.count(name) > 1]
+    numbers = dict.fromkeys(twice, 0)
+    found = []
+    for name in given:
+        if name in numbers:
+            numbers[name] += 1
+            name = f"{name}{numbers[name]}"
+        found.append(name)
+    return found

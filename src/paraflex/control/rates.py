@@ -1,0 +1,64 @@
+"""Feedback of rates of readings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.control.controllers import Plant
+from paraflex.control.estimators import BackwardDifference
+from paraflex.errors import InputError
+from paraflex.mechanism.quantities import known
+
+
+class RateFeedback:
+    """tau = -K y': damping by strain rates, say. A law for `SampledController`.
+
+    Of the strain at a beam's root the rate is nearly collocated with the motor there: such feedback takes energy out of
+    the vibration as long as the delay is short against it.
+
+    Parameters
+    ----------
+    gains : mapping of str to mapping of str to float
+        By motor and sensor: torque by rate of the reading [N m s by the sensor's unit].
+    cutoff : float, optional
+        Of the low-pass filter of rates [Hz].
+
+    Raises
+    ------
+    InputError
+        No gains, or such that are no finite numbers.
+    """
+
+    @checked_arguments()
+    def __init__(self, gains: Mapping[str, Mapping[str, float]], *, cutoff: float | None = None) -> None:
+        self.inputs: tuple[str, ...] = tuple(dict.fromkeys(name for row in gains.values() for name in row))
+        self.outputs: tuple[str, ...] = tuple(gains)
+        if not self.inputs:
+            raise InputError("no gains", field="gains", remedy="give them by motor and sensor")
+        self._gains = np.array([[_gain(row.get(name, 0.0), f"gains.{motor}.{name}") for name in self.inputs]
+                                for motor, row in gains.items()])  # fmt: skip
+        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
+
+    def start(self, plant: Plant) -> None:
+        """See `Controller`."""
+        for names, own, what in ((plant.inputs, self.inputs, "inputs"), (plant.outputs, self.outputs, "outputs")):
+            for name in names:
+                known(name, own, what, "name")
+        self._K = self._gains[np.ix_([self.outputs.index(name) for name in plant.outputs],
+                                     [self.inputs.index(name) for name in plant.inputs])]  # fmt: skip
+        self._rates = BackwardDifference(plant.period, self._cutoff)
+
+    def step(self, k: int, t: float, y: Array) -> Array:
+        """See `Controller`."""
+        return -self._K @ self._rates.step(y)[1]
+
+
+def _gain(value: Any, field: str) -> float:
+    if not (isinstance(value, int | float | np.floating) and np.isfinite(value)):
+        raise InputError("not a finite number", field=field, value=value, remedy="give a number")
+    return float(value)

@@ -1,0 +1,64 @@
+"""Which motions of a sampled plant its motors do not reach, or its readings do not show."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from paraflex.arrays import Array
+from paraflex.control.sampled import SampledPlant
+from paraflex.errors import InputError
+
+# Poles further inside the unit circle decay by themselves.
+_LASTING = 1e-9
+# Of [A - z, B], in states and inputs of one size, the least singular value below which a motion is not reached.
+_NOT_REACHED = 1e-11
+_NAMED = 4
+
+
+def check_reach(
+    plant: SampledPlant, columns: Array, field: str, problem: str, remedy: str, *, transposed: bool = False
+) -> None:
+    """Raise an error that names motions which last, and which some columns do not reach (Hautus' test).
+
+    Parameters
+    ----------
+    plant : SampledPlant
+    columns : (n, m) array
+        Of inputs; or rows of outputs as columns, with `transposed`.
+    field, problem, remedy : str
+        Of the error.
+    transposed : bool
+        Whether to test which motions outputs show.
+
+    Raises
+    ------
+    InputError
+    """
+    n = plant.own
+    size = np.asarray(scipy.linalg.matrix_balance(plant.A[:n, :n], permute=False, separate=True)[1][0])
+    A = plant.A.copy()
+    A[:n] /= size[:, None]
+    A[:, :n] *= size
+    if transposed:
+        A, scale = A.T, np.concatenate([size, np.ones(len(A) - n)])
+    else:
+        scale = np.concatenate([1.0 / size, np.ones(len(A) - n)])
+    columns = columns * scale[:, None]
+    columns = columns / max(float(np.linalg.norm(columns)), np.finfo(float).tiny)
+    missed = []
+    for z in plant.poles:
+        if abs(z) < 1.0 - _LASTING or z.imag < 0.0:
+            continue
+        least = np.linalg.svd(np.hstack([A - z * np.eye(len(A)), columns]), compute_uv=False)[-1]
+        if least < _NOT_REACHED:
+            missed.append(frequency_of(complex(z), plant.period))
+    if missed:
+        names = sorted({"free motion (0 Hz)" if hertz < 1e-4 / plant.period else f"{hertz:.4g} Hz" for hertz in missed})
+        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+        raise InputError(problem, field=field, value=", ".join(names[:_NAMED]) + more, remedy=remedy)
+
+
+def frequency_of(z: complex, period: float) -> float:
+    """Frequency of a sampled pole [Hz]: |angle| / (2 pi T)."""
+    return float(abs(np.angle(z))) / (2.0 * np.pi * period)

@@ -1,0 +1,121 @@
+"""Readings of sensors at one instant, as controllers need them: a thousand times a second of simulated time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.dynamics import System
+from paraflex.dynamics.sensors import SensorReader, sensor_rows
+from paraflex.integrators.run import Instant
+from paraflex.mechanism import Encoder, JointForceSensor, Sensor, StrainGauge, Tachometer
+
+# A reading is taken for a product with constant rows where it agrees to this part at random states.
+_SAME = 1e-9
+_TRIALS = 3
+
+
+class Affine(NamedTuple):
+    """Readings y = value + rows_q q + rows_v v + rows_a a + w^2 (turning q), w the rate of a body's angle.
+
+    Attributes
+    ----------
+    value : (sensors,) array
+    q, v, a, turning : (sensors, n) arrays
+    angle : (sensors,) array of int
+        Index of the angle.
+    """
+
+    value: Array
+    q: Array
+    v: Array
+    a: Array
+    turning: Array
+    angle: np.ndarray
+
+    def at(self, q: Array, v: Array, a: Array) -> Array:
+        """Readings (sensors,) at a state (n,)."""
+        return self.value + self.q @ q + self.v @ v + self.a @ a + v[self.angle] ** 2 * (self.turning @ q)
+
+
+class Readings:
+    """Readings of some sensors of a system, one instant after another.
+
+    Angles, their rates and strains are linear in coordinates, velocities and accelerations, but for what the turning of
+    a beam adds to its strain; others are read one by one.
+
+    Parameters
+    ----------
+    system : System
+    sensors : sequence of Sensor
+
+    Attributes
+    ----------
+    names : tuple of str
+    units : tuple of str
+    of_torques : bool
+        Whether some are of torques as well.
+    """
+
+    def __init__(self, system: System, sensors: Sequence[Sensor]) -> None:
+        self._system = system
+        self.sensors: tuple[Sensor, ...] = tuple(sensors)
+        self.names: tuple[str, ...] = tuple(sensor.name for sensor in sensors)
+        self.units: tuple[str, ...] = tuple(system.mechanism.sensor_unit(sensor) for sensor in sensors)
+        found = [_affine(system, sensor) for sensor in sensors]
+        self.linear: list[int] = [k for k, one in enumerate(found) if one is not None]
+        self.affine: Affine = _stacked([one for one in found if one is not None], system.n)
+        self._others: list[int] = [k for k, one in enumerate(found) if one is None]
+        self.of_torques: bool = any(isinstance(self.sensors[k], JointForceSensor) for k in self._others)
+        self._reader = SensorReader(system, [self.sensors[k] for k in self._others])
+
+    def only(self, names: Sequence[str]) -> Readings:
+        """Readings of some of the sensors."""
+        return Readings(self._system, [self.sensors[self.names.index(name)] for name in names])
+
+    def __call__(self, now: Instant, torques: Array) -> Array:
+        """Readings (sensors,) at an instant, under torques (motors,)."""
+        found = np.empty(len(self.sensors))
+        found[self.linear] = self.affine.at(now.q, now.v, now.a)
+        if self._others:
+            given = (now.q[None], now.v[None], now.a[None], now.multipliers[None], torques[None])
+            found[self._others] = self._reader(*given)[0]
+        return found
+
+
+def _affine(system: System, sensor: Sensor) -> Affine | None:
+    """The reading as a product with constant rows; None where it is none."""
+    if not isinstance(sensor, Encoder | Tachometer | StrainGauge):
+        return None
+    n, m, motors = system.n, system.m, len(system.mechanism.motors)
+    body = sensor.body if isinstance(sensor, StrainGauge) else system.bodies[0].name
+    angle, still = system.body(body).angle, np.zeros(n)
+    turning = np.zeros(n)
+    turning[angle] = 1.0
+    at_rest = sensor_rows(system, still, still, still, np.zeros(m), np.zeros(motors), [sensor])
+    turned = sensor_rows(system, still, turning, still, np.zeros(m), np.zeros(motors), [sensor])
+    reader = SensorReader(system, [sensor])
+
+    def read(q: Array, v: Array, a: Array, multipliers: Array) -> Array:
+        return reader(q[None], v[None], a[None], multipliers[None], np.zeros((1, motors)))[0]
+
+    rows_q, rows_v, rows_a = (np.asarray(rows.todense()) for rows in (at_rest.q, at_rest.v, at_rest.a))
+    extra = np.asarray(turned.q.todense()) - rows_q
+    found = Affine(read(still, still, still, np.zeros(m)), rows_q, rows_v, rows_a, extra, np.array([angle]))
+    random = np.random.default_rng(0)
+    for _ in range(_TRIALS):
+        q, v, a, multipliers = (random.standard_normal(size) for size in (n, n, n, m))
+        exact, linear = read(q, v, a, multipliers), found.at(q, v, a)
+        if abs(exact[0] - linear[0]) > _SAME * max(abs(exact[0]), abs(linear[0])):
+            return None
+    return found
+
+
+def _stacked(parts: Sequence[Affine], n: int) -> Affine:
+    if not parts:
+        none = np.zeros((0, n))
+        return Affine(np.zeros(0), none, none, none, none, np.zeros(0, int))
+    return Affine(*map(np.concatenate, zip(*parts, strict=True)))

@@ -1,0 +1,104 @@
+"""What readings are compared with: numbers, functions of time, or the planned motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.control.controllers import Plant
+from paraflex.dynamics.sensors import SensorReader
+from paraflex.errors import InputError
+from paraflex.kinematics import RigidMotion
+from paraflex.mechanism import Encoder, Mechanism, PointSensor, Sensor, Tachometer
+from paraflex.mechanism.measured import measured_sensors
+from paraflex.mechanism.quantities import known
+
+Reference = Callable[[float], float]
+# The word for the planned motion.
+PLAN = "plan"
+
+
+def references(given: Mapping[str, Any] | str | None, plant: Plant) -> list[Reference | None]:
+    """A reference for each of a plant's inputs; None for those that have none.
+
+    Raises
+    ------
+    InputError
+        An unknown sensor, a plan where there is none, neither a number nor a function.
+    """
+    if given is None:
+        return [None] * len(plant.inputs)
+    if isinstance(given, str):
+        if given != PLAN:
+            raise InputError("is no reference", field="reference", value=given,
+                             remedy=f'say "{PLAN}", or give numbers or functions of time by sensor')  # fmt: skip
+        return list(planned_readings(plant))
+    for name in given:
+        known(name, plant.inputs, "reference", "sensor")
+    return [_reference(given[name], f"reference.{name}") if name in given else None for name in plant.inputs]
+
+
+def _reference(given: Any, field: str) -> Reference:
+    if callable(given):
+        function: Callable[[float], Any] = given
+        return lambda t: float(function(t))
+    if isinstance(given, int | float | np.floating) and np.isfinite(given):
+        value = float(given)
+        return lambda t: value
+    raise InputError("is no reference", field=field, value=given, remedy="give a number or a function of time")
+
+
+class AtSamples:
+    """Values (k, ...) at the samples of a controller from its start on, found by their time; the last goes on."""
+
+    def __init__(self, plant: Plant, values: Array) -> None:
+        self._start, self._period, self._values = plant.state.time, plant.period, values
+
+    def __call__(self, t: float) -> Any:
+        """The value at a time [s]."""
+        sample = round((t - self._start) / self._period)
+        return self._values[min(max(sample, 0), len(self._values) - 1)]
+
+
+def planned_motion(plant: Plant, ahead: float = 0.0) -> RigidMotion:
+    """The rigid motion of a plan at the samples of a controller, so much later [s].
+
+    Raises
+    ------
+    InputError
+        There is no plan.
+    """
+    task = plant.task
+    if task is None:
+        raise InputError("there is no planned motion", field="reference", value=PLAN,
+                         remedy="give numbers or functions of time by sensor, or a path to plan along")  # fmt: skip
+    end = float(task.motion.t[-1])
+    count = int(np.floor((end - plant.state.time) / plant.period * (1.0 + 1e-12))) + 1
+    times = plant.state.time + plant.period * np.arange(max(count, 2))
+    return task.plan.follow(np.minimum(times + ahead, end))
+
+
+def planned_readings(plant: Plant) -> list[AtSamples | None]:
+    """Readings on the planned motion at a controller's samples; None of sensors that it says nothing of."""
+    motion = planned_motion(plant)
+    columns = {
+        name: AtSamples(plant, values) for name, values in readings_of(motion, plant.mechanism, plant.inputs).items()
+    }
+    return [columns.get(name) for name in plant.inputs]
+
+
+def readings_of(motion: RigidMotion, mechanism: Mechanism, names: Sequence[str]) -> dict[str, Array]:
+    """Readings (k,) on a rigid motion of those sensors of a mechanism that it says something of, by name."""
+    sensors = {sensor.name: sensor for sensor in measured_sensors(mechanism)}
+    told: list[Sensor] = [sensors[name] for name in names if _is_told(sensors[name])]
+    system = motion.system
+    nothing = np.zeros((motion.t.size, system.m)), np.zeros((motion.t.size, len(system.mechanism.motors)))
+    values = SensorReader(system, told)(motion.q, motion.v, motion.a, *nothing)
+    return {sensor.name: values[:, k] for k, sensor in enumerate(told)}
+
+
+def _is_told(sensor: Sensor) -> bool:
+    return isinstance(sensor, Encoder | Tachometer | PointSensor)

@@ -1,0 +1,267 @@
+"""Exact sampling of linear models whose inputs are held from sample to sample and act after a delay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from paraflex.arrays import Array
+from paraflex.errors import InputError
+from paraflex.linear.model import LinearModel
+from paraflex.linear.zeros import StateSpace
+from paraflex.mechanism.quantities import known, not_negative, positive
+
+# A delay this near to whole samples, as a part of one, is whole samples.
+_WHOLE = 1e-9
+
+
+class NamedMatrices(NamedTuple):
+    """A model's matrices with the names of its states, inputs and outputs."""
+
+    matrices: StateSpace
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SampledPlant:
+    """x_k+1 = A x_k + B u_k, readings y_k = C x_k: a linear model between a digital controller's samples.
+
+    Torques u_k, computed at sample k, act from k `period` + `delay` on until the next ones do. Readings are taken
+    before torques change: the feed-through of the model is with those before, so that no loop is algebraic.
+
+    Attributes
+    ----------
+    A : (n, n) array
+    B : (n, inputs) array
+    C : (outputs, n) array
+    G : (n, inputs) array
+        What efforts at the inputs lead to that act over the whole period, without delay: disturbances.
+    states : tuple of str
+        Those of the model, then torques under way, the oldest first: "tau1(k-2)".
+    inputs, outputs : tuple of str
+    period, delay : float
+        [s]
+    own : int
+        So many of the states are the model's.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    G: Array
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    period: float
+    delay: float
+    own: int
+
+    def __repr__(self) -> str:
+        late = f", {1e3 * self.delay:g} ms late" if self.delay else ""
+        return f"SampledPlant({len(self.states)} states, every {1e3 * self.period:g} ms{late})"
+
+    @property
+    def D(self) -> Array:
+        """Feed-through (outputs, inputs): none."""
+        return np.zeros((len(self.outputs), len(self.inputs)))
+
+    @property
+    def dt(self) -> float:
+        """The period [s], as python-control and SciPy call it."""
+        return self.period
+
+    @cached_property
+    def poles(self) -> NDArray[np.complex128]:
+        """Eigenvalues z (n,) of A; torques under way have zeros."""
+        own = np.linalg.eigvals(self.A[: self.own, : self.own])
+        return np.concatenate([own, np.zeros(len(self.states) - self.own)]).astype(complex)
+
+    def rows(self, names: Sequence[str], field: str = "outputs") -> Array:
+        """Rows of C (names, n) of some outputs.
+
+        Raises
+        ------
+        InputError
+            A name that is no output.
+        """
+        return self.C[places(names, self.outputs, field, "output")]
+
+    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> SampledPlant:
+        """The plant with some outputs, and with torques of some inputs; the others are zero.
+
+        Raises
+        ------
+        InputError
+            A name that is none of them.
+        """
+        columns = places(self.inputs if inputs is None else inputs, self.inputs, "inputs", "input")
+        rows = places(self.outputs if outputs is None else outputs, self.outputs, "outputs", "output")
+        width = len(self.inputs)
+        late = range((len(self.states) - self.own) // width) if width else range(0)
+        kept = [*range(self.own), *(self.own + width * k + j for k in late for j in columns)]
+        return SampledPlant(
+            self.A[np.ix_(kept, kept)], self.B[np.ix_(kept, columns)], self.C[np.ix_(rows, kept)],
+            self.G[np.ix_(kept, columns)], tuple(self.states[k] for k in kept),
+            tuple(self.inputs[j] for j in columns), tuple(self.outputs[j] for j in rows),
+            self.period, self.delay, self.own,
+        )  # fmt: skip
+
+
+def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
+    """A linear model as a digital controller sees it: sampled, with torques that are held and act after a delay.
+
+    Exact, by exponentials of [A, B; 0, 0]: of a delay of d periods and a part f, x_k+1 = Phi x_k + Phi(T - f) Gamma(f)
+    u_k-d-1 + Gamma(T - f) u_k-d (Åström and Wittenmark, Computer-Controlled Systems, section 2.3).
+
+    Parameters
+    ----------
+    model : LinearModel, ReducedModel, state space or (A, B, C, D)
+        Of paraflex, python-control or SciPy; continuous. Names of states, inputs and outputs are kept.
+    period : float
+        Of sampling [s].
+    delay : float
+        From a sample until its torques act [s]: any number of periods, fractions too.
+
+    Raises
+    ------
+    InputError
+        A period that is not positive, a negative delay, a model that is sampled already, matrices that do not fit.
+    """
+    named = named_matrices(model)
+    positive(period, "period", "s")
+    not_negative(delay, "delay", "s")
+    whole, part = _whole_and_part(delay / period)
+    scaled, back = _scaled(model, named.matrices)
+    late, early = _held(scaled, period * part), _held(scaled, period * (1.0 - part))
+    over = _held(scaled, period)
+    old, new = (back @ each for each in (early[0] @ late[1], early[1]))
+    n, m, p = len(named.states), len(named.inputs), len(named.outputs)
+    feeds = bool(np.any(named.matrices.D))
+    # Inputs under way: of the samples k - d, ..., k - 1, and that of k - d - 1 where it acts in this period or is read.
+    oldest = whole + (1 if part or feeds else 0)
+    size = n + m * oldest
+    A, B, C, G = np.zeros((size, size)), np.zeros((size, m)), np.zeros((p, size)), np.zeros((size, m))
+    A[:n, :n] = back @ over[0] @ np.linalg.inv(back) if n else over[0]
+    C[:, :n], G[:n] = named.matrices.C, back @ over[1]
+    A[n : size - m, n + m :] = np.eye(max(size - n - m, 0))
+    if oldest:
+        B[size - m :] = np.eye(m)
+    if oldest > whole:
+        A[:n, n : n + m], C[:, n : n + m] = old, named.matrices.D
+    if whole:
+        last = n + m * (oldest - whole)
+        A[:n, last : last + m] = new
+    else:
+        B[:n] = new
+    under_way = tuple(f"{name}(k-{k})" for k in range(oldest, 0, -1) for name in named.inputs)
+    return SampledPlant(A, B, C, G, (*named.states, *under_way), named.inputs, named.outputs, float(period),
+                        float(delay), n)  # fmt: skip
+
+
+def as_sampled(model: Any, period: float, delay: float) -> SampledPlant:
+    """A plant as it is, or a linear model sampled so.
+
+    Raises
+    ------
+    InputError
+        A plant of another period; see `discretise`.
+    """
+    if not isinstance(model, SampledPlant):
+        return discretise(model, period, delay)
+    if abs(model.period - period) > 1e-9 * period:
+        raise InputError(f"is sampled every {model.period:g} s", field="model", value=model,
+                         remedy=f"give the continuous model, or one sampled every {period:g} s")  # fmt: skip
+    return model
+
+
+def named_matrices(model: Any) -> NamedMatrices:
+    """Matrices and names of a continuous model.
+
+    Raises
+    ------
+    InputError
+        What is no model, or a sampled one; matrices that do not fit or are not finite.
+    """
+    given = model if isinstance(model, tuple | list) else [getattr(model, name, None) for name in ("A", "B", "C", "D")]
+    if len(given) != 4 or any(each is None for each in given):
+        raise InputError("is no linear model", field="model", value=model,
+                         remedy="give one that pf.linearise makes, a state space, or (A, B, C, D)")  # fmt: skip
+    dt = getattr(model, "dt", None)
+    if dt is not None and (dt is True or dt > 0.0):
+        raise InputError("is sampled already", field="model", value=model, remedy="give the continuous model")
+    try:
+        A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in given)
+    except (TypeError, ValueError):
+        raise InputError("has matrices that are none", field="model", value=model, remedy="give numbers") from None
+    n, m, p = (0 if A.size == 0 else len(A)), D.shape[1], D.shape[0]
+    if not n:
+        A, B, C = np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0))
+    fits = A.shape == (n, n) and B.shape == (n, m) and C.shape == (p, n)
+    if not fits or not all(np.all(np.isfinite(each)) for each in (A, B, C, D)):
+        shapes = ", ".join(f"{each.shape[0]} x {each.shape[1]}" for each in (A, B, C, D))
+        raise InputError("has matrices that do not fit together, or are not finite", field="model", value=shapes,
+                         remedy="give A (n, n), B (n, m), C (p, n), D (p, m)")  # fmt: skip
+    names = (names_of(model, what, letter, count) for what, letter, count in
+             (("state", "x", n), ("input", "u", m), ("output", "y", p)))  # fmt: skip
+    return NamedMatrices(StateSpace(A, B, C, D), *names)
+
+
+def names_of(model: Any, what: str, letter: str, count: int) -> tuple[str, ...]:
+    """Names of a model's states, inputs or outputs: x1, x2 of one that has none."""
+    have = getattr(model, f"{what}_labels", None) or getattr(model, f"{what}s", None)
+    if isinstance(have, Sequence) and not isinstance(have, str) and len(have) == count:
+        return tuple(str(getattr(one, "name", one)) for one in have)
+    return tuple(f"{letter}{k + 1}" for k in range(count))
+
+
+def places(names: Sequence[str], among: Sequence[str], field: str, what: str) -> list[int]:
+    """Numbers of names among others.
+
+    Raises
+    ------
+    InputError
+        One that is not among them, or that is given twice.
+    """
+    for k, name in enumerate(names):
+        known(name, among, field, what)
+        if name in names[:k]:
+            raise InputError("is named twice", field=field, value=name, remedy="name it once")
+    return [list(among).index(name) for name in names]
+
+
+def _whole_and_part(periods: float) -> tuple[int, float]:
+    nearest = round(periods)
+    if abs(periods - nearest) <= _WHOLE * max(1.0, nearest):
+        return nearest, 0.0
+    return math.floor(periods), periods - math.floor(periods)
+
+
+def _scaled(model: Any, matrices: StateSpace) -> tuple[StateSpace, Array]:
+    """The model in states of one size, and how its own follow from them (n, n).
+
+    Axial vibrations of links at tens of kHz, in metres beside rates, would cost exponentials their accuracy.
+    """
+    if isinstance(model, LinearModel):
+        return model.scaled, model.modal_states[1]
+    if not len(matrices.A):
+        return matrices, np.zeros((0, 0))
+    A, (sizes, _) = scipy.linalg.matrix_balance(matrices.A, permute=False, separate=True)
+    return StateSpace(A, matrices.B / sizes[:, None], matrices.C * sizes, matrices.D), np.diag(sizes)
+
+
+def _held(matrices: StateSpace, time: float) -> tuple[Array, Array]:
+    """Phi (n, n) and Gamma (n, m) over a time with inputs held."""
+    n, m = matrices.B.shape
+    both = np.zeros((n + m, n + m))
+    both[:n, :n], both[:n, n:] = matrices.A, matrices.B
+    whole = scipy.linalg.expm(both * time)
+    return whole[:n, :n], whole[:n, n:]

@@ -1,0 +1,444 @@
+"""A simulation one can step: torques that stay from one instant to the next, sensors read between, states kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.arguments import checked_arguments, given_as
+from paraflex.arrays import Array
+from paraflex.control.controllers import Controller, Plant
+from paraflex.control.described import ControllerDescription
+from paraflex.control.loop import LawFailure, Loop
+from paraflex.control.readings import Readings
+from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
+from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
+from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
+from paraflex.findings import warn_of
+from paraflex.integrators import IntegrationOptions, Method, Solution, choose
+from paraflex.integrators.integrate import Integration, Kept
+from paraflex.kinematics import ModelWithPaths
+from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode
+from paraflex.mechanism.measured import measured_sensors
+from paraflex.mechanism.quantities import known
+from paraflex.motion import motion_start
+from paraflex.tracking import Ending, TrackingTask, path_stops
+from paraflex.validity import warn, with_blame
+
+Torques = Sequence[float] | Mapping[str, float] | Array
+# Instants closer than this part of the time between them are one.
+_SAME = 1e-9
+# Samples this much later than a change of torques, as a part of the run, are those just before it.
+_ROUNDING = 1e-12
+
+
+@given_as("a saved simulation", "what Simulation.save returned")
+@dataclass(frozen=True)
+class Saved:
+    """All that a simulation goes on from: see `Simulation.save`.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    """
+
+    time: float
+    kept: Kept
+    held: Array
+    log: TorqueLog
+    loop: Loop | None
+    controllers: Any
+
+
+class Simulation:
+    """A mechanism under torques that are given from one instant to the next, as a digital controller gives them.
+
+    The same kernels, methods and error control as a run. Steps end at every instant; where torques change nothing
+    reaches across: accelerations and multipliers are made consistent with the new ones, while the size of steps and the
+    factor of the iteration matrix are kept.
+
+    Parameters
+    ----------
+    source : TrackingTask, Mechanism or Model
+        A plan, from its start; or a mechanism without a path, from a start.
+    mode : str or ActuationMode, optional
+        Motors that torques are given for; the others turn freely. All by default.
+    feed_forward : bool
+        Of a plan, whether its torques act by themselves, smooth in time, beside those that are given.
+    duration : float, optional
+        Of a mechanism: up to when it runs [s]; that of a model's study by default. The tolerance is of the whole.
+    samples : int
+        Of a mechanism: times at which results are kept; of a plan they are those of the task.
+    start : State, Start or str, optional
+        Of a mechanism, as for `simulate_motion`.
+    balanced : bool
+        Whether it starts in equilibrium, or in the deflections of the plan's motion.
+    method : Method or str, optional
+        One of paraflex's own.
+    options : IntegrationOptions, optional
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    system : System
+    mode : ActuationMode
+    motors : tuple of str
+        Those that torques are given for, in the order of the mechanism.
+    sensors_read : tuple of str
+        Encoders of motors by the names of their joints, coordinates of the end-effector, the mechanism's own sensors.
+    task : TrackingTask or None
+    end : float
+        [s]
+
+    Raises
+    ------
+    InputError
+        A mode, motor or sensor that the mechanism does not have, a method by another program, no duration.
+    ActuationError
+        The mode cannot drive the mechanism along the plan's path.
+    """
+
+    @checked_arguments()
+    def __init__(
+        self,
+        source: TrackingTask | Mechanism | ModelWithPaths,
+        *,
+        mode: str | ActuationMode | None = None,
+        feed_forward: bool = False,
+        duration: float | None = None,
+        samples: int = 701,
+        start: State | Start | str | None = None,
+        balanced: bool = False,
+        method: Method | str | None = None,
+        options: IntegrationOptions | None = None,
+    ) -> None:
+        self._options = choose(method, options)
+        self.task: TrackingTask | None = source if isinstance(source, TrackingTask) else None
+        self.mechanism: Mechanism = source.mechanism if isinstance(source, TrackingTask) else Mechanism.made_of(source)
+        self.mode: ActuationMode = _mode(self.mechanism, mode)
+        own = [motor.name for motor in self.mechanism.motors]
+        self.motors: tuple[str, ...] = tuple(name for name in own if name in self.mode.motors)
+        self._active = [own.index(name) for name in self.motors]
+        self._torques = FeedForward(self.mode, (), np.zeros(0), np.zeros(0))
+        if isinstance(source, TrackingTask):
+            _refuse(source, duration=duration, start=start)
+            # Brakes are not for motors under control.
+            task = replace(source, after=Ending.FREE)
+            self.task = task.balanced(self.mode) if balanced else task
+            self.system: System = task.system
+            self._initial: State = self.task.start
+            self._times: Array = task.motion.t
+            self._condition = actuation_condition(task.effort, self.mode)
+            if feed_forward:
+                self._torques = task.torques(self.mode)
+        else:
+            if feed_forward:
+                raise InputError("there is no plan whose torques could act", field="feed_forward", value=True,
+                                 remedy="give the task that pf.plan makes, or leave it out")  # fmt: skip
+            begun = motion_start(source, duration, samples, start, balanced=balanced)
+            self.system, self._initial, self._times = begun
+        self.end: float = float(self._times[-1])
+        self._pack()
+        self._readings = Readings(self.system, measured_sensors(self.system.mechanism))
+        self._watched = self._readings
+        self.sensors_read: tuple[str, ...] = self._readings.names
+        self._integration = Integration(
+            self.system, self._signals, self._initial, self._times, knots=self._knots, options=self._options,
+            samples=self._times.size,
+        )  # fmt: skip
+        self._loop: Loop | None = None
+        self._held = np.zeros(len(own))
+        self._log = TorqueLog(len(own))
+        self._integration.start()
+        self._fresh = self.save()
+
+    def _pack(self) -> None:
+        """Signals of motors, of which the first coefficients are those of given torques as well."""
+        motors: Sequence[InputSignals] = self._torques.signals or constant_signals(
+            [0.0] * len(self.mechanism.motors), self.end
+        )
+        if not self._torques.signals:
+            self._torques = replace(self._torques, signals=tuple(motors))
+        self._signals, knots = pack_signals(self.system.mechanism, motors, self.end)
+        smooth = path_stops(self._torques.knots, self.mechanism)
+        self._knots = np.sort(np.concatenate([smooth, knots]))
+        self._base = self._signals.coefficients[:, 0].copy()
+
+    # --- Step by step ---
+
+    @property
+    def time(self) -> float:
+        """The time reached [s]."""
+        return self._integration.time
+
+    @property
+    def state(self) -> State:
+        """Coordinates and velocities at the time reached."""
+        now = self._integration.run.now()
+        return State(now.t, now.q, now.v)
+
+    def sensors(self) -> dict[str, float]:
+        """Readings of all sensors at the time reached, by name and in their units, before torques change there."""
+        return dict(zip(self.sensors_read, self._read(self._readings).tolist(), strict=True))
+
+    def reset(self) -> dict[str, float]:
+        """Go back to the start, without torques and controllers; the readings there."""
+        self.restore(self._fresh)
+        return self.sensors()
+
+    def step(self, torques: Torques, until: float) -> dict[str, float]:
+        """Let torques act from now until a time; the readings then.
+
+        Parameters
+        ----------
+        torques : (motors,) array or mapping of str to float
+            Of the motors of the mode, in the order of `motors`, or of some by name; zero for others [N m, N].
+        until : float
+            [s]
+
+        Raises
+        ------
+        InputError
+            Other numbers of torques, none that are finite, unknown motors, a time that is past or beyond the end.
+        IntegrationError
+            It cannot go on; it carries the run so far. An event of the options that ends it does as well.
+        """
+        given = self._given(torques)
+        if not self.time < until <= self.end * (1.0 + _SAME):
+            raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
+                             value=until, remedy="give a later time in it, or reset the simulation")  # fmt: skip
+        self._use(None)
+        self._apply(given)
+        self._march(min(until, self.end))
+        if self._integration.status == "stopped":
+            cause = f"the run has ended: {self._integration.message}"
+            raise IntegrationError(cause, None, self.result(), "call result() for what there is, or reset()")
+        return self.sensors()
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has come to its end, or to an event that ends it."""
+        return self._integration.status == "stopped" or self.time >= self.end
+
+    def save(self) -> Saved:
+        """All that it goes on from, controllers included: continued from there it gives the same bits."""
+        loop = self._loop
+        controllers = None if loop is None else loop.saved()
+        return Saved(self.time, self._integration.saved(), self._held.copy(), self._log.copy(), loop, controllers)
+
+    def restore(self, saved: Saved) -> None:
+        """Go back to what `save` gave, of this simulation."""
+        self._integration.restore(saved.kept)
+        self._held, self._log = saved.held.copy(), saved.log.copy()
+        self._hold()
+        self._use(saved.loop)
+        if saved.loop is not None:
+            saved.loop.restore(saved.controllers)
+
+    # --- Under controllers ---
+
+    @checked_arguments()
+    def run(
+        self,
+        controllers: Any = None,
+        *,
+        until: float | None = None,
+        on_progress: Callable[[float], None] | None = None,
+        warning: bool = True,
+    ) -> ControlledTracking | ControlledMotion:
+        """Run under controllers from the start; without any go on under those there are.
+
+        Parameters
+        ----------
+        controllers : Controller, ControllerDescription, law or sequence of them, optional
+            See `Controller` and `SampledController`; torques of several for one motor add up. An empty list starts
+            anew without any.
+        until : float, optional
+            Up to when [s]; to the end by default.
+        on_progress : callable, optional
+            Told the time reached [s]. A KeyboardInterrupt ends the run with what is there, marked "interrupted".
+        warning : bool
+            Whether a run that is doubtful issues warnings, as of `simulate`.
+
+        Returns
+        -------
+        ControlledTracking or ControlledMotion
+
+        Raises
+        ------
+        InputError
+            Controllers with unknown sensors or motors, or with periods that are no multiples of the shortest.
+        ControllerError
+            One raised an error, or returned what cannot be torques; it carries the run so far.
+        IntegrationError
+            It cannot go on; it carries the run so far.
+        """
+        if controllers is not None:
+            self.reset()
+            given = controllers if isinstance(controllers, list | tuple) else [controllers]
+            several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
+                       for each in given]  # fmt: skip
+            start = self._initial.time
+            self._use(Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None)
+        end = self.end if until is None else min(until, self.end)
+        try:
+            while self.time < end and not self.ended:
+                self._go_on(end)
+                if on_progress is not None:
+                    on_progress(self.time)
+        except KeyboardInterrupt:
+            self._integration.interrupt()
+        except LawFailure as failure:
+            moment = self._moment()
+            cause = f"{failure}"
+            partial = self._made(replace(self._solution(), status="failed", message=f"{cause} at {moment}"))
+            raise ControllerError(cause, moment, partial, "mend the controller") from failure.__cause__
+        made = self.result()
+        if warning:
+            warn(made.validity, "" if self.task is None else f"mode {self.mode.name}")
+            warn_of(made.doubts, ResultWarning)
+        return made
+
+    def _go_on(self, end: float) -> None:
+        """To the next instant of the controllers, or to the end."""
+        loop = self._loop
+        if loop is None:
+            self._march(end)
+            return
+        slack = _SAME * loop.period
+        if loop.next <= self.time + slack:
+            changed = loop.act(lambda: self._read(self._watched))
+            if changed is not None:
+                everything = np.zeros(len(self._held))
+                everything[self._active] = changed
+                self._apply(everything)
+        until = min(end, loop.next)
+        if until > self.time + slack:
+            self._march(until, slack)
+
+    def result(self) -> ControlledTracking | ControlledMotion:
+        """The run so far.
+
+        Raises
+        ------
+        IntegrationError
+            It cannot go on; it carries the run so far.
+        """
+        try:
+            solution = self._solution()
+        except IntegrationError as error:
+            with_blame(error, self.mechanism)
+            error.partial = self._made(error.partial)
+            raise
+        if solution.status == "complete" and self.time < self.end:
+            message = f"as far as t = {self.time:.6g} s"
+            solution = replace(solution, status="interrupted", message=message)
+        return self._made(solution)
+
+    # --- Within ---
+
+    def _solution(self) -> Solution:
+        return self._integration.solution()
+
+    def _made(self, solution: Solution) -> ControlledTracking | ControlledMotion:
+        """The run with a solution."""
+        k = solution.t.size - bool(solution.event)
+        given = self._log.at(solution.t, _ROUNDING * (self.end - self._initial.time))
+        motors = {motor.name: unit for motor, unit in zip(self.mechanism.motors, self.mechanism.motor_units(),
+                                                           strict=True)}  # fmt: skip
+        records = () if self._loop is None else self._loop.records(motors.__getitem__)
+        if self.task is None:
+            times = solution.t if solution.event else self._times
+            return ControlledMotion(self.system, times, dict.fromkeys(motors, 0.0), solution, given, records)
+        acting = given[:k] + self._torques.evaluate(solution.t[:k])
+        title = self._options.method.title
+        return ControlledTracking(self.task, self._torques, self._condition, solution, title,
+                                  acting=acting, controllers=records)  # fmt: skip
+
+    def _moment(self) -> Moment:
+        return Moment(self.time, self._integration.run.attempts)
+
+    def _use(self, loop: Loop | None) -> None:
+        """Let these controllers act."""
+        if loop is not self._loop and loop is not None:
+            self._watched = self._readings.only(loop.read)
+        self._loop = loop
+
+    def _plant(self, controller: Controller) -> Plant:
+        outputs = tuple(controller.outputs) or self.motors
+        encoders = (motor.joint for motor in self.mechanism.motors if motor.name in outputs)
+        inputs = tuple(controller.inputs) or tuple(dict.fromkeys(encoders))
+        units = dict(zip(self.sensors_read, self._readings.units, strict=True))
+        return Plant(
+            self.mechanism, self.mode, self.task, self.state, inputs, tuple(units[name] for name in inputs), outputs,
+            controller.period, controller.delay,
+        )  # fmt: skip
+
+    def _given(self, torques: Torques) -> Array:
+        """Torques of all motors from those of some."""
+        everything = np.zeros(len(self._held))
+        if isinstance(torques, Mapping):
+            for name in torques:
+                known(name, self.motors, "torques", "motor")
+            torques = [torques.get(name, 0.0) for name in self.motors]
+        given = np.asarray(torques, dtype=float)
+        if given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
+            raise InputError(f"not {len(self.motors)} finite numbers", field="torques", value=torques,
+                             remedy=f"give one each of {', '.join(self.motors)}")  # fmt: skip
+        everything[self._active] = given
+        return everything
+
+    def _read(self, readings: Readings) -> Array:
+        """Readings now."""
+        now = self._integration.run.now()
+        given = self._torques.evaluate(np.array([now.t]))[0] if readings.of_torques else np.zeros(len(self._held))
+        return readings(now, self._held + given)
+
+    def _apply(self, torques: Array) -> None:
+        """Let torques (motors,) of all motors act from now on."""
+        if np.array_equal(torques, self._held) and self._log.begun:
+            return
+        changed = not np.array_equal(torques, self._held)
+        self._held = torques
+        self._log.note(self.time, torques)
+        if changed:
+            self._hold()
+            if self._integration.run.attempts == 0:
+                self._integration.start()
+            else:
+                self._integration.resume()
+
+    def _hold(self) -> None:
+        """Write the torques held into the signals."""
+        coefficients, start = self._signals.coefficients, self._signals.start
+        for k, torque in enumerate(self._held):
+            pieces = slice(start[k], start[k + 1] - 1)
+            coefficients[pieces, 0] = self._base[pieces] + torque
+
+    def _march(self, until: float, slack: float | None = None) -> None:
+        """March to a time, or to a stop of the run that is the same but for rounding."""
+        stops = self._integration.run.problem.stops
+        near = stops[int(np.argmin(np.abs(stops - until)))]
+        if abs(near - until) <= (_SAME * (until - self.time) if slack is None else slack):
+            until = float(near)
+        self._integration.march(until)
+        if not (self._integration.goes_on or self.ended):
+            self.result()
+
+
+def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
+    if isinstance(mode, ActuationMode):
+        return mode
+    return parse_mode(mechanism, ",".join(motor.name for motor in mechanism.motors) if mode is None else mode)
+
+
+def _refuse(task: TrackingTask, **given: Any) -> None:
+    """Refuse what a plan says itself."""
+    for name, value in given.items():
+        if value is not None:
+            raise InputError("a plan says it itself", field=name, value=value, remedy="leave it out")

@@ -1,0 +1,40 @@
+"""Names and periods of controllers that act together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from paraflex.errors import InputError
+
+# Instants closer than this part of the shortest period are one.
+SAME = 1e-9
+
+
+def multiple_of(name: str, period: float, shortest: float) -> int:
+    """How many shortest periods [s] the period of a controller is [s].
+
+    Raises
+    ------
+    InputError
+        It is no multiple of them.
+    """
+    times = period / shortest
+    if abs(times - round(times)) > SAME * times:
+        raise InputError(
+            f"is no multiple of the shortest period, {shortest:g} s", field=f"{name}.period", value=period,
+            remedy=f"say {round(times) * shortest:g}",
+        )  # fmt: skip
+    return round(times)
+
+
+def check_name(name: Any) -> None:
+    """Check that a controller's name can stand in files of results, and in names of fields.
+
+    Raises
+    ------
+    InputError
+        It cannot.
+    """
+    if not isinstance(name, str) or not name or set(name) & set("./"):
+        raise InputError("is no name of a controller", field="name", value=name,
+                         remedy="give a text without dots and slashes")  # fmt: skip

@@ -1,0 +1,77 @@
+"""Controllers of a model file from their tables, and their tables from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from paraflex.control.described import LAWS, TABLE, ControllerDescription, check_controllers
+from paraflex.errors import InputError
+from paraflex.files.expressions import evaluate_parameters
+from paraflex.files.laws import components_table, read_components
+from paraflex.files.said import fields_said
+from paraflex.files.schema import ControllerTable, ModelTable, TorqueTable
+from paraflex.mechanism import Mechanism
+from paraflex.mechanism.loads import InTime
+
+
+def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, ControllerDescription]:
+    """The controllers of a model file by name.
+
+    Raises
+    ------
+    InputError
+        Unknown sensors or motors, numbers that make no sense.
+    """
+    parameters, found = evaluate_parameters(table.parameters), {}
+    for name, one in table.controller.items():
+        try:
+            found[name] = _read(name, one, parameters, table.study.duration)
+        except InputError as error:
+            raise error.within(f"{TABLE}.{name}") from None
+    check_controllers(found, mechanism)
+    return found
+
+
+def _read(
+    name: str, table: ControllerTable, parameters: Mapping[str, float], duration: float | None
+) -> ControllerDescription:
+    said = {key: value for key, value in table if value is not None}
+    kind = LAWS[said.pop("type")]
+    law = kind(**{each.name: said.pop(each.name) for each in fields(kind) if each.name in said})
+    if isinstance(table.reference, Mapping):
+        said["reference"] = {
+            sensor: _reference(sensor, given, parameters, duration) for sensor, given in table.reference.items()
+        }
+    return ControllerDescription(name, law, **said)
+
+
+def _reference(sensor: str, given: Any, parameters: Mapping[str, float], duration: float | None) -> InTime:
+    """A reading that is wanted, in the words that torques of motors have."""
+    try:
+        return read_components(TorqueTable.model_construct(torque=given), "torque", parameters, duration)[0]
+    except InputError as error:
+        raise error.at(f"reference.{sensor}") from None
+
+
+def controller_table(one: ControllerDescription) -> dict[str, Any]:
+    """The table of a controller; what is as it is by default is left out.
+
+    Raises
+    ------
+    InputError
+        A reference that a file has no words for.
+    """
+    said = {"type": one.law.kind} | fields_said(one.law) | fields_said(one, "name", "law")
+    if isinstance(one.reference, Mapping):
+        try:
+            said["reference"] = {
+                sensor: components_table((law,), "torque")["torque"] for sensor, law in one.reference.items()
+            }
+        except (InputError, KeyError):
+            raise InputError(
+                "a model file cannot say this", field=f"{TABLE}.{one.name}.reference", value=dict(one.reference),
+                remedy="give numbers or expressions of the time",
+            ) from None  # fmt: skip
+    return said

@@ -1,0 +1,98 @@
+"""Torques and readings of controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paraflex.errors import InputError
+from paraflex.plots.given import drawn
+from paraflex.plots.labels import display_unit, peak, symbol
+from paraflex.plots.layout import panels
+from paraflex.plots.runs import MOST_LINES, finish_over_time
+from paraflex.plots.selection import names_of, one_run
+from paraflex.plots.style import BLACK, COLOURS, look_of
+from paraflex.results.controllers import GIVEN, INPUT, OUTPUT, READINGS, SAMPLE, WANTED, ControllerData, controllers_of
+
+# Panels below one another.
+_MOST_ROWS = 4
+_WANTED = {"linestyle": (0, (1, 1)), "linewidth": 0.8}
+_LIMIT = {"color": "0.5", "linestyle": (0, (5, 1.5)), "linewidth": 0.7, "zorder": 1.0}
+_WORDS = {"rad": "angle", "m": "position", "rad/s": "rate", "m/s": "speed", "N m": "torque", "N": "force"}
+
+
+class _Panel(NamedTuple):
+    """What a panel shows: torques or readings of a controller, those with one unit."""
+
+    controller: ControllerData
+    dim: str
+    names: list[str]
+    unit: str
+
+
+@drawn
+def controllers(data: xr.Dataset, mode: str | None = None) -> Figure:
+    """Torques of every controller, wanted and given, and its readings; at most the seven largest of each unit."""
+    run = one_run(data, mode)
+    found = [each for one in controllers_of(run) for each in _panels(one)]
+    if not found:
+        raise InputError(
+            "no controllers in these results", field="figure", value="controllers",
+            remedy="run it with --controller, or with [study] controllers in the model",
+        )  # fmt: skip
+    columns = 1 if len(found) <= _MOST_ROWS else 2
+    figure, axes = panels(-(-len(found) // columns), columns)
+    for panel in axes.flat[len(found) :]:
+        panel.set_visible(False)
+    for panel, shown in zip(axes.flat, found, strict=False):
+        (_draw_torques if shown.dim == OUTPUT else _draw_readings)(panel, shown)
+        words = "readings" if shown.dim == INPUT else "torques" if shown.unit == "N m" else "forces"
+        panel.set_title(f"{shown.controller.name}: {words}", loc="left")
+    axes.flat[0].plot([], [], color=BLACK, label="acts")
+    axes.flat[0].plot([], [], color=BLACK, label="wanted by the law", **_WANTED)
+    return finish_over_time(figure, axes, data, panel_height=40.0)
+
+
+def _panels(one: ControllerData) -> Iterator[_Panel]:
+    """Torques, then readings, each by unit; what a mode does not have is left out."""
+    for dim, variable in ((OUTPUT, GIVEN), (INPUT, READINGS)):
+        names = [name for name in names_of(one.data, dim)
+                 if np.isfinite(one.data[variable].sel({dim: name}).values).any()]  # fmt: skip
+        for unit in dict.fromkeys(one.units[name] for name in names):
+            yield _Panel(one, dim, [name for name in names if one.units[name] == unit], unit)
+
+
+def _largest(shown: _Panel, variable: str) -> list[str]:
+    """Names of the largest, in their own order."""
+    values = {name: peak(shown.controller.data[variable].sel({shown.dim: name}).values) for name in shown.names}
+    most = sorted(shown.names, key=lambda name: -values[name])[:MOST_LINES]
+    return [name for name in shown.names if name in most]
+
+
+def _draw_torques(panel: Axes, shown: _Panel) -> None:
+    """Torques as they act, after the delay and until the next sample, and those of the law at their samples."""
+    one = shown.controller
+    times = one.data[SAMPLE].values
+    for k, name in enumerate(_largest(shown, GIVEN)):
+        given, wanted = (one.data[variable].sel({OUTPUT: name}).values for variable in (GIVEN, WANTED))
+        panel.step(times + one.delay, given, where="post", label=symbol(name), **look_of(k))
+        panel.step(times, wanted, where="post", color=COLOURS[k % len(COLOURS)], **_WANTED)
+        for bound in one.limits[name]:
+            if bound is not None and np.any(given == bound):
+                panel.axhline(bound, **_LIMIT)
+    panel.set_ylabel(f"{_WORDS[shown.unit]} [{shown.unit}]")
+
+
+def _draw_readings(panel: Axes, shown: _Panel) -> None:
+    one = shown.controller
+    names = _largest(shown, READINGS)
+    values = one.data[READINGS].sel({INPUT: names}).transpose(SAMPLE, INPUT).values
+    unit = display_unit(shown.unit, values)
+    for k, name in enumerate(names):
+        panel.step(one.data[SAMPLE].values, unit.factor * values[:, k], where="post", label=symbol(name), **look_of(k))
+    panel.set_ylabel(f"{_WORDS.get(shown.unit, 'reading')} [{unit.name}]")

@@ -1,0 +1,216 @@
+"""What controllers did, in datasets of runs: each with samples of its own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from paraflex.errors import InputError
+from paraflex.results.formulas import largest_norm
+from paraflex.results.numbers import finite_or_none, largest
+
+if TYPE_CHECKING:
+    from paraflex.control.loop import ControllerRecord
+
+# The attribute of a dataset that describes its controllers by name.
+CONTROLLERS = "controllers"
+# The part of torques that only strains links.
+INTERNAL = "internal_torque"
+# Dimensions of a controller NAME, as KIND_NAME; that of samples has their times.
+SAMPLE, INPUT, OUTPUT = "sample", "input", "output"
+# And its variables: dimension besides that of samples, meaning.
+READINGS, WANTED, GIVEN = "reading", "wanted_torque", "given_torque"
+_VARIABLES = {
+    READINGS: (INPUT, "reading of a sensor as the law is given it, quantised and filtered"),
+    WANTED: (OUTPUT, "torque of the law"),
+    GIVEN: (OUTPUT, "torque within the limits"),
+}
+_ACTS = "acts after the delay, from one sample to the next; on the joint's second body, as `torque`"
+
+
+@dataclass(frozen=True)
+class ControllerData:
+    """A controller in a dataset.
+
+    Attributes
+    ----------
+    name, law : str
+    period, delay : float
+        [s]
+    limits : mapping of str to pair
+        Lowest and highest torque of each motor [N m, N]; None without.
+    rates : mapping of str to float or None
+        Largest change of each motor's torque in a second [N m/s, N/s].
+    units : mapping of str to str
+        Of each sensor and motor.
+    data : xarray.Dataset
+        `time`, `reading`, `wanted_torque` and `given_torque` over `sample`; the first has no modes.
+    """
+
+    name: str
+    law: str
+    period: float
+    delay: float
+    limits: Mapping[str, Sequence[float | None]]
+    rates: Mapping[str, float | None]
+    units: Mapping[str, str]
+    data: xr.Dataset
+
+    @property
+    def limited(self) -> xr.DataArray:
+        """At which samples a limit was met."""
+        return (self.data[WANTED] != self.data[GIVEN]).where(self.data[GIVEN].notnull(), False).any(OUTPUT)
+
+    @property
+    def samples(self) -> xr.DataArray:
+        """How many samples there are, of each run."""
+        return self.data[GIVEN].notnull().any(OUTPUT).sum(SAMPLE)
+
+
+def dimension(kind: str, controller: str) -> str:
+    """The name of a controller's dimension or variable."""
+    return f"{kind}_{controller}"
+
+
+def with_controllers(data: xr.Dataset, runs: Sequence[Sequence[ControllerRecord]], motors: Sequence[str]) -> xr.Dataset:
+    """A dataset with what controllers did in its runs, in the order of its modes; the same where they did nothing.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Of runs along a path, or of one without, which has no modes.
+    runs : sequence of sequences of ControllerRecord
+        NaN stands for samples that a run did not reach, and for motors that are not active in its mode.
+    motors : sequence of str
+        Of the mechanism, in their order.
+
+    Raises
+    ------
+    InputError
+        Controllers of one name with other periods, delays or laws.
+    """
+    names = list(dict.fromkeys(one.name for records in runs for one in records))
+    described = {}
+    for name in names:
+        own = [next((one for one in records if one.name == name), None) for records in runs]
+        array, about = _controller(name, own, motors)
+        if "mode" not in data.dims:
+            array = array.isel(mode=0)
+        data, described[name] = data.assign(array), about
+    return data.assign_attrs({CONTROLLERS: json.dumps(described)}) if described else data
+
+
+def _controller(
+    name: str, runs: Sequence[ControllerRecord | None], motors: Sequence[str]
+) -> tuple[xr.Dataset, dict[str, Any]]:
+    """Variables of a controller over mode and its samples, and what it is."""
+    done = [one for one in runs if one is not None]
+    first = max(done, key=lambda one: one.t.size)
+    for one in done:
+        for field in ("law", "period", "delay"):
+            if getattr(one, field) != getattr(first, field):
+                raise InputError(
+                    "controllers of one name differ", field=f"{name}.{field}", value=getattr(one, field),
+                    remedy="give each a name of its own",
+                )  # fmt: skip
+    inputs = {sensor: unit for one in done for sensor, unit in zip(one.inputs, one.input_units, strict=True)}
+    outputs = {motor: unit for one in done for motor, unit in zip(one.outputs, one.output_units, strict=True)}
+    outputs = {motor: outputs[motor] for motor in motors if motor in outputs}
+    labels = {INPUT: inputs, OUTPUT: outputs}
+    out = xr.Dataset(coords={dimension(SAMPLE, name): first.t})
+    out[dimension(SAMPLE, name)].attrs = {"long_name": f"times of samples of controller {name}", "units": "s"}
+    for variable, (kind, meaning) in _VARIABLES.items():
+        values = np.full((len(runs), first.t.size, len(labels[kind])), np.nan)
+        for row, one in zip(values, runs, strict=True):
+            if one is not None:
+                columns = [list(labels[kind]).index(label) for label in (one.inputs if kind == INPUT else one.outputs)]
+                row[: one.t.size, columns] = {READINGS: one.readings, WANTED: one.wanted, GIVEN: one.given}[variable]
+        dims = ("mode", dimension(SAMPLE, name), dimension(kind, name))
+        units = list(labels[kind].values())
+        array = xr.DataArray(values, {dims[2]: list(labels[kind])}, dims)
+        array.attrs = _attributes(f"{meaning}, controller {name}", units, "" if kind == INPUT else _ACTS)
+        array.attrs |= {"period": first.period, "delay": first.delay}
+        out[dimension(variable, name)] = array
+    return out, _about(done, outputs) | {"inputs": inputs, "outputs": outputs}
+
+
+def _attributes(meaning: str, units: Sequence[str], comment: str) -> dict[str, str]:
+    several = dict.fromkeys(units)
+    each = {"units_each": ", ".join(units)} if len(several) > 1 else {}
+    return {"long_name": meaning, "units": ", ".join(several)} | each | ({"comment": comment} if comment else {})
+
+
+def _about(done: Sequence[ControllerRecord], outputs: Mapping[str, str]) -> dict[str, Any]:
+    """Law, period, delay and bounds of a controller; None where a torque has no bound."""
+    first = done[0]
+    limits, rates = {}, {}
+    for motor in outputs:
+        one = next(each for each in done if motor in each.outputs)
+        at = one.outputs.index(motor)
+        limits[motor] = [finite_or_none(float(bound)) for bound in one.limits[at]]
+        rates[motor] = finite_or_none(float(one.rates[at]))
+    return {"law": first.law, "period": first.period, "delay": first.delay, "limits": limits, "rates": rates}
+
+
+def controllers_of(data: xr.Dataset) -> list[ControllerData]:
+    """The controllers of a dataset, or of one of its runs; none where there were none."""
+    found = []
+    for name, about in json.loads(data.attrs.get(CONTROLLERS, "{}")).items():
+        own = {dimension(kind, name): kind for kind in (SAMPLE, INPUT, OUTPUT, *_VARIABLES)}
+        part = data[[dimension(variable, name) for variable in _VARIABLES]].rename(own)
+        units = about["inputs"] | about["outputs"]
+        numbers = (about["period"], about["delay"], about["limits"], about["rates"])
+        found.append(ControllerData(name, about["law"], *numbers, units, part))
+    return found
+
+
+def controller_names(data: xr.Dataset) -> list[str]:
+    """Names of the controllers of a dataset."""
+    return list(json.loads(data.attrs.get(CONTROLLERS, "{}")))
+
+
+def controller_variables(name: str) -> list[str]:
+    """The variables of a controller."""
+    return [dimension(variable, name) for variable in _VARIABLES]
+
+
+def controller_figures(run: xr.Dataset) -> dict[str, Any]:
+    """`controllers` of one run as plain numbers; empty where results have none.
+
+    Returns
+    -------
+    dict
+        `controllers.<name>` with law, period and delay [s], samples, saturated_share, and of each motor `torques` with
+        unit, wanted_max, given_max, lowest, highest and rate, None of what has no limit.
+    """
+    figures = {}
+    for one in controllers_of(run):
+        samples = int(one.samples)
+        figures[one.name] = {
+            "law": one.law,
+            "period": one.period,
+            "delay": one.delay,
+            "samples": samples,
+            "saturated_share": float(one.limited.sum()) / samples if samples else None,
+            "torques": {motor: _torque(one, motor) for motor in map(str, one.data[OUTPUT].values)},
+        }
+    internal = {"internal_torque_max": _largest_internal(run[INTERNAL])} if INTERNAL in run else {}
+    return internal | ({CONTROLLERS: figures} if figures else {})
+
+
+def _torque(one: ControllerData, motor: str) -> dict[str, Any]:
+    lowest, highest = one.limits[motor]
+    most = {f"{key}_max": largest(one.data[name].sel({OUTPUT: motor}).values)
+            for key, name in (("wanted", WANTED), ("given", GIVEN))}  # fmt: skip
+    return {"unit": one.units[motor], **most, "lowest": lowest, "highest": highest, "rate": one.rates[motor]}
+
+
+def _largest_internal(torques: xr.DataArray) -> float | None:
+    known = torques.transpose("time", "motor").values
+    known = known[np.isfinite(known).all(axis=1)]
+    return float(largest_norm(known)) if len(known) else None

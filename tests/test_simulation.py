@@ -1,0 +1,367 @@
+"""Simulations one can step, under sampled controllers: closed forms, open-loop runs, saved states, failures."""
+
+import numpy as np
+import pytest
+
+import paraflex as pf
+from paraflex import SampledController, Simulation
+from paraflex.errors import ControllerError, IntegrationError
+from rotors import J, T, rotor
+
+# Closed form of a rigid rotor under sampled PD: z^2 - (2 - (Kp T^2/2 + Kd T)/J) z + 1 + (Kp T^2/2 - Kd T)/J.
+AT_20_MS = {0.0: (0.61753479, -23.76106697), T: (0.61700998, -24.83802936)}
+
+
+def simulated_rotor(duration=0.02, **more):
+    return Simulation(rotor(), duration=duration, samples=21, **more)
+
+
+def pd(Kp=40.0, Kd=1.2, **more):
+    def law(k, t, y):
+        return [-Kp * y[0] - Kd * y[1]]
+
+    return SampledController(law, **{"period": T, "inputs": ["hub", "rate"]} | more)
+
+
+@pytest.fixture(scope="module")
+def task():
+    """A corner of RAParM-I's square, of rigid and flexible links."""
+    robot = pf.load("raparm_i")
+    return pf.plan(robot.mechanism, robot.paths["square"], duration=0.08, samples=81)
+
+
+# --- Closed forms -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["tr-bdf2", "esdirk4", "esdirk5", "generalised-alpha"])
+@pytest.mark.parametrize("delay", AT_20_MS)
+def test_a_rotor_under_sampled_pd(method, delay):
+    sim = simulated_rotor(method=method)
+    run = sim.run(pd(delay=delay))
+    assert run.solution.status == "complete"
+    reached = sim.sensors()
+    assert [reached["hub"], reached["rate"]] == pytest.approx(AT_20_MS[delay], abs=1e-8)
+
+
+@pytest.mark.parametrize(("delay", "samples"), [(0.4e-3, 0), (1.4e-3, 1)])
+def test_torques_act_after_a_part_of_a_period(delay, samples):
+    """State by hand: between instants the torque is constant, the motion a parabola."""
+    sim = simulated_rotor(method="esdirk4")
+    sim.run(pd(delay=delay))
+    theta, rate, due = 1.0, 0.0, [0.0] * (samples + 1)
+    part = delay - samples * T
+    for _ in range(20):
+        due.append(-40.0 * theta - 1.2 * rate)
+        for torque, h in ((due[-3 - samples + 1], part), (due[-2 - samples + 1], T - part)):
+            theta, rate = theta + rate * h + 0.5 * torque / J * h * h, rate + torque / J * h
+    reached = sim.sensors()
+    assert [reached["hub"], reached["rate"]] == pytest.approx([theta, rate], abs=1e-8)
+
+
+@pytest.mark.parametrize(("delay", "limit"), [(0.0, 2.0 * J / T), (T, J / T)])
+def test_limits_of_stability(delay, limit):
+    """Angle, rate and torque held after a period are linear in those before: of that map the spectral radius."""
+
+    def radius(Kd, Kp=1e-9):
+        columns = []
+        # A part of the angle cancels where the run of one period starts at another: the map is linear.
+        for angle, rate, held in np.eye(3):
+            sim = Simulation(rotor(angle, rate), duration=T, samples=2, method="esdirk4")
+            wanted = -Kp * angle - Kd * rate
+            after = sim.step([held if delay else wanted], T)
+            columns.append([after["hub"], after["rate"], wanted])
+        matrix = np.array(columns).T if delay else np.array(columns).T[:2, :2]
+        return np.max(np.abs(np.linalg.eigvals(matrix)))
+
+    low, high = 0.9 * limit, 1.1 * limit
+    # At Kp = 1e-9 the slow pole is at 1 - 1e-13; beyond the limit another one passes it.
+    while high - low > 1e-10:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if radius(middle) <= 1.0 else (low, middle)
+    assert low == pytest.approx(limit, abs=1e-9)
+
+
+# --- The same as a run ------------------------------------------------------------------------------------------------
+
+
+def test_without_torques_it_is_the_open_loop_run(task):
+    run = pf.simulate(task, "++++")
+    closed = Simulation(task, mode="++++", feed_forward=True).run()
+    assert np.array_equal(closed.solution.q, run.solution.q)
+    assert np.allclose(closed.applied, run.applied, atol=1e-14)
+    assert closed.driven.deviation == run.driven.deviation
+
+
+def test_in_steps_it_differs_by_the_tolerance_only(task):
+    options = pf.IntegrationOptions(method="esdirk4", tolerance=1e-7)
+    run = pf.simulate(task, "++++", options=options)
+    sim = Simulation(task, mode="++++", feed_forward=True, options=options)
+    for k in range(1, 81):
+        sim.step([0.0] * 4, k * 1e-3)
+    place = run.task.mechanism.end_effector.point
+    assert place
+    stepped = sim.result()
+    assert stepped.solution.status == "complete"
+    assert np.max(np.abs(stepped.driven.actual - run.driven.actual)) < 2e-7
+
+
+@pytest.mark.parametrize(("method", "tolerance"), [("tr-bdf2", 1e-6), ("esdirk5", 1e-8)])
+def test_a_law_does_not_see_the_method(task, method, tolerance):
+    """Runs under one controller agree within the tolerance, whatever integrates them."""
+
+    def driven(options):
+        law = SampledController(
+            lambda k, t, e: -60.0 * e, period=1e-3, delay=1e-3, reference="plan",
+            inputs=[motor.joint for motor in task.mechanism.motors],
+        )  # fmt: skip
+        return Simulation(task, feed_forward=True, options=options).run(law).driven.actual
+
+    exact = driven(pf.IntegrationOptions(method="esdirk4", tolerance=1e-9))
+    found = driven(pf.IntegrationOptions(method=method, tolerance=tolerance))
+    assert 0.0 < np.max(np.abs(found - exact)) < 2.0 * tolerance
+
+
+def test_torques_in_results_are_those_before_they_change(task):
+    sim = Simulation(task)
+    for k in range(1, 81):
+        sim.step([float(k), 0.0, 0.0, -float(k)], k * 1e-3)
+    applied = sim.result().applied
+    assert np.array_equal(applied[:, 0], [1.0, *range(1, 81)])
+    assert np.array_equal(applied[:, 3], -applied[:, 0])
+
+
+# --- Saved and restored -----------------------------------------------------------------------------------------------
+
+
+class Integrating:
+    """A law with a state."""
+
+    period, delay, outputs = 2e-3, 1e-3, ()
+
+    def __init__(self, task):
+        self.inputs = tuple(motor.joint for motor in task.mechanism.motors)
+
+    def start(self, plant):
+        self.sum = np.zeros(len(self.inputs))
+        self.first = None
+
+    def step(self, k, t, y):
+        self.first = y if self.first is None else self.first
+        self.sum += y - self.first
+        return -10.0 * (y - self.first) - self.sum
+
+
+def test_restored_runs_have_the_same_bits(task):
+    sim = Simulation(task, mode="++++", feed_forward=True, method="esdirk5")
+    sim.run(Integrating(task), until=0.0235)
+    saved = sim.save()
+    whole = sim.run()
+    sim.step([0.3, 0.0, 0.0, 0.1], sim.end) if sim.time < sim.end else None
+    sim.restore(saved)
+    assert sim.time == saved.time == 0.0235
+    again = sim.run()
+    for name in ("t", "q", "v", "a", "multipliers", "work"):
+        assert np.array_equal(getattr(again.solution, name), getattr(whole.solution, name)), name
+    assert np.array_equal(again.controllers[0].given, whole.controllers[0].given)
+    assert np.array_equal(again.applied, whole.applied)
+    assert again.solution.steps == whole.solution.steps
+
+
+def test_reset_starts_anew(task):
+    sim = Simulation(task, mode="++++", feed_forward=True)
+    first = sim.run(Integrating(task))
+    second = sim.run(Integrating(task))
+    assert np.array_equal(first.solution.q, second.solution.q)
+    at_start = sim.reset()
+    assert sim.time == 0.0
+    assert at_start == sim.sensors()
+    assert sim.run().controllers == ()
+
+
+# --- Several controllers ----------------------------------------------------------------------------------------------
+
+
+def test_several_periods():
+    slow = pd(40.0, 0.0, period=4e-3, name="slow")
+    fast = pd(0.0, 1.2, name="fast")
+    run = simulated_rotor().run([slow, fast])
+    assert [one.name for one in run.controllers] == ["slow", "fast"]
+    assert [one.t.size for one in run.controllers] == [5, 20]
+    theta, rate, torque = 1.0, 0.0, 0.0
+    for k in range(20):
+        torque = -40.0 * theta if k % 4 == 0 else torque
+        total = torque - 1.2 * rate
+        theta, rate = theta + rate * T + 0.5 * total / J * T * T, rate + total / J * T
+    q = run.solution.q[-1]
+    assert q[2] == pytest.approx(theta, abs=1e-8)
+
+
+@pytest.mark.parametrize("period", [1.5e-3, 2.7e-3])
+def test_a_period_that_is_no_multiple(period):
+    with pytest.raises(pf.InputError, match=r"slow\.period: is no multiple of the shortest period, 0\.001 s"):
+        simulated_rotor().run([pd(name="fast"), pd(name="slow", period=period)])
+
+
+# --- The chain --------------------------------------------------------------------------------------------------------
+
+
+def test_readings_are_quantised_and_torques_limited():
+    run = simulated_rotor().run(pd(quantise={"hub": 0.01}, limits=30.0, rates=5e3))
+    (record,) = run.controllers
+    assert np.allclose(record.readings[:, 0] / 0.01, np.round(record.readings[:, 0] / 0.01), atol=1e-9)
+    assert record.given[0, 0] == -5.0  # a rate of 5000 N m/s from zero
+    assert np.max(np.abs(np.diff(record.given[:, 0]))) <= 5.0 + 1e-12
+    assert np.max(np.abs(record.given)) <= 30.0
+    assert record.limited[0]
+
+
+def test_a_filter_is_settled_and_lags():
+    """First order, cut-off f: in the end a ramp is followed with a lag of 1 / (2 pi f)."""
+    law = SampledController(lambda k, t, y: [0.0], period=T, inputs=["hub"], filters={"hub": 100.0})
+    sim = Simulation(rotor(1.0, 3.0), duration=0.05, samples=2)
+    (record,) = sim.run(law).controllers
+    assert record.readings[0, 0] == pytest.approx(1.0, abs=1e-12)
+    truth = 1.0 + 3.0 * record.t
+    tau = 1.0 / (200.0 * np.pi)
+    assert record.readings[:, 0] == pytest.approx(truth - 3.0 * tau * (1.0 - np.exp(-record.t / tau)), abs=1e-9)
+
+
+def test_a_model_of_python_control_is_a_law():
+    """PD with the rate from differences, as transfer function and by hand."""
+    control = pytest.importorskip("control")
+    derivative = control.ss([[0.0]], [[1.0]], [[-1.0 / T]], [[1.0 / T]], T)
+    model = -(40.0 * control.ss([], [], [], [[1.0]], T) + 1.2 * derivative)
+    run = simulated_rotor().run(SampledController(model, inputs=["hub"]))
+
+    class Difference:
+        def start(self, plant):
+            self.last = 0.0
+
+        def step(self, k, t, y):
+            rate, self.last = (y[0] - self.last) / T, y[0]
+            return [-40.0 * y[0] - 1.2 * rate]
+
+    by_hand = simulated_rotor().run(SampledController(Difference(), period=T, inputs=["hub"]))
+    assert np.allclose(run.solution.q, by_hand.solution.q, atol=1e-12)
+    # As it is: with its period, and the encoders of all motors.
+    assert np.array_equal(simulated_rotor().run(model).solution.q, run.solution.q)
+
+
+# --- Failures ---------------------------------------------------------------------------------------------------------
+
+
+def failing(value):
+    def law(k, t, y):
+        if t < 0.0095:
+            return [0.0]
+        if isinstance(value, Exception):
+            raise value
+        return value
+
+    return SampledController(law, period=T, inputs=["hub"], name="mine")
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ([float("nan")], 'controller "mine" returned torques that are not finite, for tau'),
+        ([1.0, 2.0], 'controller "mine" returned 2 in place of 1 torques'),
+        ("much", 'controller "mine" returned str, no torques'),
+        (ZeroDivisionError("division by zero"), 'controller "mine" raised ZeroDivisionError: division by zero'),
+    ],
+)
+def test_a_controller_that_fails_ends_the_run(value, said):
+    with pytest.raises(ControllerError) as caught:
+        simulated_rotor().run(failing(value))
+    assert caught.value.cause == said
+    assert "\n" not in str(caught.value)
+    partial = caught.value.partial
+    assert partial.solution.status == "failed"
+    assert said in partial.solution.message
+    assert partial.solution.t[-1] == pytest.approx(0.01)
+    assert partial.controllers[0].t.size == 10
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"inputs": ["hob"]}, r'inputs: unknown sensor.*did you mean "hub"'),
+        ({"outputs": ["tao"]}, r'outputs: unknown motor.*did you mean "tau"'),
+        ({"period": 0.0}, "period: must be positive"),
+        ({"period": None}, "period: is missing"),
+        ({"delay": -1e-3}, "delay: must be positive"),
+        ({"quantise": {"hab": 0.1}}, "quantise: unknown name"),
+        ({"limits": (3.0, 1.0)}, "limits: the lowest must be below"),
+        ({"filters": {"hub": ([1.0], [1.0, -3.0])}}, r"filters\.hub: is not stable"),
+        ({"reference": {"hub": "far"}}, r"reference\.hub: is no reference"),
+        ({"reference": "plan"}, "reference: there is no planned motion"),
+    ],
+)
+def test_bad_controllers(more, said):
+    with pytest.raises(pf.InputError, match=said):
+        simulated_rotor().run(pd(**more))
+
+
+def test_continuous_models_are_refused():
+    control = pytest.importorskip("control")
+    with pytest.raises(pf.InputError, match="is a continuous model"):
+        SampledController(control.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), period=T, inputs=["hub"])
+    with pytest.raises(pf.InputError, match=r"inputs: the model has 1"):
+        SampledController(control.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], T), inputs=["hub", "rate"])
+    with pytest.raises(pf.InputError, match=r"period: the model is sampled every 0\.001 s"):
+        SampledController(control.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], T), inputs=["hub"], period=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda task: Simulation(task, duration=1.0), "duration: a plan says it itself"),
+        (lambda task: Simulation(task, mode="+-"), "mode"),
+        (lambda task: Simulation(task, method="radau"), "method: goes on from time to time with own methods only"),
+        (lambda task: Simulation(rotor(), duration=1.0, feed_forward=True), "feed_forward: there is no plan"),
+        (lambda task: Simulation(rotor()), "duration: is missing"),
+        (lambda task: simulated_rotor().step([1.0, 2.0], 0.01), "torques: not 1 finite numbers"),
+        (lambda task: simulated_rotor().step([np.inf], 0.01), "torques: not 1 finite numbers"),
+        (lambda task: simulated_rotor().step({"tai": 1.0}, 0.01), "torques: unknown motor"),
+        (lambda task: simulated_rotor().step([1.0], 0.0), "until: is not within the rest of the run"),
+        (lambda task: simulated_rotor().step([1.0], 0.5), "until: is not within the rest of the run"),
+    ],
+)
+def test_bad_simulations(task, make, said):
+    with pytest.raises(pf.InputError, match=said):
+        make(task)
+
+
+def test_an_event_ends_it():
+    options = pf.IntegrationOptions(events=[pf.JointLimit("hub", low=0.8)])
+    sim = Simulation(rotor(), duration=0.02, samples=21, options=options)
+    run = sim.run(pd())
+    assert run.solution.status == "stopped"
+    assert run.solution.q[-1, 2] == pytest.approx(0.8, abs=1e-9)
+    assert run.applied.shape == (run.solution.t.size, 1)
+    sim.reset()
+    with pytest.raises(
+        IntegrationError, match=r"the run has ended: joint hub reached .* at t = 0\.00816497 s; call result"
+    ):
+        sim.step([-60.0], 0.02)
+
+
+def test_ctrl_c_keeps_what_is_there():
+    def stop(t):
+        if t > 0.0055:
+            raise KeyboardInterrupt
+
+    sim = simulated_rotor()
+    run = sim.run(pd(), on_progress=stop)
+    assert run.solution.status == "interrupted"
+    assert run.solution.t[-1] == pytest.approx(0.006)
+    assert sim.run().solution.status == "complete"
+    assert np.array_equal(sim.result().solution.q, simulated_rotor().run(pd()).solution.q)
+
+
+def test_a_run_in_the_middle_says_so():
+    sim = simulated_rotor()
+    run = sim.run(pd(), until=0.01)
+    assert run.solution.status == "interrupted"
+    assert run.solution.message == "as far as t = 0.01 s"
+    assert sim.run().solution.status == "complete"
