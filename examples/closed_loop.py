@@ -23,7 +23,7 @@ def manipulator(payload: float) -> pf.Mechanism:
     """RAParM-I in second-order geometry, links damped by 1 %, gauges on the driven ones, with a payload [kg]."""
     robot = pf.library.raparm_i().with_geometry("second-order")
     gauges = tuple(pf.StrainGauge(f"root{k}", f"link{k}", at=0.02) for k in (1, 3, 5, 7))
-    links = [replace(link, damping=pf.ModalDamping(0.01)) for link in robot.bodies]
+    links = [replace(link, damping=pf.ModalDamping((0.01,))) for link in robot.bodies]
     return replace(robot.with_bodies(links), sensors=gauges).with_payload(pf.Payload(payload))
 
 
@@ -95,8 +95,9 @@ def robustness(task, design, payloads=(0.0, 0.12, 0.2, 0.5)):
     models = {f"pose {k}": model for k, model in enumerate(pf.poses_along(task, 8, mode=MODE).models)}
     models |= {name: pf.linearise(one, mode=MODE, at=0.0) for name, one in loaded.items()}
     rows = pf.margins(pf.linearise(task, mode=MODE, at=0.0), design).to_frame()
-    radius = float(pf.closed_loops(models, design)["spectral_radius"].max())
-    return {"radius": radius, "gain": float(rows["gain_up"].min()), "delay": float(rows["delay"].min())}
+    radii = pf.closed_loops(models, design)["spectral_radius"]
+    columns = {"radius": -radii.to_numpy(), "gain": rows["gain_up"].to_numpy(), "delay": rows["delay"].to_numpy()}
+    return {name: abs(float(np.min(column))) for name, column in columns.items()}
 
 
 def feedback(design, read):
@@ -140,11 +141,9 @@ def main():
     print("                 error, vibration after the path [mm]")
     for law in laws:
         print(f"{law:16s}", *(f"{name}: {found[law, name][0]:.4f}, {found[law, name][1]:.4f};" for name in plants))
-    found["robust"] = robustness(task, design)
-    print(
-        "spectral radius up to {radius:.4f}, gain margin {gain:.2f}, delay margin {delay:.2f}".format(**found["robust"])
-    )
-    return found
+    robust = robustness(task, design)
+    print("spectral radius up to {radius:.4f}, gain margin {gain:.2f}, delay margin {delay:.2f}".format(**robust))
+    return found, robust
 
 
 if __name__ == "__main__":

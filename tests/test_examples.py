@@ -118,7 +118,7 @@ def test_second_order_spin_up(run):
 
 def test_closed_loop(run):
     """What feedback is there for: a payload that learning did not know of. Errors and vibrations in mm."""
-    example, found, printed = run("closed_loop")
+    example, (found, robust), printed = run("closed_loop")
     rigid, learned, fed_back = (
         {name: found[law, name] for name in ("as designed", "20 % more payload")}
         for law in ("rigid torques", "learned torques", "learned and LQG")
@@ -131,9 +131,9 @@ def test_closed_loop(run):
     for name, (_, vibration) in fed_back.items():
         assert vibration < 0.1 * rigid[name][1], name  # 20 dB
     assert f"{fed_back['20 % more payload'][0]:.4f}, {fed_back['20 % more payload'][1]:.4f}" in printed
-    assert found["robust"]["radius"] < 0.9932
-    assert found["robust"]["gain"] == pytest.approx(1.385, abs=2e-3)
-    assert found["robust"]["delay"] == pytest.approx(1.986, abs=2e-3)
+    assert robust["radius"] < 0.9932
+    assert robust["gain"] == pytest.approx(1.385, abs=2e-3)
+    assert robust["delay"] == pytest.approx(1.986, abs=2e-3)
     # Steps of 1 ms are fine enough for that: error control agrees.
     task = pf.plan(example.manipulator(0.12), pf.load("raparm_i").paths["square"], duration=0.7)
     planned = pf.plan(example.manipulator(0.1), task.path, duration=0.7)
