@@ -238,9 +238,13 @@ class DiscreteModel:
         inputs: Sequence[str],
         outputs: Sequence[str],
     ) -> None:
-        self.A, self.B, self.C, self.D = A, B, C, D
-        self.period = period
-        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
+        self.A: Array = A
+        self.B: Array = B
+        self.C: Array = C
+        self.D: Array = D
+        self.period: float | None = period
+        self.inputs: tuple[str, ...] = tuple(inputs)
+        self.outputs: tuple[str, ...] = tuple(outputs)
         self.x: Array = np.zeros(len(A))
 
     def check(self, inputs: Sequence[str], outputs: Sequence[str], period: float) -> None:

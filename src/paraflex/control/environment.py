@@ -27,7 +27,7 @@ from paraflex.mechanism.quantities import known, not_negative, positive
 from paraflex.tracking import TrackingTask
 
 if TYPE_CHECKING:
-    from gymnasium import Env
+    from gymnasium import Env, Space
 else:
     try:
         from gymnasium import Env
@@ -42,7 +42,7 @@ _CORRECTING = 0.1
 # With 0.25 ms deviations of RAParM-I are exact to a hundredth.
 _STEP = 2.5e-4
 # Environments of the library: what makes them, and its settings.
-REGISTERED = {
+REGISTERED: dict[str, tuple[str, dict[str, Any]]] = {
     "paraflex/RAParM-I-v0": (
         "paraflex.library:environment",
         {"name": "raparm_i", "options": IntegrationOptions(method="generalised-alpha", step=_STEP)},
@@ -192,8 +192,8 @@ class Environment(Env[Array, NDArray[Any]]):
     def _set_spaces(self) -> None:
         from gymnasium.spaces import Box
 
-        self.action_space = Box(-1.0, 1.0, (len(self.motors),), np.float32)
-        self.observation_space = Box(-WIDEST, WIDEST, (len(self.observed),), np.float64)
+        self.action_space: Space[Any] = Box(-1.0, 1.0, (len(self.motors),), np.float32)
+        self.observation_space: Space[Any] = Box(-WIDEST, WIDEST, (len(self.observed),), np.float64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Begin an episode; the first observation, and `info`.
