@@ -13,6 +13,7 @@ from paraflex.control.together import check_name, multiple_of
 from paraflex.errors import InputError
 from paraflex.mechanism import AngleLaw, Mechanism
 from paraflex.mechanism.loads import InTime
+from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import known
 
 if TYPE_CHECKING:
@@ -203,8 +204,6 @@ class ControllerDescription(CheckedFields):
         InputError
             A sensor or a motor that the mechanism does not have, a number that makes no sense.
         """
-        from paraflex.linear.linearise import measured_sensors
-
         motors = [motor.name for motor in mechanism.motors]
         sensors = [sensor.name for sensor in measured_sensors(mechanism)]
         try:
@@ -237,8 +236,7 @@ class ControllerDescription(CheckedFields):
             See `check`.
         """
         outputs = self.outputs or tuple(motors)
-        encoders = [motor.joint for motor in mechanism.motors if motor.name in outputs]
-        inputs = self.inputs or tuple(dict.fromkeys(encoders))
+        inputs = self.inputs or encoders_of(mechanism, outputs)
         chosen = {
             "reference": _functions(_of(self.reference, inputs)),
             "limits": _of(self.limits, outputs),

@@ -12,7 +12,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
-from paraflex.control.together import SAME as _SAME, check_name, multiple_of
+from paraflex.control.together import check_name, multiple_of, whole_and_part
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 
@@ -119,7 +119,7 @@ class Loop:
     ) -> None:
         self.controllers: list[Controller] = [_controller(each, sensors, motors) for each in controllers]
         self.names: list[str] = _names(self.controllers)
-        self._start, self._motors = start, len(motors)
+        self._start = start
         self._plants: list[Plant] = []
         for name, each in zip(self.names, self.controllers, strict=True):
             try:
@@ -132,24 +132,15 @@ class Loop:
         self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self._plants]
         self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self._plants]
         self.period: float = min(each.period for each in self.controllers)
-        self._every = [multiple_of(name, each.period, self.period) for name, each in self._named()]
-        self._delays = [self._ticks(each.delay) for each in self.controllers]
+        self._every = [
+            multiple_of(name, each.period, self.period) for name, each in zip(self.names, self.controllers, strict=True)
+        ]
+        self._delays = [whole_and_part(each.delay / self.period) for each in self.controllers]
         # Number of the next sample of each, torques to come, and those of each that act.
         self._next = [0] * len(self.controllers)
         self._due: list[Due] = []
         self._acting = np.zeros((len(self.controllers), len(motors)))
         self.kept: list[Done] = [Done() for _ in self.controllers]
-
-    def _named(self) -> list[tuple[str, Controller]]:
-        return list(zip(self.names, self.controllers, strict=True))
-
-    def _ticks(self, time: float) -> tuple[int, float]:
-        """A time in whole shortest periods, and what is left as a part of one."""
-        whole = round(time / self.period)
-        if abs(time / self.period - whole) <= _SAME * max(1.0, whole):
-            return whole, 0.0
-        whole = int(np.floor(time / self.period))
-        return whole, time / self.period - whole
 
     @property
     def _instant(self) -> tuple[int, float]:

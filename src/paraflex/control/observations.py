@@ -11,6 +11,7 @@ from paraflex.control.references import readings_of
 from paraflex.control.simulation import Simulation
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
+from paraflex.mechanism.measured import encoders_of
 from paraflex.mechanism.quantities import known
 from paraflex.tracking import TrackingTask
 
@@ -104,7 +105,7 @@ def observed_sensors(given: Sequence[str] | None, simulation: Simulation) -> tup
             known(name, simulation.sensors_read, "sensors", "sensor")
         return tuple(given)
     mechanism, effector = simulation.mechanism, simulation.mechanism.end_effector
-    joints = [motor.joint for motor in mechanism.motors if motor.name in simulation.motors]
+    joints = encoders_of(mechanism, simulation.motors)
     axes = [] if effector is None else [axis for axis in ("x", "y") if axis in effector.coordinates]
     return tuple(dict.fromkeys([*joints, *axes]))
 

@@ -51,6 +51,8 @@ class Readings:
     ----------
     system : System
     sensors : sequence of Sensor
+    found : sequence of Affine or None, optional
+        Rows of the sensors, where they are known.
 
     Attributes
     ----------
@@ -60,12 +62,13 @@ class Readings:
         Whether some are of torques as well.
     """
 
-    def __init__(self, system: System, sensors: Sequence[Sensor]) -> None:
+    def __init__(self, system: System, sensors: Sequence[Sensor], found: Sequence[Affine | None] | None = None) -> None:
         self._system = system
         self.sensors: tuple[Sensor, ...] = tuple(sensors)
         self.names: tuple[str, ...] = tuple(sensor.name for sensor in sensors)
         self.units: tuple[str, ...] = tuple(system.mechanism.sensor_unit(sensor) for sensor in sensors)
-        found = [_affine(system, sensor) for sensor in sensors]
+        found = [_affine(system, sensor) for sensor in sensors] if found is None else found
+        self._found = found
         self.linear: list[int] = [k for k, one in enumerate(found) if one is not None]
         self.affine: Affine = _stacked([one for one in found if one is not None], system.n)
         self._others: list[int] = [k for k, one in enumerate(found) if one is None]
@@ -74,7 +77,8 @@ class Readings:
 
     def only(self, names: Sequence[str]) -> Readings:
         """Readings of some of the sensors."""
-        return Readings(self._system, [self.sensors[self.names.index(name)] for name in names])
+        places = [self.names.index(name) for name in names]
+        return Readings(self._system, [self.sensors[k] for k in places], [self._found[k] for k in places])
 
     def __call__(self, now: Instant, torques: Array) -> Array:
         """Readings (sensors,) at an instant, under torques (motors,)."""

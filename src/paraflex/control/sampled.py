@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,13 +12,11 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
+from paraflex.control.together import whole_and_part
 from paraflex.errors import InputError
 from paraflex.linear.model import LinearModel
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import known, not_negative, positive
-
-# A delay this near to whole samples, as a part of one, is whole samples.
-_WHOLE = 1e-9
 
 
 class NamedMatrices(NamedTuple):
@@ -139,7 +136,7 @@ def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
     named = named_matrices(model)
     positive(period, "period", "s")
     not_negative(delay, "delay", "s")
-    whole, part = _whole_and_part(delay / period)
+    whole, part = whole_and_part(delay / period)
     scaled, back = _scaled(model, named.matrices)
     late, early = _held(scaled, period * part), _held(scaled, period * (1.0 - part))
     over = _held(scaled, period)
@@ -236,13 +233,6 @@ def places(names: Sequence[str], among: Sequence[str], field: str, what: str) ->
         if name in names[:k]:
             raise InputError("is named twice", field=field, value=name, remedy="name it once")
     return [list(among).index(name) for name in names]
-
-
-def _whole_and_part(periods: float) -> tuple[int, float]:
-    nearest = round(periods)
-    if abs(periods - nearest) <= _WHOLE * max(1.0, nearest):
-        return nearest, 0.0
-    return math.floor(periods), periods - math.floor(periods)
 
 
 def _scaled(model: Any, matrices: StateSpace) -> tuple[StateSpace, Array]:

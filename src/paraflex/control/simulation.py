@@ -22,8 +22,8 @@ from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, choose
 from paraflex.integrators.integrate import Integration, Kept
 from paraflex.kinematics import ModelWithPaths
-from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode
-from paraflex.mechanism.measured import measured_sensors
+from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
+from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import known
 from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask, path_stops
@@ -279,7 +279,7 @@ class Simulation:
             It cannot go on; it carries the run so far.
         """
         if controllers is not None:
-            self.reset()
+            self.restore(self._fresh)
             given = controllers if isinstance(controllers, list | tuple) else [controllers]
             several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
                        for each in given]  # fmt: skip
@@ -314,9 +314,7 @@ class Simulation:
         if loop.next <= self.time + slack:
             changed = loop.act(lambda: self._read(self._watched))
             if changed is not None:
-                everything = np.zeros(len(self._held))
-                everything[self._active] = changed
-                self._apply(everything)
+                self._apply(self._of_all(changed))
         until = min(end, loop.next)
         if until > self.time + slack:
             self._march(until, slack)
@@ -371,8 +369,7 @@ class Simulation:
 
     def _plant(self, controller: Controller) -> Plant:
         outputs = tuple(controller.outputs) or self.motors
-        encoders = (motor.joint for motor in self.mechanism.motors if motor.name in outputs)
-        inputs = tuple(controller.inputs) or tuple(dict.fromkeys(encoders))
+        inputs = tuple(controller.inputs) or encoders_of(self.mechanism, outputs)
         units = dict(zip(self.sensors_read, self._readings.units, strict=True))
         return Plant(
             self.mechanism, self.mode, self.task, self.state, inputs, tuple(units[name] for name in inputs), outputs,
@@ -381,7 +378,6 @@ class Simulation:
 
     def _given(self, torques: Torques) -> Array:
         """Torques of all motors from those of some."""
-        everything = np.zeros(len(self._held))
         if isinstance(torques, Mapping):
             for name in torques:
                 known(name, self.motors, "torques", "motor")
@@ -390,7 +386,12 @@ class Simulation:
         if given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
             raise InputError(f"not {len(self.motors)} finite numbers", field="torques", value=torques,
                              remedy=f"give one each of {', '.join(self.motors)}")  # fmt: skip
-        everything[self._active] = given
+        return self._of_all(given)
+
+    def _of_all(self, torques: Array) -> Array:
+        """Torques of all motors from those of the mode's."""
+        everything = np.zeros(len(self._held))
+        everything[self._active] = torques
         return everything
 
     def _read(self, readings: Readings) -> Array:
@@ -401,17 +402,17 @@ class Simulation:
 
     def _apply(self, torques: Array) -> None:
         """Let torques (motors,) of all motors act from now on."""
-        if np.array_equal(torques, self._held) and self._log.begun:
-            return
         changed = not np.array_equal(torques, self._held)
+        if changed or not self._log.begun:
+            self._log.note(self.time, torques)
+        if not changed:
+            return
         self._held = torques
-        self._log.note(self.time, torques)
-        if changed:
-            self._hold()
-            if self._integration.run.attempts == 0:
-                self._integration.start()
-            else:
-                self._integration.resume()
+        self._hold()
+        if self._integration.run.attempts == 0:
+            self._integration.start()
+        else:
+            self._integration.resume()
 
     def _hold(self) -> None:
         """Write the torques held into the signals."""
@@ -432,9 +433,9 @@ class Simulation:
 
 
 def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
-    if isinstance(mode, ActuationMode):
-        return mode
-    return parse_mode(mechanism, ",".join(motor.name for motor in mechanism.motors) if mode is None else mode)
+    if mode is None:
+        return mode_of_motors(mechanism, [motor.name for motor in mechanism.motors])
+    return mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
 
 
 def _refuse(task: TrackingTask, **given: Any) -> None:

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from paraflex.errors import InputError
 
 # Instants closer than this part of the shortest period are one.
 SAME = 1e-9
+
+
+def whole_and_part(periods: float) -> tuple[int, float]:
+    """A number of periods as whole ones, and what is left as a part of one: none to rounding."""
+    nearest = round(periods)
+    if abs(periods - nearest) <= SAME * max(1.0, nearest):
+        return nearest, 0.0
+    return math.floor(periods), periods - math.floor(periods)
 
 
 def multiple_of(name: str, period: float, shortest: float) -> int:

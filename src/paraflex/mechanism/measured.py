@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.sensors import Encoder, PositionSensor, Sensor
 
@@ -15,3 +17,8 @@ def measured_sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:
         found += [PositionSensor(axis, effector.point, axis) for axis in ("x", "y") if axis in effector.coordinates]
     taken = {sensor.name for sensor in mechanism.sensors}
     return (*(sensor for sensor in found if sensor.name not in taken), *mechanism.sensors)
+
+
+def encoders_of(mechanism: Mechanism, motors: Container[str]) -> tuple[str, ...]:
+    """Names of the encoders of some motors, those of their joints, each once."""
+    return tuple(dict.fromkeys(motor.joint for motor in mechanism.motors if motor.name in motors))
