@@ -13,10 +13,9 @@ from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
 
-@given_as("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
-class ControlledTracking(TrackingRun):
-    """A run of a plan under torques that were given from one instant to the next.
+class Controlled:
+    """What runs under torques have that were given from one instant to the next.
 
     Attributes
     ----------
@@ -35,6 +34,12 @@ class ControlledTracking(TrackingRun):
         assert self.acting is not None
         return self.acting
 
+
+@given_as("a run under controllers", "the run that Simulation.run returns")
+@dataclass(frozen=True)
+class ControlledTracking(Controlled, TrackingRun):
+    """A run of a plan under torques that were given from one instant to the next."""
+
     @property
     def follows(self) -> bool:
         """Whether torques drive it along the path."""
@@ -43,29 +48,13 @@ class ControlledTracking(TrackingRun):
 
 @given_as("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
-class ControlledMotion(MotionRun):
-    """A run without a path under torques that were given from one instant to the next.
-
-    Attributes
-    ----------
-    acting : (k, motors) array
-        See `ControlledTracking`.
-    controllers : tuple of ControllerRecord
-    """
-
-    acting: Array | None = None
-    controllers: tuple[ControllerRecord, ...] = ()
+class ControlledMotion(Controlled, MotionRun):
+    """A run without a path under torques that were given from one instant to the next."""
 
     @property
     def in_time(self) -> bool:
         """Whether torques change in time."""
         return True
-
-    @property
-    def applied(self) -> Array:
-        """Torques (k, motors) at the samples reached [N m, N]."""
-        assert self.acting is not None
-        return self.acting
 
 
 class TorqueLog:

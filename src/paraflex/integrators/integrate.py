@@ -194,14 +194,14 @@ class Integration:
 
     def resume(self) -> None:
         """Find accelerations and multipliers once more, as something given has changed at this time."""
-        native.resume(self.run)
+        native.own(self.run).resume()
 
     def march(self, until: float | None = None, *, on_progress: Callable[[float], None] | None = None) -> None:
         """Go on to a time [s], at which a step ends, or to the end; less far to an event, or where it cannot go on.
 
         Only own methods go on to a time before the end.
         """
-        run = self.run if until is None else native.until(self.run, until)
+        run = self.run if until is None else native.own(self.run).until(until)
         self._code = PAUSED
         if self.status == "interrupted":
             self.status, self.message = "complete", ""
@@ -225,13 +225,14 @@ class Integration:
     def saved(self) -> Kept:
         """All that it goes on from, to the bit; of own methods only."""
         more = {name: getattr(self, name) for name in _KEPT}
-        return Kept(native.arrays_of(self.run), more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
+        arrays = tuple(one.copy() for one in native.own(self.run).arrays())
+        return Kept(arrays, more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
 
     def restore(self, kept: Kept) -> None:
         """Go back to what `saved` gave, of this integration or of one made of the same."""
         # Into the arrays that are there: how they lie in memory must not change, as rounding may depend on it.
-        for own, array in zip(native.arrays_of(self.run, copies=False), kept.arrays, strict=True):
-            own[...] = array
+        for mine, array in zip(native.own(self.run).arrays(), kept.arrays, strict=True):
+            mine[...] = array
         for name, value in kept.more.items():
             setattr(self, name, value)
         self._ends, self._pace = copy.copy(self._ends), self._pace.copy()

@@ -168,6 +168,16 @@ class NativeRun:
             passages=state.passages[:, : state.counts[PASSAGES]],
         )
 
+    def until(self, time: float) -> NativeRun:
+        """The same run, whose steps end at a time before its end, where it pauses."""
+        before = self.problem.stops[self.problem.stops < time]
+        self.state.counts[STOP] = 0
+        return replace(self, problem=replace(self.problem, stops=np.append(before, time)))
+
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """All arrays that it goes on from, its samples among them."""
+        return tuple(_arrays((self.state, self.workspace, self.slow, self.samples)))
+
     def resume(self) -> None:
         """A first stage after a jump; energies and work continue."""
         kept = self.state.clock[_KEPT]
@@ -177,46 +187,20 @@ class NativeRun:
         self.state.clock[_KEPT] = kept
 
 
-def until(run: Run, time: float) -> Run:
-    """The same run, whose steps end at a time before its end, where it pauses.
+def own(run: Run) -> NativeRun:
+    """The run, where it is by an own method, which goes on from time to time.
 
     Raises
     ------
     InputError
         It is by another program's solver, which steps on over any time that it was not told at the start.
     """
-    if not isinstance(run, NativeRun):
-        raise _not_in_parts()
-    before = run.problem.stops[run.problem.stops < time]
-    run.state.counts[STOP] = 0
-    return replace(run, problem=replace(run.problem, stops=np.append(before, time)))
-
-
-def resume(run: Run) -> None:
-    """See `NativeRun.resume`.
-
-    Raises
-    ------
-    InputError
-        See `until`.
-    """
-    if not isinstance(run, NativeRun):
-        raise _not_in_parts()
-    run.resume()
-
-
-def arrays_of(run: Run, *, copies: bool = True) -> tuple[np.ndarray, ...]:
-    """All arrays that a run of an own method goes on from, or copies of them; its samples among them.
-
-    Raises
-    ------
-    InputError
-        See `until`.
-    """
-    if not isinstance(run, NativeRun):
-        raise _not_in_parts()
-    found = tuple(_arrays((run.state, run.workspace, run.slow, run.samples)))
-    return tuple(one.copy() for one in found) if copies else found
+    if isinstance(run, NativeRun):
+        return run
+    raise InputError(
+        "goes on from time to time with own methods only", field="method",
+        remedy="choose one of paraflex's own, say esdirk5 or tr-bdf2",
+    )  # fmt: skip
 
 
 def _arrays(given: object) -> Iterator[np.ndarray]:
@@ -225,13 +209,6 @@ def _arrays(given: object) -> Iterator[np.ndarray]:
     elif isinstance(given, tuple):
         for one in given:
             yield from _arrays(one)
-
-
-def _not_in_parts() -> InputError:
-    return InputError(
-        "goes on from time to time with own methods only", field="method",
-        remedy="choose one of paraflex's own, say esdirk5 or tr-bdf2",
-    )  # fmt: skip
 
 
 def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
