@@ -17,6 +17,7 @@ from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
 from paraflex.control.references import Reference, references
 from paraflex.errors import InputError
+from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import known, positive
 
 # A transfer function: the time constant's inverse as a cut-off frequency [Hz] of first order, or coefficients of
@@ -311,15 +312,30 @@ def as_law(given: Any) -> Any:
 
 
 def _discrete_model(given: Any) -> DiscreteModel:
-    dt = given.dt
+    check_discrete(given.dt, given, "law", "model")
+    labels = [_own_names(getattr(given, name, None)) for name in ("input_labels", "output_labels")]
+    return DiscreteModel(*matrices_of(given), None if given.dt is True else float(given.dt), *labels)
+
+
+def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
+    """Raise unless a model with this time step is discrete, as python-control and SciPy have it.
+
+    Raises
+    ------
+    InputError
+        It is continuous.
+    """
     if dt is None or (dt is not True and not dt > 0.0):
-        raise InputError("is a continuous model", field="law", value=given,
-                         remedy="discretise it, say model.sample(1e-3)")  # fmt: skip
-    A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (given.A, given.B, given.C, given.D))
+        raise InputError("is a continuous model", field=field, value=given,
+                         remedy=f"discretise it, say {name}.sample(1e-3)")  # fmt: skip
+
+
+def matrices_of(model: Any) -> StateSpace:
+    """Matrices of a model in state space, which may have no states."""
+    A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (model.A, model.B, model.C, model.D))
     if A.size == 0:
         A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
-    labels = [_own_names(getattr(given, name, None)) for name in ("input_labels", "output_labels")]
-    return DiscreteModel(A, B, C, D, None if dt is True else float(dt), *labels)
+    return StateSpace(A, B, C, D)
 
 
 def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:

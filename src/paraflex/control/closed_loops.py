@@ -12,6 +12,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arrays import Array
+from paraflex.control.chain import check_discrete, matrices_of
 from paraflex.control.reach import frequency_of
 from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.errors import InputError, ResultWarning, warn_user
@@ -206,13 +207,9 @@ def law_of(controller: Any) -> StateSpace:
     if not all(hasattr(own, name) for name in ("A", "B", "C", "D")):
         raise InputError("is no linear law", field="controller", value=controller,
                          remedy="give a design of pf.lqg, or a discrete state space")  # fmt: skip
-    if hasattr(own, "dt") and (own.dt is None or (own.dt is not True and not own.dt > 0.0)):
-        raise InputError("is a continuous model", field="controller", value=controller,
-                         remedy="discretise it, say controller.sample(1e-3)")  # fmt: skip
-    A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (own.A, own.B, own.C, own.D))
-    if not A.size:
-        A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
-    return StateSpace(A, B, C, D)
+    if hasattr(own, "dt"):
+        check_discrete(own.dt, controller, "controller", "controller")
+    return matrices_of(own)
 
 
 def spillover(full: Any, reduced: Any, controller: Any, **settings: Any) -> pd.DataFrame:
