@@ -9,8 +9,9 @@ import pytest
 import scipy
 
 import paraflex as pf
-from paraflex.control.chain import DiscreteModel, SampledController
+from paraflex.control.chain import SampledController
 from paraflex.control.closed_loops import damped_frequency
+from paraflex.control.discrete import DiscreteModel
 from paraflex.errors import InputError
 from test_regulators import PERIOD, oscillator, quanser, quanser_design
 

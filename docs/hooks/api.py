@@ -29,6 +29,7 @@ PACKAGES = (
     "linear",
     "control.simulation",
     "control.chain",
+    "control.discrete",
     "control.controllers",
     "control.laws",
     "control.computed_torque",

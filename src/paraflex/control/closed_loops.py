@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arrays import Array
-from paraflex.control.chain import check_discrete, matrices_of
+from paraflex.control.discrete import check_discrete, matrices_of
 from paraflex.control.reach import frequency_of
 from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.errors import InputError, ResultWarning, warn_user
@@ -326,10 +326,7 @@ def _chosen(controller: Any, attribute: str, given: Sequence[str] | None) -> tup
     """Names that are given, or a controller's own, if it has any that are names."""
     if given is not None:
         return tuple(given)
-    plural = {"inputs": "measured", "outputs": "motors"}[attribute]
-    for source in (controller, getattr(controller, "regulator", None)):
-        for name in (plural, attribute):
-            own = getattr(source, name, None)
-            if isinstance(own, tuple | list) and own and all(isinstance(one, str) for one in own):
-                return tuple(own)
-    return None
+    own = getattr(controller, attribute, None)
+    # Models of python-control have a number of inputs.
+    named = isinstance(own, tuple | list) and own and all(isinstance(one, str) for one in own)
+    return tuple(own) if named else None

@@ -16,7 +16,7 @@ from paraflex.actuation.allocation import Effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
-from paraflex.control.estimators import BackwardDifference
+from paraflex.control.estimators import BackwardDifference, checked_cutoff
 from paraflex.control.references import planned_motion
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import InputError
@@ -54,7 +54,7 @@ class ComputedTorque:
         positive(damping_ratio, "damping_ratio", "parts of the critical one")
         omega = 2.0 * np.pi * frequency
         self._Kp, self._Kv = omega**2, 2.0 * damping_ratio * omega
-        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
+        self._cutoff = checked_cutoff(cutoff)
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""

@@ -17,7 +17,8 @@ from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import known
 
 if TYPE_CHECKING:
-    from paraflex.control.chain import DiscreteModel, SampledController
+    from paraflex.control.chain import SampledController
+    from paraflex.control.discrete import DiscreteModel
     from paraflex.control.laws import JointPID
 
 # Where a model file has controllers; and the word for none of them.
@@ -144,7 +145,7 @@ class StateSpaceDescription(CheckedFields):
         return self._model(period)
 
     def _model(self, period: float) -> DiscreteModel:
-        from paraflex.control.chain import DiscreteModel
+        from paraflex.control.discrete import DiscreteModel
 
         D, n = np.array(self.D), len(self.A)
         A, B, C = (np.reshape(rows, shape) if n else np.zeros(shape) for rows, shape in (

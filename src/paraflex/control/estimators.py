@@ -186,6 +186,19 @@ class Differentiator:
         return found[0].copy(), found[1].copy()
 
 
+def checked_cutoff(cutoff: float | None) -> float | None:
+    """The cut-off frequency of a low-pass of rates [Hz], or none.
+
+    Raises
+    ------
+    InputError
+        It is not positive.
+    """
+    if cutoff is not None:
+        positive(cutoff, "cutoff", "Hz")
+    return cutoff
+
+
 class BackwardDifference:
     """Rates of readings by backward differences and a low-pass of first order: r + a ((y - y_before) / T - r).
 
@@ -207,10 +220,8 @@ class BackwardDifference:
 
     def __init__(self, period: float, cutoff: float | None = None) -> None:
         positive(period, "period", "s")
-        if cutoff is not None:
-            positive(cutoff, "cutoff", "Hz")
         self.period: float = period
-        self.cutoff: float | None = cutoff
+        self.cutoff: float | None = checked_cutoff(cutoff)
         self.share: float = 1.0 if cutoff is None else 1.0 - float(np.exp(-2.0 * np.pi * cutoff * period))
         self._before: Array | None = None
         self._rate: Array = np.zeros(0)

@@ -17,7 +17,7 @@ from paraflex.actuation import Effort, required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
-from paraflex.control.estimators import BackwardDifference
+from paraflex.control.estimators import BackwardDifference, checked_cutoff
 from paraflex.control.references import PLAN, AtSamples, planned_motion
 from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError
@@ -77,7 +77,7 @@ class JointPID:
     ) -> None:
         self._gains = {"stiffness": stiffness, "damping": damping, "integral": integral}
         self._project = project
-        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
+        self._cutoff = checked_cutoff(cutoff)
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""

@@ -10,7 +10,7 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
-from paraflex.control.estimators import BackwardDifference
+from paraflex.control.estimators import BackwardDifference, checked_cutoff
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 
@@ -42,7 +42,7 @@ class RateFeedback:
             raise InputError("no gains", field="gains", remedy="give them by motor and sensor")
         self._gains = np.array([[_gain(row.get(name, 0.0), f"gains.{motor}.{name}") for name in self.inputs]
                                 for motor, row in gains.items()])  # fmt: skip
-        self._cutoff = BackwardDifference(1.0, cutoff).cutoff
+        self._cutoff = checked_cutoff(cutoff)
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""

@@ -105,6 +105,16 @@ class LQGDesign:
         """That the design accounts for [s]."""
         return self.regulator.plant.delay
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Sensors: `measured`."""
+        return self.measured
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Motors, those of the regulator."""
+        return self.regulator.motors
+
     @cached_property
     def state_space(self) -> StateSpace:
         """The law without limits, from readings to torques: x_k+1 = A x_k + B y_k, u_k = C x_k + D y_k.
@@ -153,8 +163,8 @@ class LQGLaw:
         self.design = design
         self.period: float = design.period
         self.delay: float = design.delay
-        self.inputs: tuple[str, ...] = design.measured
-        self.outputs: tuple[str, ...] = design.regulator.motors
+        self.inputs: tuple[str, ...] = design.inputs
+        self.outputs: tuple[str, ...] = design.outputs
         self._reset()
 
     def _reset(self) -> None:

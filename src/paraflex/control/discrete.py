@@ -1,0 +1,120 @@
+"""Discrete models in state space as control laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.control.controllers import Plant
+from paraflex.errors import InputError
+from paraflex.linear.zeros import StateSpace
+
+
+class DiscreteModel:
+    """x_k+1 = A x_k + B y_k, torques C x_k + D y_k: a law.
+
+    Parameters
+    ----------
+    A, B, C, D : arrays
+    period : float or None
+        [s]; None where the model does not say it.
+    inputs, outputs : tuple of str
+        Names, where the model has any.
+    """
+
+    title = "state space"
+
+    def __init__(
+        self,
+        A: Array,
+        B: Array,
+        C: Array,
+        D: Array,
+        period: float | None,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+    ) -> None:
+        self.A: Array = A
+        self.B: Array = B
+        self.C: Array = C
+        self.D: Array = D
+        self.period: float | None = period
+        self.inputs: tuple[str, ...] = tuple(inputs)
+        self.outputs: tuple[str, ...] = tuple(outputs)
+        self.x: Array = np.zeros(len(A))
+
+    def check(self, inputs: Sequence[str], outputs: Sequence[str], period: float) -> None:
+        """Compare its size and its period with what it is to have.
+
+        Raises
+        ------
+        InputError
+            They differ.
+        """
+        if inputs:
+            _check_count(inputs, self.B.shape[1], "inputs")
+        if outputs:
+            _check_count(outputs, self.C.shape[0], "outputs")
+        if self.period is not None and abs(period - self.period) > 1e-9 * period:
+            raise InputError(f"the model is sampled every {self.period:g} s", field="period", value=period,
+                             remedy="leave it out")  # fmt: skip
+
+    def start(self, plant: Plant) -> None:
+        """Set its states to zero."""
+        _check_count(plant.inputs, self.B.shape[1], "inputs")
+        _check_count(plant.outputs, self.C.shape[0], "outputs")
+        self.x = np.zeros(len(self.A))
+
+    def step(self, k: int, t: float, y: Array) -> Array:
+        """Torques of this sample; its states go on to the next."""
+        torques = self.C @ self.x + self.D @ y
+        self.x = self.A @ self.x + self.B @ y
+        return torques
+
+
+def _check_count(names: Sequence[str], count: int, field: str) -> None:
+    if len(names) != count:
+        raise InputError(f"the model has {count}", field=field, value=", ".join(names), remedy="name as many")
+
+
+def discrete_model(given: Any) -> DiscreteModel:
+    """A model of python-control or SciPy as a law.
+
+    Raises
+    ------
+    InputError
+        It is continuous.
+    """
+    check_discrete(given.dt, given, "law", "model")
+    labels = [_own_names(getattr(given, name, None)) for name in ("input_labels", "output_labels")]
+    return DiscreteModel(*matrices_of(given), None if given.dt is True else float(given.dt), *labels)
+
+
+def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
+    """Raise unless a model with this time step is discrete, as python-control and SciPy have it.
+
+    Raises
+    ------
+    InputError
+        It is continuous.
+    """
+    if dt is None or (dt is not True and not dt > 0.0):
+        raise InputError("is a continuous model", field=field, value=given,
+                         remedy=f"discretise it, say {name}.sample(1e-3)")  # fmt: skip
+
+
+def matrices_of(model: Any) -> StateSpace:
+    """Matrices of a model in state space, which may have no states."""
+    A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (model.A, model.B, model.C, model.D))
+    if A.size == 0:
+        A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
+    return StateSpace(A, B, C, D)
+
+
+def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:
+    """Names that somebody gave: python-control calls others u[0], u[1] and y[0], y[1]."""
+    names = tuple(labels or ())
+    return () if any(name[:2] in ("u[", "y[") for name in names) else names
