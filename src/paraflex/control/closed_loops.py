@@ -328,5 +328,5 @@ def _chosen(controller: Any, attribute: str, given: Sequence[str] | None) -> tup
         return tuple(given)
     own = getattr(controller, attribute, None)
     # Models of python-control have a number of inputs.
-    named = isinstance(own, tuple | list) and own and all(isinstance(one, str) for one in own)
-    return tuple(own) if named else None
+    names = tuple(own) if isinstance(own, tuple | list) else ()
+    return names if names and all(isinstance(one, str) for one in names) else None
