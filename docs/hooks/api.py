@@ -30,6 +30,7 @@ PACKAGES = (
     "control.simulation",
     "control.chain",
     "control.discrete",
+    "control.inside",
     "control.controllers",
     "control.laws",
     "control.computed_torque",

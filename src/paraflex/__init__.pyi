@@ -100,6 +100,7 @@ from .control.chain import SampledController as SampledController
 from .control.controllers import Controller as Controller, Plant as Plant
 from .control.laws import JointPID as JointPID, joint_gains as joint_gains, internal_torques as internal_torques
 from .control.computed_torque import ComputedTorque as ComputedTorque
+from .control.inside import CompiledLaw as CompiledLaw
 from .control.rates import RateFeedback as RateFeedback
 from .control.shaping import Shaper as Shaper, shaper as shaper
 from .control.shaped import ShapedPath as ShapedPath, shape_torques as shape_torques

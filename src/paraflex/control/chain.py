@@ -18,6 +18,7 @@ from paraflex.control.controllers import Plant
 from paraflex.control.discrete import DiscreteModel, discrete_model
 from paraflex.control.references import Reference, references
 from paraflex.errors import InputError
+from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import known, positive
 
 # A transfer function: the time constant's inverse as a cut-off frequency [Hz] of first order, or coefficients of
@@ -167,8 +168,9 @@ class SampledController:
         InputError
             Names that the plant does not have.
         """
-        self._references: list[Reference | None] = references(self.reference, plant)
-        self._resolution, filters, limits, rates = self.check(plant.inputs, plant.outputs)
+        self.found_references: list[Reference | None] = references(self.reference, plant)
+        resolution, filters, limits, rates = self.check(plant.inputs, plant.outputs)
+        self.resolution: Array = np.array([0.0 if one is None else one for one in resolution])
         self._filters = [None if given is None else _SettledFilter(given, plant.period) for given in filters]
         self._lowest = np.array([-np.inf if one is None else one[0] for one in limits])
         self._highest = np.array([np.inf if one is None else one[1] for one in limits])
@@ -187,16 +189,21 @@ class SampledController:
         """Lowest and highest torques (outputs, 2), and their largest changes in a second (outputs,), once started."""
         return np.stack([self._lowest, self._highest], axis=1), self._most / self.period
 
+    @property
+    def filter_models(self) -> list[StateSpace | None]:
+        """Filters of readings as discrete models, once started."""
+        return [None if each is None else each.model for each in self._filters]
+
     def step(self, k: int, t: float, y: Array) -> Any:
         """See `Controller`."""
         y = np.array(y, dtype=float)
-        for i, (resolution, filtered) in enumerate(zip(self._resolution, self._filters, strict=True)):
-            if resolution is not None:
+        for i, (resolution, filtered) in enumerate(zip(self.resolution, self._filters, strict=True)):
+            if resolution > 0.0:
                 y[i] = resolution * np.round(y[i] / resolution)
             if filtered is not None:
                 y[i] = filtered(y[i])
         errors = y.copy()
-        for i, reference in enumerate(self._references):
+        for i, reference in enumerate(self.found_references):
             if reference is not None:
                 errors[i] -= reference(t)
         said = self.law.step(k, t, errors)
@@ -249,15 +256,15 @@ class _SettledFilter:
 
     def __init__(self, given: tuple[Array, Array], period: float) -> None:
         continuous = scipy.signal.tf2ss(*given)
-        self._A, self._B, self._C, self._D, _ = scipy.signal.cont2discrete(continuous, period, method="foh")
+        *matrices, _ = scipy.signal.cont2discrete(continuous, period, method="foh")
+        self.model: StateSpace = StateSpace(*matrices)
         self._x: Array | None = None
 
     def __call__(self, value: float) -> float:
-        if self._x is None:
-            rest = np.eye(len(self._A)) - self._A
-            self._x = np.linalg.solve(rest, self._B * value)
-        filtered = float((self._C @ self._x + self._D * value).item())
-        self._x = self._A @ self._x + self._B * value
+        A, B, C, D = self.model
+        x = np.linalg.solve(np.eye(len(A)) - A, B * value) if self._x is None else self._x
+        self._x = np.asarray(A @ x + B * value, dtype=float)
+        filtered = float((C @ x + D * value).item())
         return filtered
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
+from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 
@@ -67,6 +68,10 @@ class DiscreteModel:
         _check_count(plant.inputs, self.B.shape[1], "inputs")
         _check_count(plant.outputs, self.C.shape[0], "outputs")
         self.x = np.zeros(len(self.A))
+
+    def linear_law(self) -> LinearLaw:
+        """Itself, for the compiled time loop."""
+        return LinearLaw(self.A, self.B, self.C, self.D)
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """Torques of this sample; its states go on to the next."""

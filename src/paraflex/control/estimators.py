@@ -10,6 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
+from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import positive
 
@@ -239,3 +240,13 @@ class BackwardDifference:
             self._rate = self._rate + self.share * ((y - self._before) / self.period - self._rate)
         self._before = y
         return y, self._rate.copy()
+
+    def linear_law(self, readings: int) -> LinearLaw:
+        """From readings to rates: states are the readings before, then their rates."""
+        none, one = np.zeros((readings, readings)), np.eye(readings)
+        by = self.share / self.period * one
+        left = (1.0 - self.share) * one
+        return LinearLaw(
+            np.block([[none, none], [-by, left]]), np.vstack([one, by]), np.hstack([-by, left]), by,
+            first=np.vstack([one, none]),
+        )  # fmt: skip

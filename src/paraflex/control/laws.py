@@ -12,12 +12,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from paraflex.actuation import Effort, required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
 from paraflex.control.estimators import BackwardDifference, checked_cutoff
+from paraflex.control.linear_law import LinearLaw
 from paraflex.control.references import PLAN, AtSamples, planned_motion
 from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError
@@ -107,8 +109,28 @@ class JointPID:
         """Bring the integral back where torques were limited."""
         excess = self._wanted - torques
         if np.any(excess):
-            pace = np.divide(self._Ki * self._period, self._Kp, out=np.ones_like(excess), where=self._Kp > 0.0)
-            self._sum = self._sum + np.minimum(pace, 1.0) * excess * (self._Ki > 0.0)
+            self._sum = self._sum + self._pace * excess
+
+    @property
+    def _pace(self) -> Array:
+        """Share of an excess by which integrals are brought back in a period."""
+        pace = np.divide(self._Ki * self._period, self._Kp, out=np.ones_like(self._Kp), where=self._Kp > 0.0)
+        return np.minimum(pace, 1.0) * (self._Ki > 0.0)
+
+    def linear_law(self) -> LinearLaw:
+        """For the compiled time loop: states are the errors before, their rates and the integrals."""
+        none, one = np.zeros((len(self._Kp),) * 2), np.eye(len(self._Kp))
+        rates = self._rates.linear_law(len(one))
+        gain = np.diag(self._Ki * self._period)
+        return LinearLaw(
+            A=scipy.linalg.block_diag(rates.A, one),
+            B=np.vstack([rates.B, gain]),
+            C=-np.hstack([self._Kd[:, None] * rates.C, one]),
+            D=-(np.diag(self._Kp) + self._Kd[:, None] * rates.D + gain),
+            E=np.vstack([none, none, np.diag(self._pace)]),
+            first=np.vstack([rates.first, none]),
+            projector=None if self._projector is None else self._projector.values,
+        )
 
 
 def projectors(plant: Plant) -> AtSamples:

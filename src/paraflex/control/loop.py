@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -12,8 +12,10 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
+from paraflex.control.inside import wrong_torques
 from paraflex.control.together import check_name, multiple_of, whole_and_part
 from paraflex.errors import InputError
+from paraflex.kernel.sampled import ACTED, SAMPLED, SampledLaw
 from paraflex.mechanism.quantities import known
 
 
@@ -141,6 +143,19 @@ class Loop:
         self._due: list[Due] = []
         self._acting = np.zeros((len(self.controllers), len(motors)))
         self.kept: list[Done] = [Done() for _ in self.controllers]
+        # Where the compiled time loop runs the controller.
+        self.inside: SampledLaw | None = None
+
+    @property
+    def alone(self) -> tuple[Controller, Plant] | None:
+        """The controller with its plant, where there is but one."""
+        return (self.controllers[0], self._plants[0]) if len(self.controllers) == 1 else None
+
+    @property
+    def failure(self) -> LawFailure | None:
+        """What ended a run in the compiled time loop."""
+        wrong = [] if self.inside is None else wrong_torques(self.inside)
+        return _not_finite(self.names[0], [self._plants[0].outputs[k] for k in wrong]) if wrong else None
 
     @property
     def _instant(self) -> tuple[int, float]:
@@ -201,7 +216,7 @@ class Loop:
             raise LawFailure(f'controller "{name}" returned {count} in place of {len(outputs)} torques')
         wrong = [motor for motor, value in zip(outputs, torques, strict=True) if not np.isfinite(value)]
         if wrong:
-            raise LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(wrong)}')
+            raise _not_finite(name, wrong)
         kept, last = self.kept[k], getattr(controller, "last", None)
         record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
         kept.t.append(t)
@@ -210,12 +225,27 @@ class Loop:
         kept.given.append(torques)
         return torques
 
+    def torques_acted(self, after: int) -> Iterator[tuple[float, Array]]:
+        """Times at which torques (motors,) of all motors began to act in the compiled time loop, after so many."""
+        law = self.inside
+        if law is None:
+            return
+        k = int(law.counts[SAMPLED]) - 1
+        controller = self.controllers[0]
+        if k >= 0 and isinstance(controller, SampledController):
+            controller.last = ChainSample(law.readings[k].copy(), law.wanted[k].copy(), law.given[k].copy())
+        for k in range(after, int(law.counts[ACTED])):
+            torques = np.zeros(law.held.size)
+            torques[law.outputs] = law.given[k]
+            yield float(law.acted[k]), torques
+
     def records(self, units: Callable[[str], str]) -> tuple[ControllerRecord, ...]:
         """What each controller has done."""
         return tuple(self._record(k, units) for k in range(len(self.controllers)))
 
     def _record(self, k: int, units: Callable[[str], str]) -> ControllerRecord:
-        controller, plant, kept = self.controllers[k], self._plants[k], self.kept[k]
+        controller, plant = self.controllers[k], self._plants[k]
+        kept = self.kept[k] if self.inside is None else _done(self.inside)
         law, limits, rates = _bounds(controller, len(plant.outputs))
         return ControllerRecord(
             name=self.names[k],
@@ -240,16 +270,31 @@ class Loop:
         own = (self._next, self._due, self._acting, self.kept)
         # Plants, with tasks and mechanisms, stay what they are.
         memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
-        return copy.deepcopy((state, own), memo)
+        inside = None if self.inside is None else [array.copy() for array in self.inside]
+        return copy.deepcopy((state, own), memo), inside
 
     def restore(self, saved: Any) -> None:
         """Go back to what `saved` gave."""
         memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
-        states, own = copy.deepcopy(saved, memo)
+        outside, inside = saved
+        states, own = copy.deepcopy(outside, memo)
         self._next, self._due, self._acting, self.kept = own
         for controller, state in zip(self.controllers, states, strict=True):
             vars(controller).clear()
             vars(controller).update(state)
+        if self.inside is not None:
+            for mine, array in zip(self.inside, inside, strict=True):
+                mine[...] = array
+
+
+def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
+    return LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(motors)}')
+
+
+def _done(inside: SampledLaw) -> Done:
+    """What a controller in the compiled time loop has done so far."""
+    so_far = slice(0, int(inside.counts[SAMPLED]))
+    return Done(*(list(each[so_far]) for each in (inside.t, inside.readings, inside.wanted, inside.given)))
 
 
 def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -> Controller:

@@ -11,6 +11,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
 from paraflex.control.estimators import BackwardDifference, checked_cutoff
+from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 
@@ -56,6 +57,11 @@ class RateFeedback:
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`."""
         return -self._K @ self._rates.step(y)[1]
+
+    def linear_law(self) -> LinearLaw:
+        """For the compiled time loop: states are readings before and their rates."""
+        rates = self._rates.linear_law(self._K.shape[1])
+        return LinearLaw(rates.A, rates.B, -self._K @ rates.C, -self._K @ rates.D, first=rates.first)
 
 
 def _gain(value: Any, field: str) -> float:

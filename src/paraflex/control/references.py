@@ -55,12 +55,13 @@ class AtSamples:
     """Values (k, ...) at the samples of a controller from its start on, found by their time; the last goes on."""
 
     def __init__(self, plant: Plant, values: Array) -> None:
-        self._start, self._period, self._values = plant.state.time, plant.period, values
+        self._start, self._period = plant.state.time, plant.period
+        self.values: Array = values
 
     def __call__(self, t: float) -> Any:
         """The value at a time [s]."""
         sample = round((t - self._start) / self._period)
-        return self._values[min(max(sample, 0), len(self._values) - 1)]
+        return self.values[min(max(sample, 0), len(self.values) - 1)]
 
 
 def planned_motion(plant: Plant, ahead: float = 0.0) -> RigidMotion:

@@ -15,6 +15,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
 from paraflex.control.estimators import KalmanFilter, kalman_filter, riccati
+from paraflex.control.linear_law import LinearLaw
 from paraflex.control.reach import check_reach
 from paraflex.control.sampled import SampledPlant, as_sampled, places
 from paraflex.errors import InputError
@@ -211,6 +212,17 @@ class LQGLaw:
         self._wanted = -design.K @ np.concatenate([self.x, self.integrals])
         self._given = self._wanted
         return self._wanted.copy()
+
+    def linear_law(self) -> LinearLaw:
+        """For the compiled time loop: states are the estimate before the reading, and integrals."""
+        design, states = self.design, self.state_space
+        n, more = len(design.filter.A), len(self.integrals)
+        return LinearLaw(
+            *states,
+            E=np.vstack([-design.filter.B, np.zeros((more, len(self.outputs)))]),
+            first=np.vstack([design.start, np.zeros((more, len(self.inputs)))]),
+            waiting=(np.arange(n + more) >= n).astype(float),
+        )
 
     def limited(self, torques: Array) -> None:
         """Take note of the torques (motors,) that are given in place of those that were wanted."""

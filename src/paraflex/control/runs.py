@@ -63,9 +63,12 @@ class TorqueLog:
     Parameters
     ----------
     motors : int
+    start : float
+        Of the run [s].
     """
 
-    def __init__(self, motors: int) -> None:
+    def __init__(self, motors: int, start: float) -> None:
+        self._start = start
         self._times: list[float] = []
         self._torques: list[Array] = [np.zeros(motors)]
 
@@ -74,6 +77,10 @@ class TorqueLog:
         """Whether anything was given."""
         return bool(self._times)
 
+    def __len__(self) -> int:
+        """How often something was given."""
+        return len(self._times)
+
     def note(self, t: float, torques: Array) -> None:
         """Add torques (motors,) that act from a time on."""
         self._times.append(t)
@@ -81,7 +88,7 @@ class TorqueLog:
 
     def copy(self) -> TorqueLog:
         """The same so far, to go on from apart."""
-        other = TorqueLog(0)
+        other = TorqueLog(0, self._start)
         other._times, other._torques = self._times.copy(), self._torques.copy()
         return other
 
@@ -89,6 +96,6 @@ class TorqueLog:
         """Torques (k, motors) at times (k,), those before a change within a slack [s]; the first at the start."""
         changes = np.array(self._times)
         number = np.searchsorted(changes, times - slack, side="left")
-        if changes.size:
+        if changes.size and changes[0] <= self._start + slack:
             number = np.where(times <= changes[0] + slack, 1, number)
         return np.array(self._torques)[number]

@@ -13,6 +13,7 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.described import ControllerDescription
+from paraflex.control.inside import sampled_law
 from paraflex.control.loop import LawFailure, Loop
 from paraflex.control.readings import Readings
 from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
@@ -21,6 +22,7 @@ from paraflex.errors import ControllerError, InputError, IntegrationError, Momen
 from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, choose
 from paraflex.integrators.integrate import Integration, Kept
+from paraflex.kernel.sampled import SampledLaw
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
 from paraflex.mechanism.measured import encoders_of, measured_sensors
@@ -153,7 +155,7 @@ class Simulation:
         )  # fmt: skip
         self._loop: Loop | None = None
         self._held = np.zeros(len(own))
-        self._log = TorqueLog(len(own))
+        self._log = TorqueLog(len(own), self._initial.time)
         self._integration.start()
         self._fresh = self.save()
 
@@ -288,7 +290,7 @@ class Simulation:
         end = self.end if until is None else min(until, self.end)
         try:
             while self.time < end and not self.ended:
-                self._go_on(end)
+                self._go_on(end, on_progress)
                 if on_progress is not None:
                     on_progress(self.time)
         except KeyboardInterrupt:
@@ -304,11 +306,11 @@ class Simulation:
             warn_of(made.doubts, ResultWarning)
         return made
 
-    def _go_on(self, end: float) -> None:
+    def _go_on(self, end: float, on_progress: Callable[[float], None] | None) -> None:
         """To the next instant of the controllers, or to the end."""
         loop = self._loop
-        if loop is None:
-            self._march(end)
+        if loop is None or loop.inside is not None:
+            self._march(end, on_progress=on_progress)
             return
         slack = _SAME * loop.period
         if loop.next <= self.time + slack:
@@ -365,7 +367,19 @@ class Simulation:
         """Let these controllers act."""
         if loop is not self._loop and loop is not None:
             self._watched = self._readings.only(loop.read)
+            if loop.inside is None:
+                loop.inside = self._inside(loop)
         self._loop = loop
+        self._integration.under(None if loop is None else loop.inside)
+
+    def _inside(self, loop: Loop) -> SampledLaw | None:
+        """A loop for the compiled time loop; None where it stays outside."""
+        if loop.alone is None:
+            return None
+        controller, plant = loop.alone
+        own = [motor.name for motor in self.mechanism.motors]
+        outputs = [own.index(name) for name in plant.outputs]
+        return sampled_law(controller, plant, self._watched, outputs, self._base, len(own), self.end)
 
     def _plant(self, controller: Controller) -> Plant:
         outputs = tuple(controller.outputs) or self.motors
@@ -421,15 +435,30 @@ class Simulation:
             pieces = slice(start[k], start[k + 1] - 1)
             coefficients[pieces, 0] = self._base[pieces] + torque
 
-    def _march(self, until: float, slack: float | None = None) -> None:
+    def _march(
+        self, until: float, slack: float | None = None, on_progress: Callable[[float], None] | None = None
+    ) -> None:
         """March to a time, or to a stop of the run that is the same but for rounding."""
         stops = self._integration.run.problem.stops
         near = stops[int(np.argmin(np.abs(stops - until)))]
         if abs(near - until) <= (_SAME * (until - self.time) if slack is None else slack):
             until = float(near)
-        self._integration.march(until)
+        try:
+            self._integration.march(until, on_progress=on_progress)
+        finally:
+            self._note_inside()
+        if self._loop is not None and self._loop.failure is not None:
+            raise self._loop.failure
         if not (self._integration.goes_on or self.ended):
             self.result()
+
+    def _note_inside(self) -> None:
+        """Note which torques acted in the compiled time loop."""
+        if self._loop is None:
+            return
+        for t, torques in self._loop.torques_acted(len(self._log)):
+            self._log.note(t, torques)
+            self._held = torques
 
 
 def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, PointRef, in_frames
+
+if TYPE_CHECKING:
+    from paraflex.dynamics.sections import Sections
 
 
 @given_as("a system", "the system that dynamics.build_system makes")
@@ -91,6 +95,13 @@ class System:
     def index(self) -> dict[str, int]:
         """Index of each body by name."""
         return {body.name: i for i, body in enumerate(self.bodies)}
+
+    @cached_property
+    def sections(self) -> Sections | None:
+        """Stations of its flexible beams, at which loads and stresses are told; None without such beams."""
+        from paraflex.dynamics.sections import sections_of
+
+        return sections_of(self)
 
     @cached_property
     def row_terms(self) -> dict[str, list[RowTerm]]:

@@ -33,7 +33,8 @@ from paraflex.integrators.run import Instant, Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
 from paraflex.integrators.watch import Breakdown, bent_too_far, come_apart, least_norm
 from paraflex.kernel.packed import Signals
-from paraflex.kernel.run_state import ERROR_TEST, FINISHED, NO_CONVERGENCE, NOT_FINITE, PAUSED
+from paraflex.kernel.run_state import ERROR_TEST, FINISHED, LAW_FAILED, NO_CONVERGENCE, NOT_FINITE, PAUSED
+from paraflex.kernel.sampled import SampledLaw, no_law
 from paraflex.mechanism import AtEnd
 
 # Attempted steps between two looks: some milliseconds for a dozen bodies.
@@ -196,6 +197,11 @@ class Integration:
         """Find accelerations and multipliers once more, as something given has changed at this time."""
         native.own(self.run).resume()
 
+    def under(self, law: SampledLaw | None) -> None:
+        """Let a sampled law act from now on, in the time loop of own methods; None for none."""
+        run = native.own(self.run)
+        self.run = replace(run, law=no_law() if law is None else law)
+
     def march(self, until: float | None = None, *, on_progress: Callable[[float], None] | None = None) -> None:
         """Go on to a time [s], at which a step ends, or to the end; less far to an event, or where it cannot go on.
 
@@ -207,6 +213,10 @@ class Integration:
             self.status, self.message = "complete", ""
         while self._code == PAUSED and run.attempts < self._most:
             self._code, crossing = advance(run, self._functions, min(_SLICE, self._most - run.attempts))
+            if self._code == LAW_FAILED:
+                # Who gave the law says so; the run itself could go on.
+                self._code = FINISHED
+                return
             if crossing is not None:
                 self._functions, crossing = self._ends.pass_over(crossing, self._functions)
             if crossing is not None:

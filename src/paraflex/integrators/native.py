@@ -21,8 +21,6 @@ from paraflex.kernel.run_state import (
     BALANCE,
     BAUMGARTE,
     DPHI_MAX,
-    ENERGY_0,
-    FACTOR_B,
     FACTORS,
     FINISHED,
     GGL,
@@ -40,7 +38,6 @@ from paraflex.kernel.run_state import (
     STEPS,
     STOP,
     TIME,
-    WEIGHT_0,
     WORK,
     Controls,
     March,
@@ -48,9 +45,8 @@ from paraflex.kernel.run_state import (
     Tableau,
     make_march,
 )
+from paraflex.kernel.sampled import SampledLaw, no_law
 
-# What a jump leaves as it is.
-_KEPT = [ENERGY_0, WEIGHT_0, FACTOR_B]
 # How long a velocity error that Newton leaves is taken to last, as a fraction of the run: it must count for more
 # than its share of one step, since it is of one sign while a factor is in use.
 _NEWTON_MEMORY = 0.02
@@ -90,7 +86,7 @@ class NativeRun:
     samples: Samples
     # For first stages after a jump, so that the factor in the workspace stays.
     aside: Workspace
-    nothing: Samples
+    law: SampledLaw
 
     @property
     def dependent_rows(self) -> int:
@@ -118,22 +114,20 @@ class NativeRun:
 
     def start(self) -> None:
         """See `Run`."""
-        arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
-        start(*arguments, self.state, self.workspace, self.samples)
+        self._start(again=False)
 
     def march(self, attempts: int) -> int:
         """See `Run`."""
         jumps, now = self.problem.jumps, self.state.clock[TIME]
         # The last call may have ended there; until now the run had the values before the jump.
-        if np.any(jumps == now):
-            self.resume()
+        jumped = bool(np.any(jumps == now))
         stops = self.problem.stops
         ahead = jumps[(jumps > now) & (jumps < stops[-1])]
         if ahead.size:
             stops = stops[stops <= ahead[0]]
         given = (self.problem.system.packed, self.problem.signals_from(now))
         arguments = (*given, self.scheme, self.controls, stops, attempts)
-        code = march(*arguments, self.state, self.workspace, self.slow, self.samples)
+        code = march(*arguments, self.state, self.workspace, self.slow, self.samples, self.law, self.aside, jumped)
         return PAUSED if code == FINISHED and ahead.size else code
 
     @property
@@ -180,11 +174,11 @@ class NativeRun:
 
     def resume(self) -> None:
         """A first stage after a jump; energies and work continue."""
-        kept = self.state.clock[_KEPT]
+        self._start(again=True)
+
+    def _start(self, *, again: bool) -> None:
         arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
-        self.aside.redundant[:] = self.workspace.redundant
-        start(*arguments, self.state, self.aside, self.nothing)
-        self.state.clock[_KEPT] = kept
+        start(*arguments, self.state, self.workspace, self.aside, self.samples, again)
 
 
 def own(run: Run) -> NativeRun:
@@ -262,5 +256,5 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         slow=system.workspace(),
         samples=empty_samples(problem.times, system),
         aside=system.workspace(),
-        nothing=empty_samples(np.zeros(0), system),
+        law=no_law(),
     )

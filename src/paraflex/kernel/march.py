@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, sqrt
+from math import ceil, inf, sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
@@ -30,6 +30,7 @@ from paraflex.kernel.run_state import (
     HELD_END,
     LAST_ERROR,
     LAST_STEP,
+    LAW_FAILED,
     NEAR,
     PART,
     PART_END,
@@ -50,6 +51,7 @@ from paraflex.kernel.run_state import (
     WIDEST,
     WORK,
 )
+from paraflex.kernel.sampled import CHANGED, FAILED, SLACK, control, next_instant
 from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
@@ -182,9 +184,9 @@ def enter(system, signals, t, controls, march, work):
     first_stage(system, signals, t, controls, march, work)
 
 
-@kernel
-def start(system, signals, tableau, controls, march, work, out):
-    """First stage and first sample of a run."""
+@routine
+def begin(system, signals, controls, march, work):
+    """First stage of a run, or after a jump."""
     t = march.clock[TIME]
     first_stage(system, signals, t, controls, march, work)
     a, lam = march.stage_a[1, 0], march.stage_lam[0]
@@ -199,11 +201,37 @@ def start(system, signals, tableau, controls, march, work, out):
     march.clock[PART_END] = t
     march.clock[ROOT_RATE], march.counts[ROOT_STEP] = 0.0, -1
     march.power[0] = input_power(system, signals, t, march.q, march.v, lam, march.torques, work)
+    note_constraints(system, signals, t, march, work)
+
+
+@routine
+def resume(system, signals, controls, march, work, aside):
+    """First stage after a jump, its matrix in a workspace aside: the factor in use stays."""
+    factor = march.clock[FACTOR_B]
+    for r in range(work.redundant.size):
+        aside.redundant[r] = work.redundant[r]
+    begin(system, signals, controls, march, aside)
+    march.clock[FACTOR_B] = factor
+
+
+@kernel
+def start(system, signals, tableau, controls, march, work, aside, out, again):
+    """First stage and first sample of a run; or once more first stages, after a jump."""
+    if again:
+        resume(system, signals, controls, march, work, aside)
+    else:
+        start_run(system, signals, controls, march, work, out)
+
+
+@routine
+def start_run(system, signals, controls, march, work, out):
+    """First stage and first sample of a run."""
+    begin(system, signals, controls, march, work)
+    t, a, lam = march.clock[TIME], march.stage_a[1, 0], march.stage_lam[0]
     kinetic, strain = system_energy(system, march.q, march.v, work.scratch)
     strain += spring_energy(system, lam) + line_energy(system, march.q, march.v)[0]
     march.clock[ENERGY_0] = kinetic + strain
     march.clock[WEIGHT_0] = weight_work(system, march.q, work.scratch)
-    note_constraints(system, signals, t, march, work)
     if out.times.size > 0 and out.times[0] <= t:
         copy(march.q, out.q[0])
         copy(march.v, out.v[0])
@@ -260,22 +288,54 @@ def accept(system, signals, tableau, controls, t, h, march, work, out):
 
 
 @releases_lock
-def march(system, signals, tableau, controls, stops, max_steps, march, work, slow, out):
+def march(system, signals, tableau, controls, stops, max_steps, march, work, slow, out, law, aside, jumped):
     """Advance by up to max_steps attempted steps, ending steps exactly at each of the times in `stops`.
+
+    Under a sampled law steps end at its instants as well, and what is due at the start is done first. `jumped` says
+    that something given jumps at the start.
 
     Returns
     -------
     int
-        PAUSED, FINISHED, or why it cannot go on.
+        PAUSED, FINISHED, LAW_FAILED, or why it cannot go on.
     """
+    if law.counts.size == 0:
+        if jumped:
+            resume(system, signals, controls, march, work, aside)
+        return advance(system, signals, tableau, controls, stops, inf, 0.0, max_steps, march, work, slow, out)
+    most = march.counts[STEPS] + march.counts[REJECTED] + max_steps
+    while True:
+        t = march.clock[TIME]
+        done = control(law, signals, t, march.q, march.v, march.stage_a[1, 0])
+        if done == FAILED:
+            return LAW_FAILED
+        taken = march.counts[STEPS] + march.counts[REJECTED]
+        if done == CHANGED and taken == 0:
+            start_run(system, signals, controls, march, work, out)
+        elif done == CHANGED or jumped:
+            resume(system, signals, controls, march, work, aside)
+        jumped = False
+        pause = next_instant(law)
+        code = advance(
+            system, signals, tableau, controls, stops, pause, law.clock[SLACK], most - taken, march, work, slow, out
+        )  # fmt: skip
+        if code != FINISHED or march.clock[TIME] >= stops[stops.size - 1]:
+            return code
+
+
+@routine
+def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, march, work, slow, out):
+    """Advance to the last of the stops, or to a pause before it, or to a stop within a slack of that: see `march`."""
     exponent = 1.0 / tableau.order
     for _ in range(max_steps):
         t = march.clock[TIME]
         while march.counts[STOP] < stops.size and stops[march.counts[STOP]] <= t:
             march.counts[STOP] += 1
-        if march.counts[STOP] == stops.size:
+        if march.counts[STOP] == stops.size or t >= pause - slack:
             return FINISHED
         end, longest = stops[march.counts[STOP]], controls.fixed_step
+        if end > pause + slack:
+            end = pause
         if t < march.clock[PART_END]:
             end, longest = march.clock[PART_END], march.clock[PART]
         left = end - t

@@ -16,6 +16,8 @@ MOST_PASSAGES = 1000
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # Why `attempt` did so besides: the step comes near a singular position, and its start is to be prepared.
 ENTERS = 5
+# A sampled law gives torques that are not finite.
+LAW_FAILED = 6
 # March.clock
 TIME, STEP, WORK, FACTOR_B, CONTRACTION, ENERGY_0 = range(6)
 WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(6, 12)

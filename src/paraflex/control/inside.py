@@ -1,0 +1,220 @@
+"""Controllers within the compiled time loop: one that samples alone, with a linear law or a compiled function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import ceil
+from typing import Any
+
+import numpy as np
+import scipy
+from numba import cfunc, njit, types
+from numba.core.errors import NumbaError
+from numba.extending import is_jitted
+from numba.np.numpy_support import carray
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.control.chain import SampledController
+from paraflex.control.controllers import Plant
+from paraflex.control.linear_law import LinearLaw
+from paraflex.control.readings import Readings
+from paraflex.control.references import AtSamples
+from paraflex.control.together import SAME, whole_and_part
+from paraflex.errors import InputError
+from paraflex.kernel.arrays import apart
+from paraflex.kernel.sampled import SAMPLED, WRONG, SampledLaw
+
+_POINTER = types.CPointer(types.float64)
+_SIGNATURE = types.void(types.int64, types.float64, _POINTER, _POINTER, _POINTER)
+
+
+class CompiledLaw:
+    """A law of one's own that runs in the compiled time loop: a law for `SampledController`.
+
+    Parameters
+    ----------
+    function : callable
+        Of (k, t, y, x, torques), compiled by Numba, or such that Numba can compile it: from the errors y (inputs,) of
+        sample k at time t [s] and its states x (states,), zero at the start, it writes torques (outputs,) [N m, N] and
+        changes x.
+    states : int
+        Number of its states.
+
+    Raises
+    ------
+    InputError
+        No function, or a number of states below zero; as it starts, of a function that Numba cannot compile.
+    """
+
+    @checked_arguments()
+    def __init__(self, function: Callable[..., None], states: int = 0) -> None:
+        if not callable(function):
+            raise InputError("is no function", field="function", value=function,
+                             remedy="give one of (k, t, y, x, torques)")  # fmt: skip
+        if states < 0:
+            raise InputError("is negative", field="states", value=states, remedy="give the number of states, or none")
+        self._function: Any = function if is_jitted(function) else njit(function)
+        self.states: int = states
+        name = getattr(function, "__name__", "")
+        self.title: str = f"compiled {name if name.isidentifier() else 'function'}"
+        self._entry: Any = None
+
+    def start(self, plant: Plant) -> None:
+        """See `Controller`."""
+        self.x: Array = np.zeros(self.states)
+        self._torques = np.zeros(len(plant.outputs))
+        sizes = (len(plant.inputs), self.states, len(plant.outputs))
+        if self._entry is None or self._sizes != sizes:
+            self._sizes = sizes
+            self._entry = _entry(self._function, *sizes)
+
+    def step(self, k: int, t: float, y: Array) -> Array:
+        """See `Controller`."""
+        self._function(k, t, np.ascontiguousarray(y), self.x, self._torques)
+        return self._torques.copy()
+
+    @property
+    def address(self) -> int:
+        """Of its machine code, once it has started."""
+        return int(self._entry.address)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> CompiledLaw:
+        """A copy with its own states and the same function."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
+        other.x, other._torques = self.x.copy(), self._torques.copy()
+        return other
+
+
+def _entry(law: Any, inputs: int, states: int, outputs: int) -> Any:
+    """The function for C: numbers and pointers."""
+
+    def entry(k, t, y, x, torques):
+        law(k, t, carray(y, inputs), carray(x, states), carray(torques, outputs))
+
+    try:
+        return cfunc(_SIGNATURE)(entry)
+    except NumbaError as error:
+        cause = " ".join(str(error).split())[:200]
+        raise InputError(f"cannot be compiled: {cause}", field="law", value=law.__name__,
+                         remedy="write it as Numba takes functions, or give a law in Python") from None  # fmt: skip
+
+
+def sampled_law(
+    controller: Any, plant: Plant, readings: Readings, outputs: list[int], base: Array, motors: int, end: float
+) -> SampledLaw | None:
+    """A controller that has started, for the time loop; None of one that has to stay outside.
+
+    Parameters
+    ----------
+    controller : Controller
+    plant : Plant
+    readings : Readings
+        Of its inputs.
+    outputs : list of int
+        Its motors, by their numbers among all of the mechanism.
+    base : (breaks,) array
+        First coefficients of signals without its torques.
+    motors : int
+        Of the mechanism.
+    end : float
+        Of the run [s].
+    """
+    law: Any = getattr(controller, "law", None)
+    linear = _linear(law)
+    if type(controller) is not SampledController or len(readings.linear) < len(readings.names):
+        return None
+    if linear is None and type(law) is not CompiledLaw:
+        return None
+    inputs, start, period = len(plant.inputs), plant.state.time, plant.period
+    count = max(ceil((end - start) / period - SAME), 1)
+    filters = _filters(controller, inputs)
+    given = _law_arrays(linear, law, inputs, len(outputs))
+    states, kept = given["A"].shape[0], filters["filter_A"].shape[0]
+    whole, part = whole_and_part(plant.delay / period)
+    affine = readings.affine
+    lowest, highest = controller.bounds[0].T
+    address = 0 if linear is not None else law.address
+    projector = None if linear is None else linear.projector
+    arrays: dict[str, Any] = {
+        "clock": np.array([start, period, part, SAME * period]),
+        "counts": np.array([0, 0, whole, 0, address], np.int64),
+        "angle": affine.angle.astype(np.int64),
+        "value": affine.value, "rows_q": affine.q, "rows_v": affine.v, "rows_a": affine.a, "turning": affine.turning,
+        "resolution": controller.resolution,
+        "reference": _reference_table(controller, start + period * np.arange(float(count))),
+        "projector": np.zeros((0, 0, 0)) if projector is None else projector[_rows(count, len(projector))],
+        "lowest": lowest, "highest": highest, "most": controller.bounds[1] * period,
+        "outputs": np.array(outputs, np.int64), "base": base,
+        "filtered": np.zeros(kept), "x": np.zeros(states), "last": np.zeros(len(outputs)), "held": np.zeros(motors),
+        "scratch": np.zeros((2, max(kept, states, inputs, len(outputs)))),
+        "t": np.zeros(count), "acted": np.zeros(count), "readings": np.zeros((count, inputs)),
+        "wanted": np.zeros((count, len(outputs))), "given": np.zeros((count, len(outputs))),
+        **filters, **given,
+    }  # fmt: skip
+    return SampledLaw(**{name: _apart(array) for name, array in arrays.items()})
+
+
+def wrong_torques(law: SampledLaw) -> list[int]:
+    """Places among its outputs of torques that are not finite, where that ended a run."""
+    if not law.counts[WRONG]:
+        return []
+    return np.flatnonzero(~np.isfinite(law.wanted[law.counts[SAMPLED]])).tolist()
+
+
+def _linear(law: Any) -> LinearLaw | None:
+    """A law as a linear one, unless its steps are those of another class than its linear form."""
+    if not hasattr(law, "linear_law") or "step" in vars(law):
+        return None
+    owners = [next((each for each in type(law).__mro__ if name in vars(each)), None)
+              for name in ("linear_law", "step", "start", "limited")]  # fmt: skip
+    return law.linear_law() if len({each for each in owners if each is not None}) == 1 else None
+
+
+def _law_arrays(linear: LinearLaw | None, law: Any, inputs: int, outputs: int) -> dict[str, Array]:
+    if linear is None:
+        n, linear = law.states, LinearLaw(*(np.zeros((0, 0)) for _ in range(4)))
+    else:
+        n = len(linear.A)
+    shapes = {"A": (n, n), "B": (n, inputs), "C": (outputs, n), "D": (outputs, inputs), "E": (n, outputs),
+              "first": (n, inputs), "waiting": (n,)}  # fmt: skip
+    found = {name: getattr(linear, name) for name in shapes}
+    return {name: np.reshape(array, shapes[name]).astype(float) if array.size else np.zeros(shapes[name])
+            for name, array in found.items()}  # fmt: skip
+
+
+def _filters(controller: SampledController, inputs: int) -> dict[str, Array]:
+    """Matrices of all filters of readings together; none where there are no filters."""
+    several = controller.filter_models
+    if not any(several):
+        shapes = {"A": (0, 0), "B": (0, inputs), "C": (inputs, 0), "D": 0, "start": (0, inputs)}
+        return {f"filter_{name}": np.zeros(shape) for name, shape in shapes.items()}
+    passed = (np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.eye(1))
+    A, B, C, D = (scipy.linalg.block_diag(*matrices) for matrices in
+                  zip(*(each or passed for each in several), strict=True))  # fmt: skip
+    settled = np.linalg.solve(np.eye(len(A)) - A, B)
+    return {"filter_A": A, "filter_B": B, "filter_C": C, "filter_D": np.diag(D), "filter_start": settled}
+
+
+def _reference_table(controller: SampledController, times: Array) -> Array:
+    """References (samples, inputs) at times of samples."""
+    table = np.zeros((times.size, len(controller.found_references)))
+    for i, reference in enumerate(controller.found_references):
+        if isinstance(reference, AtSamples):
+            table[:, i] = reference.values[_rows(times.size, len(reference.values))]
+        elif reference is not None:
+            table[:, i] = [reference(float(t)) for t in times]
+    return table
+
+
+def _rows(count: int, there: int) -> np.ndarray:
+    """Numbers of rows for samples: the last goes on."""
+    return np.minimum(np.arange(count), there - 1)
+
+
+def _apart(array: np.ndarray) -> Any:
+    """A copy in memory of its own: see `kernel.arrays`."""
+    copy = apart(array.shape, array.dtype.type)
+    copy[...] = array
+    return copy

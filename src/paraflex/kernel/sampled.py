@@ -1,0 +1,249 @@
+"""A sampled controller in the time loop: its readings, a linear law with limits, torques held between instants.
+
+With readings y, quantised and filtered, errors e = y - r_k and states x the law is
+
+    w = P_k (C x + D e),   g = w within the limits,   x' = A x + B e + E (w - g),
+
+or a compiled function computes w from the errors and changes x. Torques g of sample k act (whole + part) periods later.
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from paraflex.kernel.compiling import by_reference, routine
+
+# SampledLaw.counts: number of the next sample, of the next torques to act, whole periods of delay, a motor whose
+# torque is not finite, 1 + its place; the address of a compiled function.
+SAMPLED, ACTED, WHOLE, WRONG, FUNCTION = range(5)
+# SampledLaw.clock: of the first sample, period [s]; part of a period of delay; instants closer than this are one [s].
+START, PERIOD, PART, SLACK = range(4)
+# What `control` did.
+NOTHING, CHANGED, FAILED = range(3)
+
+
+@by_reference
+class SampledLaw(NamedTuple):
+    """A controller, its state, and what it has done; without one all arrays are empty."""
+
+    clock: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    angle: NDArray[np.int64]  # (inputs,) readings, see `control.readings.Affine`
+    value: NDArray[np.float64]  # (inputs,)
+    rows_q: NDArray[np.float64]  # (inputs, n)
+    rows_v: NDArray[np.float64]
+    rows_a: NDArray[np.float64]
+    turning: NDArray[np.float64]
+    resolution: NDArray[np.float64]  # (inputs,) zero without
+    filter_A: NDArray[np.float64]  # (filters, filters) of all filters at once
+    filter_B: NDArray[np.float64]  # (filters, inputs)
+    filter_C: NDArray[np.float64]  # (inputs, filters)
+    filter_D: NDArray[np.float64]  # (inputs,)
+    filter_start: NDArray[np.float64]  # (filters, inputs) settled at first readings
+    reference: NDArray[np.float64]  # (samples, inputs)
+    A: NDArray[np.float64]  # (states, states)
+    B: NDArray[np.float64]  # (states, inputs)
+    C: NDArray[np.float64]  # (outputs, states)
+    D: NDArray[np.float64]  # (outputs, inputs)
+    E: NDArray[np.float64]  # (states, outputs)
+    first: NDArray[np.float64]  # (states, inputs) of first errors
+    waiting: NDArray[np.float64]  # (states,) one for those that stay as they are while a torque is limited
+    projector: NDArray[np.float64]  # (samples, outputs, outputs), or none
+    lowest: NDArray[np.float64]  # (outputs,)
+    highest: NDArray[np.float64]
+    most: NDArray[np.float64]  # (outputs,) largest change from sample to sample
+    outputs: NDArray[np.int64]  # (outputs,) number of each motor
+    base: NDArray[np.float64]  # (breaks,) first coefficients of the signals without torques that are given
+    filtered: NDArray[np.float64]  # (filters,) states of filters
+    x: NDArray[np.float64]  # (states,)
+    last: NDArray[np.float64]  # (outputs,) torques of the last sample
+    held: NDArray[np.float64]  # (motors,) those that act
+    scratch: NDArray[np.float64]  # (2, most of filters, states, inputs and outputs)
+    t: NDArray[np.float64]  # (samples,) times of samples, and from when on their torques acted
+    acted: NDArray[np.float64]
+    readings: NDArray[np.float64]  # (samples, inputs)
+    wanted: NDArray[np.float64]  # (samples, outputs)
+    given: NDArray[np.float64]
+
+
+def no_law() -> SampledLaw:
+    """None, for a run without a controller."""
+    none, rows, whole = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
+    readings = (whole, none, rows, rows, rows, rows, none)
+    filters, law = (rows, rows, rows, none, rows), (rows, rows, rows, rows, rows, rows, none, np.zeros((0, 0, 0)))
+    state, done = (none, none, none, none, rows), (none, none, rows, rows, rows)
+    return SampledLaw(none, whole, *readings, *filters, rows, *law, none, none, none, whole, none, *state, *done)
+
+
+def _function_called(typingctx, address, k, t, y, x, torques):
+    """Code that calls a function of C by its address, with numbers and pointers to data of vectors."""
+    signature = types.void(address, k, t, y, x, torques)
+
+    def code(context, builder, given, arguments):
+        number, real = ir.IntType(64), ir.DoubleType()
+        kind = ir.FunctionType(ir.VoidType(), [number, real, *3 * [real.as_pointer()]])
+        arrays = [
+            cgutils.create_struct_proxy(array)(context, builder, value=value).data
+            for array, value in zip(given.args[3:], arguments[3:], strict=True)
+        ]
+        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [arguments[1], arguments[2], *arrays])
+        return context.get_dummy_value()
+
+    return signature, code
+
+
+call_function: Any = intrinsic(_function_called)
+
+
+@routine
+def multiply_add(A, x, out):
+    """Add A x to a vector."""
+    for i in range(A.shape[0]):
+        total = 0.0
+        for j in range(A.shape[1]):
+            total += A[i, j] * x[j]
+        out[i] += total
+
+
+@routine
+def read(law, q, v, a, y):
+    """Readings (inputs,) at a state, quantised."""
+    for i in range(law.value.size):
+        total, turned = law.value[i], 0.0
+        for j in range(q.size):
+            total += law.rows_q[i, j] * q[j] + law.rows_v[i, j] * v[j] + law.rows_a[i, j] * a[j]
+            turned += law.turning[i, j] * q[j]
+        rate = v[law.angle[i]]
+        y[i] = total + rate * rate * turned
+        if law.resolution[i] > 0.0:
+            y[i] = law.resolution[i] * np.rint(y[i] / law.resolution[i])
+
+
+@routine
+def filter_readings(law, k, y):
+    """Readings as filters leave them; these go on to the next sample."""
+    before, after = law.filtered, law.scratch[1]
+    if k == 0:
+        for i in range(before.size):
+            before[i] = 0.0
+        multiply_add(law.filter_start, y, before)
+    for i in range(before.size):
+        after[i] = 0.0
+    multiply_add(law.filter_A, before, after)
+    multiply_add(law.filter_B, y, after)
+    for i in range(law.value.size):
+        y[i] *= law.filter_D[i]
+    multiply_add(law.filter_C, before, y)
+    for i in range(before.size):
+        before[i] = after[i]
+
+
+@routine
+def take_sample(law, k, q, v, a):
+    """Read, and compute the torques of sample k; whether they are finite."""
+    y, wanted, given = law.readings[k], law.wanted[k], law.given[k]
+    read(law, q, v, a, y)
+    if law.filter_D.size > 0:
+        filter_readings(law, k, y)
+    errors, x = law.scratch[0], law.x
+    for i in range(y.size):
+        errors[i] = y[i] - law.reference[k, i]
+    if law.counts[FUNCTION] != 0:
+        call_function(law.counts[FUNCTION], k, law.t[k], errors, x, wanted)
+    else:
+        if k == 0:
+            for i in range(x.size):
+                x[i] = 0.0
+            multiply_add(law.first, errors, x)
+        plain = law.scratch[1]
+        for i in range(wanted.size):
+            plain[i] = 0.0
+        multiply_add(law.C, x, plain)
+        multiply_add(law.D, errors, plain)
+        for i in range(wanted.size):
+            wanted[i] = plain[i]
+        if law.projector.size > 0:
+            for i in range(wanted.size):
+                wanted[i] = 0.0
+            multiply_add(law.projector[k], plain, wanted)
+    limited = False
+    for i in range(wanted.size):
+        if not isfinite(wanted[i]):
+            law.counts[WRONG] = 1 + i
+            return False
+        within = min(max(wanted[i], law.lowest[i]), law.highest[i])
+        given[i] = min(max(within, law.last[i] - law.most[i]), law.last[i] + law.most[i])
+        law.last[i] = given[i]
+        limited = limited or given[i] != wanted[i]
+    if law.counts[FUNCTION] == 0:
+        go_on_to_next(law, errors, wanted, given, limited)
+    return True
+
+
+@routine
+def go_on_to_next(law, errors, wanted, given, limited):
+    """States of a linear law at the next sample."""
+    x, after = law.x, law.scratch[1]
+    for i in range(x.size):
+        after[i] = 0.0
+    multiply_add(law.A, x, after)
+    multiply_add(law.B, errors, after)
+    if limited:
+        for i in range(x.size):
+            for j in range(given.size):
+                after[i] += law.E[i, j] * (wanted[j] - given[j])
+    for i in range(x.size):
+        if not (limited and law.waiting[i] == 1.0):
+            x[i] = after[i]
+
+
+@routine
+def next_instant(law):
+    """When it samples, or its torques act, next."""
+    clock, counts = law.clock, law.counts
+    sample = clock[START] + counts[SAMPLED] * clock[PERIOD] if counts[SAMPLED] < law.t.size else inf
+    if counts[ACTED] == counts[SAMPLED]:
+        return sample
+    return min(sample, clock[START] + (counts[ACTED] + counts[WHOLE] + clock[PART]) * clock[PERIOD])
+
+
+@routine
+def control(law, signals, t, q, v, a):
+    """Do what is due at a time: take a sample, and let torques act.
+
+    Returns
+    -------
+    int
+        NOTHING, CHANGED where torques are others from now on, or FAILED.
+    """
+    clock, counts = law.clock, law.counts
+    now = t + clock[SLACK]
+    k = counts[SAMPLED]
+    if clock[START] + k * clock[PERIOD] <= now and k < law.t.size:
+        law.t[k] = clock[START] + k * clock[PERIOD]
+        if not take_sample(law, k, q, v, a):
+            return FAILED
+        counts[SAMPLED] += 1
+    k = counts[ACTED]
+    if k == counts[SAMPLED] or clock[START] + (k + counts[WHOLE] + clock[PART]) * clock[PERIOD] > now:
+        return NOTHING
+    law.acted[k] = t
+    counts[ACTED] += 1
+    changed = False
+    for i in range(law.outputs.size):
+        changed = changed or law.held[law.outputs[i]] != law.given[k, i]
+        law.held[law.outputs[i]] = law.given[k, i]
+    if not changed:
+        return NOTHING
+    for i in range(law.held.size):
+        for piece in range(signals.start[i], signals.start[i + 1] - 1):
+            signals.coefficients[piece, 0] = law.base[piece] + law.held[i]
+    return CHANGED
