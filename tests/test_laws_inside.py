@@ -111,11 +111,16 @@ def test_redundant_motors_with_projection_and_gauges(task):
     for law, more in (
         (JointPID(0.02, 1e-5, 0.1), {}),
         (RateFeedback({"tau1": {gauge: 1e-5}}), {"reference": None}),
+        (
+            DiscreteModel(*(np.zeros(shape) for shape in ((0, 0), (0, 2), (1, 0))), np.array([[0.3, -0.2]]), T, (), ()),
+            {"inputs": ["x", "y"], "outputs": ["tau5"], "reference": "plan"},
+        ),
     ):
         runs = []
         for kind in (SampledController, Outside):
             sim = Simulation(task, mode="++++", feed_forward=True, options=pf.IntegrationOptions(step=T))
             runs.append(sim.run(kind(law, period=T, delay=T, limits=2e-3, **more), warning=False))
+            assert (sim._loop.inside is not None) is (kind is SampledController)
         a, b = runs
         np.testing.assert_allclose(a.controllers[0].wanted, b.controllers[0].wanted, rtol=1e-6, atol=1e-10)
         np.testing.assert_allclose(a.solution.q, b.solution.q, rtol=1e-9, atol=1e-12)

@@ -123,7 +123,7 @@ def sampled_law(
     """
     law: Any = getattr(controller, "law", None)
     linear = _linear(law)
-    if type(controller) is not SampledController or len(readings.linear) < len(readings.names):
+    if type(controller) is not SampledController or not readings.simple:
         return None
     if linear is None and type(law) is not CompiledLaw:
         return None
@@ -133,15 +133,12 @@ def sampled_law(
     given = _law_arrays(linear, law, inputs, len(outputs))
     states, kept = given["A"].shape[0], filters["filter_A"].shape[0]
     whole, part = whole_and_part(plant.delay / period)
-    affine = readings.affine
     lowest, highest = controller.bounds[0].T
     address = 0 if linear is not None else law.address
     projector = None if linear is None else linear.projector
     arrays: dict[str, Any] = {
         "clock": np.array([start, period, part, SAME * period]),
         "counts": np.array([0, 0, whole, 0, address], np.int64),
-        "angle": affine.angle.astype(np.int64),
-        "value": affine.value, "rows_q": affine.q, "rows_v": affine.v, "rows_a": affine.a, "turning": affine.turning,
         "resolution": controller.resolution,
         "reference": _reference_table(controller, start + period * np.arange(float(count))),
         "projector": np.zeros((0, 0, 0)) if projector is None else projector[_rows(count, len(projector))],
@@ -151,7 +148,7 @@ def sampled_law(
         "scratch": np.zeros((2, max(kept, states, inputs, len(outputs)))),
         "t": np.zeros(count), "acted": np.zeros(count), "readings": np.zeros((count, inputs)),
         "wanted": np.zeros((count, len(outputs))), "given": np.zeros((count, len(outputs))),
-        **filters, **given,
+        **_read(readings), **filters, **given,
     }  # fmt: skip
     return SampledLaw(**{name: _apart(array) for name, array in arrays.items()})
 
@@ -182,6 +179,24 @@ def _law_arrays(linear: LinearLaw | None, law: Any, inputs: int, outputs: int) -
     found = {name: getattr(linear, name) for name in shapes}
     return {name: np.reshape(array, shapes[name]).astype(float) if array.size else np.zeros(shapes[name])
             for name, array in found.items()}  # fmt: skip
+
+
+def _read(readings: Readings) -> dict[str, np.ndarray]:
+    """Rows of readings that are linear, zero of others, and places."""
+    linear, count = readings.affine, len(readings.names)
+    given = {"value": linear.value, "rows_q": linear.q, "rows_v": linear.v, "rows_a": linear.a,
+             "turning": linear.turning, "angle": linear.angle.astype(np.int64)}  # fmt: skip
+    found: dict[str, np.ndarray] = {}
+    for name, rows in given.items():
+        found[name] = np.zeros((count, *rows.shape[1:]), rows.dtype)
+        found[name][readings.linear] = rows
+    numbers = [np.concatenate([one.axis, one.x0, one.N.ravel(), one.B.ravel()]) for one in readings.places]
+    found["points"] = np.array([[one.sensor, one.offset, one.angle, one.first, len(one.B)] for one in readings.places],
+                               np.int64).reshape(len(numbers), 5)  # fmt: skip
+    found["shapes"] = np.zeros((len(numbers), max((row.size for row in numbers), default=0)))
+    for place, row in zip(found["shapes"], numbers, strict=True):
+        place[: row.size] = row
+    return found
 
 
 def _filters(controller: SampledController, inputs: int) -> dict[str, Array]:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System
+from paraflex.dynamics.coordinates import GROUND_INDEX
 from paraflex.dynamics.sensors import SensorReader, sensor_rows
 from paraflex.integrators.run import Instant
-from paraflex.mechanism import Encoder, JointForceSensor, Sensor, StrainGauge, Tachometer
+from paraflex.mechanism import GROUND, Encoder, JointForceSensor, PositionSensor, Sensor, StrainGauge, Tachometer
 
 # A reading is taken for a product with constant rows where it agrees to this part at random states.
 _SAME = 1e-9
@@ -41,11 +43,46 @@ class Affine(NamedTuple):
         return self.value + self.q @ q + self.v @ v + self.a @ a + v[self.angle] ** 2 * (self.turning @ q)
 
 
+class Place(NamedTuple):
+    """Place of a material point along an axis of the ground, e . (r + R (x0 + N u - (u . B u / 2, 0))).
+
+    Attributes
+    ----------
+    sensor : int
+        Its number.
+    offset, angle, first : int
+        Where r (2,), the angle of R and u (nf,) begin among the coordinates.
+    axis : (2,) array
+        e.
+    x0 : (2,) array
+    N : (2, nf) array
+    B : (nf, nf) array
+    """
+
+    sensor: int
+    offset: int
+    angle: int
+    first: int
+    axis: Array
+    x0: Array
+    N: Array
+    B: Array
+
+    def at(self, q: Array) -> float:
+        """The reading at coordinates (n,) [m]."""
+        u = q[self.first : self.first + len(self.B)]
+        x, y = self.x0 + self.N @ u
+        x -= 0.5 * float(u @ self.B @ u)
+        c, s = cos(q[self.angle]), sin(q[self.angle])
+        ex, ey = self.axis
+        return float(ex * (q[self.offset] + c * x - s * y) + ey * (q[self.offset + 1] + s * x + c * y))
+
+
 class Readings:
     """Readings of some sensors of a system, one instant after another.
 
     Angles, their rates and strains are linear in coordinates, velocities and accelerations, but for what the turning of
-    a beam adds to its strain; others are read one by one.
+    a beam adds to its strain; places of points are read as they are, others one by one.
 
     Parameters
     ----------
@@ -71,9 +108,17 @@ class Readings:
         self._found = found
         self.linear: list[int] = [k for k, one in enumerate(found) if one is not None]
         self.affine: Affine = _stacked([one for one in found if one is not None], system.n)
-        self._others: list[int] = [k for k, one in enumerate(found) if one is None]
+        several = [_place(system, sensor, k) for k, sensor in enumerate(sensors)]
+        self.places: list[Place] = [place for place in several if place is not None]
+        apart = {*self.linear, *(place.sensor for place in self.places)}
+        self._others: list[int] = [k for k in range(len(sensors)) if k not in apart]
         self.of_torques: bool = any(isinstance(self.sensors[k], JointForceSensor) for k in self._others)
         self._reader = SensorReader(system, [self.sensors[k] for k in self._others])
+
+    @property
+    def simple(self) -> bool:
+        """Whether all are linear or places."""
+        return not self._others
 
     def only(self, names: Sequence[str]) -> Readings:
         """Readings of some of the sensors."""
@@ -84,10 +129,25 @@ class Readings:
         """Readings (sensors,) at an instant, under torques (motors,)."""
         found = np.empty(len(self.sensors))
         found[self.linear] = self.affine.at(now.q, now.v, now.a)
+        for place in self.places:
+            found[place.sensor] = place.at(now.q)
         if self._others:
             given = (now.q[None], now.v[None], now.a[None], now.multipliers[None], torques[None])
             found[self._others] = self._reader(*given)[0]
         return found
+
+
+def _place(system: System, sensor: Sensor, number: int) -> Place | None:
+    """A sensor as the place of a point of a body along an axis of the ground; None where it is none."""
+    if not isinstance(sensor, PositionSensor) or sensor.body != GROUND:
+        return None
+    marker = system.marker(sensor.point)
+    if marker.body == GROUND_INDEX:
+        return None
+    body = system.bodies[marker.body]
+    bending = np.zeros((body.nf, body.nf)) if marker.bending is None else marker.bending
+    axis = np.array(sensor.direction, dtype=float)
+    return Place(number, body.offset, body.angle, body.flexible.start, axis, marker.x0, marker.N, bending)
 
 
 def _affine(system: System, sensor: Sensor) -> Affine | None:

@@ -87,6 +87,11 @@ class System:
         """Unit of each constraint row (m,): the size for lengths, 1 for angles."""
         return np.real(self.packed.rows["unit"]).astype(float)
 
+    @cached_property
+    def least_row_unit(self) -> float:
+        """The least of `row_units`."""
+        return float(np.min(self.row_units, initial=1.0))
+
     def gap(self, phi: Array) -> float:
         """The largest violation among constraint rows (m,), lengths in sizes of the mechanism, angles in rad."""
         return float(np.max(np.abs(phi) / self.row_units, initial=0.0))

@@ -194,7 +194,7 @@ class Integration:
         self.run.start()
 
     def resume(self) -> None:
-        """Find accelerations and multipliers once more, as something given has changed at this time."""
+        """Let the next step find accelerations and multipliers anew, as something given changes at this time."""
         native.own(self.run).resume()
 
     def under(self, law: SampledLaw | None) -> None:
@@ -279,7 +279,8 @@ class Integration:
         if self._code == FINISHED and run.attempts < self._looked + _SLICE and now.t < problem.times[-1]:
             return False
         self._looked = run.attempts
-        limits = (run.dependent_rows, options.tolerance, options.treatment)
+        largest = run.figures().constraint_position_max
+        limits = (run.dependent_rows, options.tolerance, options.treatment, largest)
         bent = bent_too_far(self._system, now.q)
         drift = come_apart(self._system, problem.signals, now.t, now.q, *limits)
         self._broken, self._drifts = bent or drift, drift is not None and bent is None

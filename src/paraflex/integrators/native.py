@@ -25,6 +25,7 @@ from paraflex.kernel.run_state import (
     FINISHED,
     GGL,
     ITERATIONS,
+    JUMPED,
     PASSAGES,
     PAUSED,
     PHI_MAX,
@@ -114,20 +115,22 @@ class NativeRun:
 
     def start(self) -> None:
         """See `Run`."""
-        self._start(again=False)
+        arguments = (self.problem.system.packed, self.problem.signals, self.controls)
+        start(*arguments, self.state, self.workspace, self.samples)
 
     def march(self, attempts: int) -> int:
         """See `Run`."""
         jumps, now = self.problem.jumps, self.state.clock[TIME]
         # The last call may have ended there; until now the run had the values before the jump.
-        jumped = bool(np.any(jumps == now))
+        if np.any(jumps == now):
+            self.resume()
         stops = self.problem.stops
         ahead = jumps[(jumps > now) & (jumps < stops[-1])]
         if ahead.size:
             stops = stops[stops <= ahead[0]]
         given = (self.problem.system.packed, self.problem.signals_from(now))
         arguments = (*given, self.scheme, self.controls, stops, attempts)
-        code = march(*arguments, self.state, self.workspace, self.slow, self.samples, self.law, self.aside, jumped)
+        code = march(*arguments, self.state, self.workspace, self.slow, self.samples, self.law, self.aside)
         return PAUSED if code == FINISHED and ahead.size else code
 
     @property
@@ -173,12 +176,8 @@ class NativeRun:
         return tuple(_arrays((self.state, self.workspace, self.slow, self.samples)))
 
     def resume(self) -> None:
-        """A first stage after a jump; energies and work continue."""
-        self._start(again=True)
-
-    def _start(self, *, again: bool) -> None:
-        arguments = (self.problem.system.packed, self.problem.signals, self.scheme, self.controls)
-        start(*arguments, self.state, self.workspace, self.aside, self.samples, again)
+        """Let the next step begin with a first stage, after a jump; energies and work continue."""
+        self.state.counts[JUMPED] = 1
 
 
 def own(run: Run) -> NativeRun:

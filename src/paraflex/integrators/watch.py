@@ -50,6 +50,7 @@ def come_apart(
     dependent: int,
     tolerance: float,
     treatment: Treatment,
+    largest: float,
 ) -> Breakdown | None:
     """The constraints violated by more than errors of integration explain, and by how much; None if there are none.
 
@@ -66,9 +67,14 @@ def come_apart(
         Of the run [m]; what it allows is no fault.
     treatment : Treatment
         What keeps the constraints in the run.
+    largest : float
+        Largest violation in the run so far [m, rad].
     """
+    allowed = max(_CONTRADICTION if dependent else _GAPS, tolerance / system.size)
+    if largest <= allowed * system.least_row_unit:
+        return None
     phi, _ = system.constraints(signals, t, q)
-    if not system.gap(phi) > max(_CONTRADICTION if dependent else _GAPS, tolerance / system.size):
+    if not system.gap(phi) > allowed:
         return None
     if dependent:
         return Breakdown(contradiction(system, phi, dependence(system, q, count=dependent), "positions"), AGREE)

@@ -28,6 +28,7 @@ from paraflex.kernel.run_state import (
     FAILURES,
     FINISHED,
     HELD_END,
+    JUMPED,
     LAST_ERROR,
     LAST_STEP,
     LAW_FAILED,
@@ -188,6 +189,7 @@ def enter(system, signals, t, controls, march, work):
 def begin(system, signals, controls, march, work):
     """First stage of a run, or after a jump."""
     t = march.clock[TIME]
+    march.counts[JUMPED] = 0
     first_stage(system, signals, t, controls, march, work)
     a, lam = march.stage_a[1, 0], march.stage_lam[0]
     # No starting guess reaches across a jump: what was before does not count as another time.
@@ -215,12 +217,9 @@ def resume(system, signals, controls, march, work, aside):
 
 
 @kernel
-def start(system, signals, tableau, controls, march, work, aside, out, again):
-    """First stage and first sample of a run; or once more first stages, after a jump."""
-    if again:
-        resume(system, signals, controls, march, work, aside)
-    else:
-        start_run(system, signals, controls, march, work, out)
+def start(system, signals, controls, march, work, out):
+    """First stage and first sample of a run."""
+    start_run(system, signals, controls, march, work, out)
 
 
 @routine
@@ -288,11 +287,10 @@ def accept(system, signals, tableau, controls, t, h, march, work, out):
 
 
 @releases_lock
-def march(system, signals, tableau, controls, stops, max_steps, march, work, slow, out, law, aside, jumped):
+def march(system, signals, tableau, controls, stops, max_steps, march, work, slow, out, law, aside):
     """Advance by up to max_steps attempted steps, ending steps exactly at each of the times in `stops`.
 
-    Under a sampled law steps end at its instants as well, and what is due at the start is done first. `jumped` says
-    that something given jumps at the start.
+    Under a sampled law steps end at its instants as well, and what is due at the start is done first.
 
     Returns
     -------
@@ -300,7 +298,7 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
         PAUSED, FINISHED, LAW_FAILED, or why it cannot go on.
     """
     if law.counts.size == 0:
-        if jumped:
+        if march.counts[JUMPED] == 1:
             resume(system, signals, controls, march, work, aside)
         return advance(system, signals, tableau, controls, stops, inf, 0.0, max_steps, march, work, slow, out)
     most = march.counts[STEPS] + march.counts[REJECTED] + max_steps
@@ -312,9 +310,8 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
         taken = march.counts[STEPS] + march.counts[REJECTED]
         if done == CHANGED and taken == 0:
             start_run(system, signals, controls, march, work, out)
-        elif done == CHANGED or jumped:
+        elif done == CHANGED or march.counts[JUMPED] == 1:
             resume(system, signals, controls, march, work, aside)
-        jumped = False
         pause = next_instant(law)
         code = advance(
             system, signals, tableau, controls, stops, pause, law.clock[SLACK], most - taken, march, work, slow, out

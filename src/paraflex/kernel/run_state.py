@@ -43,6 +43,8 @@ ROOT_STEP = 13
 PREPARED = 14
 # Whether rows were not trusted at the end of the last step attempted, and of the last one taken.
 HELD_END, DRIFTED = 15, 16
+# Whether something given jumps at the time reached: first stages are found once more before the next step.
+JUMPED = 17
 
 
 # What keeps the constraints, as integers for kernels; index 3 is POSITION.
@@ -136,7 +138,7 @@ def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGA
     stage_v = apart((stages, n))
     return March(
         clock=apart(19),
-        counts=apart(17, np.int64),
+        counts=apart(18, np.int64),
         q=apart(n),
         v=apart(n),
         stage_t=apart((2, stages)),

@@ -9,7 +9,7 @@ or a compiled function computes w from the errors and changes x. Torques g of sa
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import cos, inf, isfinite, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,6 +42,8 @@ class SampledLaw(NamedTuple):
     rows_v: NDArray[np.float64]
     rows_a: NDArray[np.float64]
     turning: NDArray[np.float64]
+    points: NDArray[np.int64]  # (places, 5) reading, then where r, angle and u begin, and size of u: see `Place`
+    shapes: NDArray[np.float64]  # (places, numbers) e, x0, N and B
     resolution: NDArray[np.float64]  # (inputs,) zero without
     filter_A: NDArray[np.float64]  # (filters, filters) of all filters at once
     filter_B: NDArray[np.float64]  # (filters, inputs)
@@ -77,7 +79,7 @@ class SampledLaw(NamedTuple):
 def no_law() -> SampledLaw:
     """None, for a run without a controller."""
     none, rows, whole = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
-    readings = (whole, none, rows, rows, rows, rows, none)
+    readings = (whole, none, rows, rows, rows, rows, np.zeros((0, 5), np.int64), rows, none)
     filters, law = (rows, rows, rows, none, rows), (rows, rows, rows, rows, rows, rows, none, np.zeros((0, 0, 0)))
     state, done = (none, none, none, none, rows), (none, none, rows, rows, rows)
     return SampledLaw(none, whole, *readings, *filters, rows, *law, none, none, none, whole, none, *state, *done)
@@ -123,8 +125,26 @@ def read(law, q, v, a, y):
             turned += law.turning[i, j] * q[j]
         rate = v[law.angle[i]]
         y[i] = total + rate * rate * turned
+    for p in range(law.points.shape[0]):
+        y[law.points[p, 0]] = place_of(law, p, q)
+    for i in range(law.value.size):
         if law.resolution[i] > 0.0:
             y[i] = law.resolution[i] * np.rint(y[i] / law.resolution[i])
+
+
+@routine
+def place_of(law, p, q):
+    """Place of a point along an axis: see `control.readings.Place`."""
+    offset, angle, first, nf, numbers = law.points[p, 1], law.points[p, 2], law.points[p, 3], law.points[p, 4], 4
+    x, y, bent = law.shapes[p, 2], law.shapes[p, 3], 0.0
+    for i in range(nf):
+        x += law.shapes[p, numbers + i] * q[first + i]
+        y += law.shapes[p, numbers + nf + i] * q[first + i]
+        for j in range(nf):
+            bent += q[first + i] * law.shapes[p, numbers + 2 * nf + i * nf + j] * q[first + j]
+    x -= 0.5 * bent
+    c, s = cos(q[angle]), sin(q[angle])
+    return law.shapes[p, 0] * (q[offset] + c * x - s * y) + law.shapes[p, 1] * (q[offset + 1] + s * x + c * y)
 
 
 @routine
