@@ -40,7 +40,7 @@ import documented  # noqa: E402
         ("learning.md", 4),
         ("statics.md", 3),
         ("flexures.md", 6),
-        ("control.md", 3),
+        ("control.md", 4),
     ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):

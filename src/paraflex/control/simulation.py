@@ -20,7 +20,7 @@ from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLo
 from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
 from paraflex.findings import warn_of
-from paraflex.integrators import IntegrationOptions, Method, Solution, choose
+from paraflex.integrators import IntegrationOptions, Method, Solution, Treatment, choose
 from paraflex.integrators.integrate import Integration, Kept
 from paraflex.kernel.sampled import SampledLaw
 from paraflex.kinematics import ModelWithPaths
@@ -83,6 +83,8 @@ class Simulation:
     method : Method or str, optional
         One of paraflex's own.
     options : IntegrationOptions, optional
+        With a fixed `step` constraints are kept by projection, where the method can, unless `constraints` says
+        otherwise: torques that jump let joints come apart faster than Baumgarte's coefficients bring them together.
 
     Attributes
     ----------
@@ -119,7 +121,7 @@ class Simulation:
         method: Method | str | None = None,
         options: IntegrationOptions | None = None,
     ) -> None:
-        self._options = choose(method, options)
+        self._options = _projecting(choose(method, options))
         self.task: TrackingTask | None = source if isinstance(source, TrackingTask) else None
         self.mechanism: Mechanism = source.mechanism if isinstance(source, TrackingTask) else Mechanism.made_of(source)
         self.mode: ActuationMode = _mode(self.mechanism, mode)
@@ -459,6 +461,13 @@ class Simulation:
         for t, torques in self._loop.torques_acted(len(self._log)):
             self._log.note(t, torques)
             self._held = torques
+
+
+def _projecting(options: IntegrationOptions) -> IntegrationOptions:
+    """Options of which constraints are kept by projection with fixed steps, which no error control shortens."""
+    chosen = options.constraints is not None or options.automatic_gains or options.step is None
+    able = Treatment.PROJECTION in options.method.treatments
+    return replace(options, constraints=Treatment.PROJECTION) if able and not chosen else options
 
 
 def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
