@@ -127,13 +127,13 @@ def test_closed_loop(run):
     assert learned["as designed"][0] < 0.003
     assert learned["20 % more payload"][0] > 1.0
     assert fed_back["as designed"][0] < 0.006
-    assert fed_back["20 % more payload"][0] < 0.14
-    for name, (_, vibration) in fed_back.items():
-        assert vibration < 0.1 * rigid[name][1], name  # 20 dB
+    assert fed_back["20 % more payload"][0] < 0.083  # 0.1 is asked for
+    assert fed_back["20 % more payload"][1] < 0.034 * rigid["20 % more payload"][1]  # 29 dB
+    assert fed_back["as designed"][1] < 0.07 * rigid["as designed"][1]  # 23 dB
     assert f"{fed_back['20 % more payload'][0]:.4f}, {fed_back['20 % more payload'][1]:.4f}" in printed
-    assert robust["radius"] < 0.9932
-    assert robust["gain"] == pytest.approx(1.385, abs=2e-3)
-    assert robust["delay"] == pytest.approx(1.986, abs=2e-3)
+    assert robust["radius"] < 0.9953
+    assert robust["gain"] == pytest.approx(2.857, abs=2e-3)
+    assert robust["delay"] == pytest.approx(2.468, abs=2e-3)
     # Steps of 1 ms are fine enough for that: error control agrees.
     task = pf.plan(example.manipulator(0.12), pf.load("raparm_i").paths["square"], duration=0.7)
     planned = pf.plan(example.manipulator(0.1), task.path, duration=0.7)
