@@ -122,7 +122,7 @@ def largest_radius(task, design, damping, payloads=(0.0, 0.12, 0.2, 0.5)):
 def least_margins(task, design):
     """Gain margin and delay margin [samples] of the weakest motor at the start."""
     rows = pf.margins(pf.linearise(task, mode=MODE, at=0.0), design).to_frame()
-    return float(rows["gain_up"].min()), float(rows["samples"].min())
+    return float(np.min(rows["gain_up"].to_numpy())), float(np.min(rows["samples"].to_numpy()))
 
 
 def feedback(design, read):
