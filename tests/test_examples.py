@@ -118,24 +118,41 @@ def test_second_order_spin_up(run):
 
 def test_closed_loop(run):
     """What feedback is there for: a payload that learning did not know of. Errors and vibrations in mm."""
-    example, (found, robust), printed = run("closed_loop")
-    rigid, learned, fed_back = (
-        {name: found[law, name] for name in ("as designed", "20 % more payload")}
-        for law in ("rigid torques", "learned torques", "learned and LQG")
-    )
-    assert rigid["as designed"][0] > 0.6
-    assert learned["as designed"][0] < 0.003
-    assert learned["20 % more payload"][0] > 1.0
-    assert fed_back["as designed"][0] < 0.006
-    assert fed_back["20 % more payload"][0] < 0.14
-    for name, (_, vibration) in fed_back.items():
-        assert vibration < 0.1 * rigid[name][1], name  # 20 dB
-    assert f"{fed_back['20 % more payload'][0]:.4f}, {fed_back['20 % more payload'][1]:.4f}" in printed
-    assert robust["radius"] < 0.9932
-    assert robust["gain"] == pytest.approx(1.385, abs=2e-3)
-    assert robust["delay"] == pytest.approx(1.986, abs=2e-3)
-    # Steps of 1 ms are fine enough for that: error control agrees.
+    example, every, printed = run("closed_loop")
+    # Learned, fed back, with 20 % more payload (0.1 is asked for); vibration: 29 and 28 dB.
+    limits = {0.01: (0.003, 0.006, 0.083, 0.034), 0.0: (0.007, 0.009, 0.083, 0.037)}
+    for damping, (found, radius, _, _) in every.items():
+        exactly, closely, heavily, quietly = limits[damping]
+        rigid, learned, fed_back = (
+            {name: found[law, name] for name in ("as designed", "20 % more payload")}
+            for law in ("rigid torques", "learned torques", "learned and LQG")
+        )
+        assert rigid["as designed"][0] > 0.6
+        assert learned["as designed"][0] < exactly
+        assert learned["20 % more payload"][0] > 1.0
+        assert fed_back["as designed"][0] < closely
+        assert fed_back["20 % more payload"][0] < heavily
+        assert fed_back["20 % more payload"][1] < quietly * rigid["20 % more payload"][1]
+        assert fed_back["as designed"][1] < 0.076 * rigid["as designed"][1]  # 22 dB
+        assert f"{fed_back['20 % more payload'][0]:.4f}, {fed_back['20 % more payload'][1]:.4f}" in printed
+        assert f"{radius:.4f}" in printed
+        # Without damping some vibration beyond 1 kHz grows slowly in some poses.
+        assert radius < 0.9953 if damping else 1.0 < radius < 1.0009
+    gain, delay = example.least_margins(*every[0.01][2:])
+    assert gain == pytest.approx(2.857, abs=2e-3)
+    assert delay == pytest.approx(2.468, abs=2e-3)
+    # Steps of 1 ms are fine enough for damped links: error control agrees.
     task = pf.plan(example.manipulator(0.12), pf.load("raparm_i").paths["square"], duration=0.7)
     planned = pf.plan(example.manipulator(0.1), task.path, duration=0.7)
     finely = planned.remodelled(task.mechanism).simulate("++++", method="esdirk4")
-    assert example.figures(finely)[0] == pytest.approx(rigid["20 % more payload"][0], rel=2e-3)
+    rigid = every[0.01].found["rigid torques", "20 % more payload"]
+    assert example.figures(finely)[0] == pytest.approx(rigid[0], rel=2e-3)
+
+
+@pytest.mark.parametrize(("damping", "states", "stable"), [(5e-4, 44, False), (1e-3, 44, True), (2e-4, 100, True)])
+def test_closed_loop_with_little_damping(damping, states, stable):
+    """How little suffices in every pose and with 0 to 0.5 kg depends on how many vibrations the design knows."""
+    example = load_example("closed_loop")
+    task = pf.plan(example.manipulator(0.1, damping), pf.load("raparm_i").paths["square"], duration=0.7)
+    radius = example.largest_radius(task, example.design_of(task, states), damping)
+    assert (radius < 1.0) == stable

@@ -11,6 +11,7 @@ import scipy
 
 import paraflex as pf
 from paraflex.control.chain import SampledController
+from paraflex.control.coloured import disturbed_plant
 from paraflex.control.controllers import Plant
 from paraflex.control.estimators import kalman_filter, riccati
 from paraflex.errors import InputError
@@ -293,6 +294,10 @@ TWO = scipy.linalg.block_diag(oscillator()[0], oscillator(47.0, 0.0)[0])
         ({"state_weights": -np.eye(4)}, "state_weights", "semi"),
         ({"measured": ["y2"]}, "measured", "free motion"), ({"delay": -1.0}, "delay", "negative"),
         ({"deviations": {"y2": 0.1}, "state_weights": None}, "deviations", "best"),
+        ({"coloured": {"u7": (1.0, 1.0)}}, "coloured", "unknown"), ({"coloured": {"u1": 1.0}}, "coloured.u1", "pair"),
+        ({"coloured": {"u1": (-1.0, 1.0)}}, "coloured.u1", "positive"),
+        ({"coloured": {"u1": (1.0, -1.0)}}, "coloured.u1", "positive"),
+        ({"coloured": {"u1": (1.0, ([1.0], [1.0, 0.0]))}}, "coloured.u1", "not stable"),
     ],
 )  # fmt: skip
 def test_designs_that_make_no_sense(changes, field, said):
@@ -315,6 +320,69 @@ def test_vibrations_that_motors_or_readings_miss_are_named():
         pf.lqg((TWO, both, np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, 1))), 0.01,
                **{**settings, "state_weights": np.eye(4)})  # fmt: skip
     assert error.value.field == "measured"
+
+
+def test_disturbances_that_last_are_estimated():
+    """A rotor under a torque that noise makes through a low-pass: its sampling in closed form, gains by SciPy."""
+    T, J, sd, hertz = 0.01, 0.02, 0.3, 2.0
+    a = 2.0 * np.pi * hertz
+    e, g = np.exp(-a * T), sd * np.sqrt((1.0 + np.exp(-a * T)) / (1.0 - np.exp(-a * T)))
+    once, twice = (1.0 - e) / a, T / a - (1.0 - e) / a**2  # integrals of exp(-a t) over the period
+    A = np.array([[1.0, T, twice / J], [0.0, 1.0, once / J], [0.0, 0.0, e]])
+    B = np.array([[T**2 / 2.0], [T], [0.0]]) / J
+    w = g * np.array([[(T**2 / 2.0 - twice) / J], [(T - once) / J], [1.0 - e]])
+    assert w[2] ** 2 / (1.0 - e**2) == pytest.approx(sd**2)
+    rotor = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0 / J]]), np.array([[1.0, 0.0]]), np.zeros((1, 1))
+    design = pf.lqg(rotor, T, measured=["y1"], deviations={"y1": 1e-3}, effort=1.0, noise=1e-4, disturbance=0.1,
+                    coloured={"u1": (sd, hertz)})  # fmt: skip
+    C, process = np.array([[1.0, 0.0, 0.0]]), w @ w.T + 0.1**2 * B @ B.T
+    P = scipy.linalg.solve_discrete_are(A, B, 1e6 * C.T @ C, np.eye(1))
+    gain = np.linalg.solve(1.0 + B.T @ P @ B, B.T @ P @ A)
+    # The filter's state x follows noise with x' = w - a x: the torque is g a x.
+    size = np.array([1.0, 1.0, g * a])
+    assert design.K / size == pytest.approx(gain, rel=1e-7)
+    P = scipy.linalg.solve_discrete_are(A.T, C.T, process, np.array([[1e-8]]))
+    assert design.filter.covariance * np.outer(size, size) == pytest.approx(P, rel=1e-6)
+    assert design.regulator.plant.states == ("x1", "x2", "u1 disturbance 1")
+    # Torques act against what lasts: K of the disturbance is one, but for what effort spares.
+    assert gain[0, 2] == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("period", [1e-3, 0.02])
+@pytest.mark.parametrize("through", [5.0, ([1.0, 300.0], [1.0, 20.0])])
+def test_filters_of_noise_have_the_deviation_asked_for(period, through):
+    """y = u: the variance is the sum of squares of the response to one sample of noise, the sample itself too."""
+    straight = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.eye(1)
+    plant, noise = disturbed_plant(straight, period, 0.0, {"u1": (0.7, through)})
+    x, squares = noise[:, 0], 0.0
+    for _ in range(20000):
+        squares += (plant.C @ x).item() ** 2
+        x = plant.A @ x
+    direct = 0.0 if isinstance(through, float) else _direct(through, period, 0.7)
+    assert squares + direct**2 == pytest.approx(0.7**2, rel=1e-9)
+
+
+def _direct(through, period, deviation):
+    """What a sample of noise adds at once: c s + d over s + a passes c, beside a response d - c a."""
+    (c, d), (_, a) = through
+    e = np.exp(-a * period)
+    after = (d - c * a) * (1.0 - e) / a  # of the sample that follows, and then less by e each
+    return deviation * c / np.sqrt(c**2 + after**2 / (1.0 - e**2))
+
+
+def test_noise_through_a_filter_acts_as_integrated():
+    """A vibration driven by noise held for a period through (s + 300)/(s + 20), against an integration to 1e-12."""
+    A, B, _, _ = oscillator()
+    plant, noise = disturbed_plant(oscillator(), 0.01, 0.003, {"u1": (0.7, ([1.0, 300.0], [1.0, 20.0]))})
+    gain = _direct(([1.0, 300.0], [1.0, 20.0]), 0.01, 0.7)
+
+    def rates(t, x):
+        return [*(A @ x[:2] + B[:, 0] * gain * (1.0 + 280.0 * x[2])), 1.0 - 20.0 * x[2]]
+
+    exact = scipy.integrate.solve_ivp(rates, (0.0, 0.01), np.zeros(3), rtol=1e-12, atol=1e-15, method="DOP853").y[:, -1]
+    assert noise[:3, 0] == pytest.approx(exact, rel=1e-9)
+    assert plant.states == ("x1", "x2", "u1 disturbance 1", "u1(k-1)")
+    assert noise[3, 0] == 0.0
 
 
 def test_inputs_that_are_not_named_are_disturbances():

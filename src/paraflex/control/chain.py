@@ -16,14 +16,12 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
 from paraflex.control.discrete import DiscreteModel, discrete_model
+from paraflex.control.filters import transfer_function
 from paraflex.control.references import Reference, references
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import known, positive
 
-# A transfer function: the time constant's inverse as a cut-off frequency [Hz] of first order, or coefficients of
-# numerator and denominator in descending powers of s.
-Filter = float | tuple[Sequence[float], Sequence[float]]
 Limit = float | tuple[float, float]
 
 
@@ -155,7 +153,7 @@ class SampledController:
         """
         return Chain(
             _by_name(self.quantise, inputs, "quantise", _resolution),
-            _by_name(self.filters, inputs, "filters", _transfer_function),
+            _by_name(self.filters, inputs, "filters", transfer_function),
             _by_name(self.limits, outputs, "limits", _range),
             _by_name(self.rates, outputs, "rates", _pace),
         )
@@ -310,26 +308,3 @@ def _range(value: Any, field: str) -> tuple[float, float]:
         return low, high
     most = _positive(value, field, "N m or N")
     return -most, most
-
-
-def _transfer_function(value: Any, field: str) -> tuple[Array, Array]:
-    """Coefficients of numerator and denominator, in descending powers of s."""
-    if all(hasattr(value, name) for name in ("num", "den")):
-        value = (np.ravel(value.num), np.ravel(value.den))
-    if isinstance(value, int | float):
-        rate = 2.0 * np.pi * _positive(value, field, "Hz")
-        return np.array([rate]), np.array([1.0, rate])
-    try:
-        numerator, denominator = (np.trim_zeros(np.atleast_1d(np.asarray(each, dtype=float)), "f") for each in value)
-    except (TypeError, ValueError):
-        numerator = denominator = np.zeros(0)
-    proper = 0 < numerator.size <= denominator.size and denominator.size > 1
-    if not proper or not np.all(np.isfinite([*numerator, *denominator])):
-        raise InputError(
-            "is no filter", field=field, value=value,
-            remedy="give a cut-off frequency in Hz, or coefficients (numerator, denominator) in descending powers of s",
-        )  # fmt: skip
-    if np.any(np.roots(denominator).real >= 0.0):
-        raise InputError("is not stable", field=field, value=value,
-                         remedy="give a denominator whose roots have negative real parts")  # fmt: skip
-    return numerator, denominator

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
+from paraflex.control.coloured import DisturbedPlant, disturbed_plant
 from paraflex.control.controllers import Plant
 from paraflex.control.estimators import KalmanFilter, kalman_filter, riccati
 from paraflex.control.linear_law import LinearLaw
@@ -286,6 +287,7 @@ def lqg(
     integrators: Mapping[str, float] | None = None,
     state_weights: ArrayLike | None = None,
     state_noise: ArrayLike | None = None,
+    coloured: Mapping[str, Any] | None = None,
 ) -> LQGDesign:
     """A regulator as `lqr` makes it, acting on what a Kalman filter estimates from readings.
 
@@ -304,13 +306,18 @@ def lqg(
         model does not have.
     state_noise : (n, n) array, optional
         Covariance added to that of the disturbances, of the model's own states or of all, for one sample.
+    coloured : mapping of str to (float, Filter), optional
+        Disturbances that last, besides, by input: their standard deviation [N m, N], and a cut-off frequency [Hz] or
+        coefficients (numerator, denominator) in descending powers of s of the filter that noise comes through. The
+        Kalman filter estimates them, and the torques act against them (Anderson and Moore, Optimal Control, section
+        9.4). The filters' states follow the model's.
 
     Raises
     ------
     InputError
         See `lqr`; readings that do not show a motion without friction or a vibration, which it names.
     """
-    plant = as_sampled(model, period, delay)
+    plant, lasting = _disturbed(model, period, delay, coloured)
     regulator = _regulator(plant, deviations, effort, integrators or {}, state_weights)
     measured = tuple(measured)
     C = plant.rows(measured, "measured")
@@ -324,10 +331,18 @@ def lqg(
                          "pf.quantisation_noise(resolution)")  # fmt: skip
     check_reach(plant, C.T, "measured", "is not seen by the readings", "measure more outputs", transposed=True)
     process = _disturbances(plant, regulator, disturbance, effort) + _padded(state_noise, plant, "state_noise")
+    process = process + lasting @ lasting.T
     R = np.diag([given[name] ** 2 for name in measured])
     motors = plant.B[:, places(regulator.motors, plant.inputs, "effort", "input")]
     found = kalman_filter(plant.A, motors, C, process, R)
     return LQGDesign(regulator, found, measured, _first_estimate(plant, C, np.sqrt(R)))
+
+
+def _disturbed(model: Any, period: float, delay: float, coloured: Mapping[str, Any] | None) -> DisturbedPlant:
+    if coloured:
+        return disturbed_plant(model, period, delay, coloured)
+    plant = as_sampled(model, period, delay)
+    return DisturbedPlant(plant, np.zeros((len(plant.states), 0)))
 
 
 class _Cost(NamedTuple):
