@@ -119,8 +119,8 @@ def test_second_order_spin_up(run):
 def test_closed_loop(run):
     """What feedback is there for: a payload that learning did not know of. Errors and vibrations in mm."""
     example, every, printed = run("closed_loop")
-    # Learned, fed back, with 20 % more payload (0.1 is asked for); vibration: 29 and 28 dB.
-    limits = {0.01: (0.003, 0.006, 0.083, 0.034), 0.0: (0.007, 0.009, 0.083, 0.037)}
+    # Learned, fed back, with 20 % more payload (0.1 is asked for); vibration: 28 and 29 dB.
+    limits = {0.01: (0.003, 0.006, 0.083, 0.038), 0.0: (0.007, 0.009, 0.083, 0.034)}
     for damping, (found, radius, _, _) in every.items():
         exactly, closely, heavily, quietly = limits[damping]
         rigid, learned, fed_back = (
@@ -133,7 +133,7 @@ def test_closed_loop(run):
         assert fed_back["as designed"][0] < closely
         assert fed_back["20 % more payload"][0] < heavily
         assert fed_back["20 % more payload"][1] < quietly * rigid["20 % more payload"][1]
-        assert fed_back["as designed"][1] < 0.076 * rigid["as designed"][1]  # 22 dB
+        assert fed_back["as designed"][1] < 0.081 * rigid["as designed"][1]  # 21.8 dB
         assert f"{fed_back['20 % more payload'][0]:.4f}, {fed_back['20 % more payload'][1]:.4f}" in printed
         assert f"{radius:.4f}" in printed
         # Without damping some vibration beyond 1 kHz grows slowly in some poses.
