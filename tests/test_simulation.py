@@ -167,6 +167,19 @@ def test_restored_runs_have_the_same_bits(task):
     assert again.solution.steps == whole.solution.steps
 
 
+def test_a_run_is_a_reference(task):
+    """Against its own readings a flexible mechanism has no error, against the rigid plan it has."""
+    sim = Simulation(task, mode="++++", feed_forward=True, options=pf.IntegrationOptions(step=T))
+    # Steps end at the same instants in all runs.
+    run = sim.run(SampledController(lambda k, t, y: 0.0 * y, period=T), warning=False)
+    for reference, least, most in ((run, 0.0, 1e-7), ("plan", 1e-5, 1.0)):
+        law = SampledController(lambda k, t, y: 1e-12 * y, period=T, reference=reference)
+        errors = sim.run(law, warning=False).controllers[0].wanted / 1e-12
+        assert least <= np.max(np.abs(errors)) < most
+    with pytest.raises(pf.errors.InputError, match=r'reference: unknown sensor "A1"'):
+        simulated_rotor().run(SampledController(lambda k, t, y: y, period=T, inputs=["hub"], reference=run))
+
+
 @pytest.mark.parametrize("method", ["esdirk5", "tr-bdf2"])
 def test_jumps_of_torques_do_not_part_joints_in_fixed_steps(task, method):
     """Redundant motors that pull at random: Baumgarte's coefficients would let joints be apart by tenths of mm."""

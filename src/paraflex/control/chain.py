@@ -21,6 +21,8 @@ from paraflex.control.references import Reference, references
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import known, positive
+from paraflex.motion import MotionRun
+from paraflex.tracking import TrackingRun
 
 Limit = float | tuple[float, float]
 
@@ -85,10 +87,10 @@ class SampledController:
         Sensors. By default the law's own, or the names of a model's inputs, else the encoders of the mode's motors.
     outputs : sequence of str, optional
         Motors. By default the law's own, or the names of a model's outputs, else all of the mode.
-    reference : mapping of str to float or callable, or "plan", optional
-        What is taken off the readings of sensors: numbers, functions of time, or the values on the planned motion of
-        all that it tells: angles and travels of joints, their rates, and the end-effector's coordinates. By default the
-        law's own.
+    reference : mapping of str to float or callable, "plan", or a run, optional
+        What is taken off the readings of sensors: numbers, functions of time, the values on the planned motion of
+        all that it tells (angles and travels of joints, their rates, and the end-effector's coordinates), or what
+        sensors read in another run, of a flexible mechanism say. By default the law's own.
     quantise : float or mapping of str to float, optional
         Resolution of readings, of all or by sensor: they are rounded to its multiples.
     filters : mapping of str to Filter, optional
@@ -118,7 +120,7 @@ class SampledController:
         delay: float | None = None,
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
-        reference: Mapping[str, Any] | str | None = None,
+        reference: Mapping[str, Any] | TrackingRun | MotionRun | str | None = None,
         quantise: float | Mapping[str, float] | None = None,
         filters: Mapping[str, Any] | None = None,
         limits: Any = None,
@@ -134,7 +136,9 @@ class SampledController:
         self.inputs: tuple[str, ...] = tuple(getattr(self.law, "inputs", ()) if inputs is None else inputs)
         self.outputs: tuple[str, ...] = tuple(getattr(self.law, "outputs", ()) if outputs is None else outputs)
         own = getattr(self.law, "reference", None)
-        self.reference: Mapping[str, Any] | str | None = own if reference is None else reference
+        self.reference: Mapping[str, Any] | TrackingRun | MotionRun | str | None = (
+            own if reference is None else reference
+        )
         self.quantise: Any = quantise
         self.filters: Mapping[str, Any] = filters or {}
         self.limits: Any = limits

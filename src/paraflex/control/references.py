@@ -15,13 +15,15 @@ from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import Encoder, Mechanism, PointSensor, Sensor, Tachometer
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import known
+from paraflex.motion import MotionRun
+from paraflex.tracking import TrackingRun
 
 Reference = Callable[[float], float]
 # The word for the planned motion.
 PLAN = "plan"
 
 
-def references(given: Mapping[str, Any] | str | None, plant: Plant) -> list[Reference | None]:
+def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, plant: Plant) -> list[Reference | None]:
     """A reference for each of a plant's inputs; None for those that have none.
 
     Raises
@@ -33,9 +35,11 @@ def references(given: Mapping[str, Any] | str | None, plant: Plant) -> list[Refe
         return [None] * len(plant.inputs)
     if isinstance(given, str):
         if given != PLAN:
-            raise InputError("is no reference", field="reference", value=given,
-                             remedy=f'say "{PLAN}", or give numbers or functions of time by sensor')  # fmt: skip
+            remedy = f'say "{PLAN}", or give a run, or numbers or functions of time by sensor'
+            raise InputError("is no reference", field="reference", value=given, remedy=remedy)
         return list(planned_readings(plant))
+    if isinstance(given, TrackingRun | MotionRun):
+        return list(readings_in(given, plant))
     for name in given:
         known(name, plant.inputs, "reference", "sensor")
     return [_reference(given[name], f"reference.{name}") if name in given else None for name in plant.inputs]
@@ -89,6 +93,25 @@ def planned_readings(plant: Plant) -> list[AtSamples | None]:
         name: AtSamples(plant, values) for name, values in readings_of(motion, plant.mechanism, plant.inputs).items()
     }
     return [columns.get(name) for name in plant.inputs]
+
+
+def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:
+    """What a controller's sensors read in another run, at its samples: on straight lines between those of the run.
+
+    Raises
+    ------
+    InputError
+        A sensor that the run's mechanism does not have.
+    """
+    system, solution = (run.task.system if isinstance(run, TrackingRun) else run.system), run.solution
+    sensors = {sensor.name: sensor for sensor in measured_sensors(system.mechanism)}
+    for name in plant.inputs:
+        known(name, sensors, "reference", "sensor")
+    k = solution.t.size
+    reader = SensorReader(system, [sensors[name] for name in plant.inputs])
+    values = reader(solution.q, solution.v, solution.a, solution.multipliers, run.applied[:k])
+    times = np.arange(plant.state.time, solution.t[-1] + 0.5 * plant.period, plant.period)
+    return [AtSamples(plant, np.interp(times, solution.t, column)) for column in values.T]
 
 
 def readings_of(motion: RigidMotion, mechanism: Mechanism, names: Sequence[str]) -> dict[str, Array]:
