@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
@@ -86,6 +87,17 @@ class System:
     def row_units(self) -> Array:
         """Unit of each constraint row (m,): the size for lengths, 1 for angles."""
         return np.real(self.packed.rows["unit"]).astype(float)
+
+    @cached_property
+    def slope_rows(self) -> scipy.sparse.csr_matrix:
+        """From coordinates to slopes along all bodies (slopes, n)."""
+        rows = scipy.sparse.lil_matrix((sum(len(body.shape.slopes) for body in self.bodies), self.n))
+        first = 0
+        for body in self.bodies:
+            last = first + len(body.shape.slopes)
+            rows[first:last, body.flexible] = body.shape.slopes @ body.integrals.D
+            first = last
+        return rows.tocsr()
 
     @cached_property
     def least_row_unit(self) -> float:

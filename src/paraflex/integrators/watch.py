@@ -31,6 +31,8 @@ class Breakdown(NamedTuple):
 
 def bent_too_far(system: System, q: Array) -> Breakdown | None:
     """The beam whose slope exceeds the validity of the theory, and its slope; None if there is none."""
+    if not np.max(np.abs(system.slope_rows @ q), initial=0.0) > _LARGEST_SLOPE:
+        return None
     for body in system.bodies:
         slope = float(np.max(np.abs(body.slopes(q)), initial=0.0))
         if slope > _LARGEST_SLOPE:
