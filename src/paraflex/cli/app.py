@@ -14,7 +14,7 @@ from paraflex.cli import BAD_INPUT, TROUBLE
 from paraflex.cli.collected import collecting
 from paraflex.cli.commands.once import Command
 from paraflex.cli.commands.requests import with_options
-from paraflex.cli.commands.shell import COMMANDS
+from paraflex.cli.commands.shell import COMMANDS, GROUPS
 from paraflex.cli.signals import exit_code
 from paraflex.errors import InputError, ParaflexError
 
@@ -26,10 +26,16 @@ app: typer.Typer = typer.Typer(
     rich_markup_mode=None,
 )
 
+_groups = {name: typer.Typer(help=about, no_args_is_help=True, rich_markup_mode=None) for name, about in GROUPS.items()}
 for _one in COMMANDS:
-    app.command(_one.name, cls=Command, help=_one.help)(with_options(_one.request, _one.answer))
+    _group, _, _name = _one.name.rpartition(" ")
+    _to = _groups[_group] if _group else app
+    _to.command(_name, cls=Command, help=_one.help)(with_options(_one.request, _one.answer))
     if _one.name == "optimise":
         app.command("optimize", cls=Command, hidden=True, help=_one.help)(with_options(_one.request, _one.answer))
+
+for _group, _commands in _groups.items():
+    app.add_typer(_commands, name=_group)
 
 
 def _show_version(wanted: bool) -> None:

@@ -159,7 +159,7 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:
     """The modes asked for, else all; none for results without modes."""
-    if source.kind in ("tracking", "verification", "linear"):
+    if source.kind in ("tracking", "verification", "linear", "laws"):
         known = names_of(source.data, "mode")
     elif source.kind == "sensitivity":
         known = list(dict.fromkeys(run["mode"] for run in source.data["runs"]))

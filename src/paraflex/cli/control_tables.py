@@ -1,0 +1,110 @@
+"""What `paraflex control compare` prints."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+
+import xarray as xr
+from rich.console import Console
+
+from paraflex.cli.tables import plain_table, print_titled
+from paraflex.designs.measure import beyond_limits
+from paraflex.results.following import SPAN_WORDS, ErrorSpan
+from paraflex.results.metrics import VALIDITY, metric_label
+from paraflex.studies.law_comparison import LawComparison
+from paraflex.units import DisplayUnit, printed_unit
+
+# Of what laws are judged by, in units in which few digits are needed.
+_UNITS = {"m": DisplayUnit("mm", 1e3), "m/s": DisplayUnit("mm/s", 1e3)}
+_SHARE = DisplayUnit("%", 100.0)
+# Letters of a line of a heading, and room between two columns.
+_HEAD, _BETWEEN = 9, 2
+# Below this share of the largest of a column a value is rounding.
+_ROUNDING = 1e-9
+
+
+def print_laws(console: Console, result: LawComparison) -> None:
+    """A block of rows for each mode, a row for each law; of columns as many side by side as there is room for."""
+    data = result.data
+    metrics = [name for name in result.metrics if name != VALIDITY]
+    columns = {_heading(data, name): _column(data, name) for name in metrics}
+    cells = [(mode, law) for mode in range(data.sizes["mode"]) for law in range(data.sizes["law"])]
+    names = [["" if law else result.modes[mode], result.laws[law]] for mode, law in cells]
+    taken = sum(max(map(len, texts)) + _BETWEEN for texts in zip(*names, ("mode", "law"), strict=True))
+    title = f"{data.attrs['mechanism']}: control laws"
+    if "tracking_rms" in metrics or "tracking_rms_motion" in metrics:
+        title += f", errors {SPAN_WORDS[ErrorSpan(data.attrs['error'])]}"
+    for heads in _fitting(columns, console.width - taken):
+        rows = ([*names[k], *(columns[head][cell] for head in heads)] for k, cell in enumerate(cells))
+        print_titled(console, title, plain_table("mode", "law", numbers=_level(heads), rows=rows))
+        title = "and"
+    for line in (*_reasons(result), *_doubtful(data)):
+        console.print(line, soft_wrap=True)
+    if result.interrupted:
+        console.print("interrupted: cells marked so were not run")
+
+
+def _heading(data: xr.Dataset, name: str) -> str:
+    unit = _unit(data, name).name
+    lines = textwrap.wrap(metric_label(name), _HEAD, break_long_words=False)
+    return "\n".join([*lines, f"[{unit}]" if unit else ""])
+
+
+def _unit(data: xr.Dataset, name: str) -> DisplayUnit:
+    unit = data[name].attrs["units"]
+    return _SHARE if name.endswith("_share") else _UNITS.get(unit, printed_unit(unit))
+
+
+def _column(data: xr.Dataset, name: str) -> dict[tuple[int, int], str]:
+    """Texts by place of mode and law; that of a cell without numbers is its status, in the first column alone."""
+    values = _unit(data, name).factor * data[name].transpose("mode", "law").values
+    status = data["status"].transpose("mode", "law").values
+    first = name == next(iter(data.data_vars))
+    rounding = _ROUNDING * max((abs(x) for x in values.flat if math.isfinite(x)), default=0.0)
+    out = {}
+    for k, mode in enumerate(values):
+        for j, value in enumerate(mode):
+            known = "-" if math.isnan(value) else f"{0.0 if abs(value) < rounding else value:.3g}"
+            out[k, j] = known if status[k, j] == "complete" else str(status[k, j]) if first else ""
+    return out
+
+
+def _level(heads: Sequence[str]) -> list[str]:
+    """Headings of as many lines each, units on the last."""
+    most = max(head.count("\n") for head in heads)
+    return ["\n" * (most - head.count("\n")) + head for head in heads]
+
+
+def _fitting(columns: dict[str, dict[tuple[int, int], str]], room: int) -> Iterator[list[str]]:
+    """Headings of columns that stand side by side in so many letters, one at least."""
+    heads: list[str] = []
+    left = room
+    for head, texts in columns.items():
+        width = max(map(len, (*head.split("\n"), *texts.values()))) + _BETWEEN
+        if heads and width > left:
+            yield heads
+            heads, left = [], room
+        heads.append(head)
+        left -= width
+    yield heads
+
+
+def _reasons(result: LawComparison) -> Iterator[str]:
+    """Why laws could not run in a mode, or how they are doubtful; once where it is the same in several modes."""
+    data, said = result.data, dict[tuple[str, str, str], list[str]]()
+    for law in result.laws:
+        for mode in result.modes:
+            cell = data.sel(law=law, mode=mode)
+            reason = str(cell["reason"].item())
+            if reason:
+                said.setdefault((law, str(cell["status"].item()), reason), []).append(mode)
+    for (law, status, reason), modes in said.items():
+        yield f"{law}, {'mode' if len(modes) == 1 else 'modes'} {', '.join(modes)}: {status}, {reason}"
+
+
+def _doubtful(data: xr.Dataset) -> Iterator[str]:
+    count = int((data[VALIDITY] > 1.0).sum())
+    if count:
+        yield beyond_limits(count)
