@@ -53,7 +53,7 @@ def _compare(
     if not result.begun:
         return exit_code(False, interrupted=result.interrupted)
     result.save_in(folder)
-    doubts = collected(check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes))
+    doubts = collected(check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes, request.plan.assembly))
     tell(result.to_dict(), lambda out: print_laws(out, result), as_json=request.json, doubts=doubts)
     write_drawn(result.data, folder)
     if not request.json:

@@ -10,7 +10,6 @@ import xarray as xr
 from rich.console import Console
 
 from paraflex.cli.tables import plain_table, print_titled
-from paraflex.designs.measure import beyond_limits
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.metrics import VALIDITY, metric_label
 from paraflex.studies.law_comparison import LawComparison
@@ -21,8 +20,8 @@ _UNITS = {"m": DisplayUnit("mm", 1e3), "m/s": DisplayUnit("mm/s", 1e3)}
 _SHARE = DisplayUnit("%", 100.0)
 # Letters of a line of a heading, and room between two columns.
 _HEAD, _BETWEEN = 9, 2
-# Below this share of the largest of a column a value is rounding.
-_ROUNDING = 1e-9
+# Internal torques below this share of the peak torque are rounding.
+_ROUNDING = 1e-8
 
 
 def print_laws(console: Console, result: LawComparison) -> None:
@@ -39,8 +38,8 @@ def print_laws(console: Console, result: LawComparison) -> None:
     for heads in _fitting(columns, console.width - taken):
         rows = ([*names[k], *(columns[head][cell] for head in heads)] for k, cell in enumerate(cells))
         print_titled(console, title, plain_table("mode", "law", numbers=_level(heads), rows=rows))
-        title = "and"
-    for line in (*_reasons(result), *_doubtful(data)):
+        title = "continued"
+    for line in (*_reasons(result), *_doubtful(result)):
         console.print(line, soft_wrap=True)
     if result.interrupted:
         console.print("interrupted: cells marked so were not run")
@@ -59,16 +58,21 @@ def _unit(data: xr.Dataset, name: str) -> DisplayUnit:
 
 def _column(data: xr.Dataset, name: str) -> dict[tuple[int, int], str]:
     """Texts by place of mode and law; that of a cell without numbers is its status, in the first column alone."""
-    values = _unit(data, name).factor * data[name].transpose("mode", "law").values
+    values = _unit(data, name).factor * _unless_rounding(data, name).transpose("mode", "law").values
     status = data["status"].transpose("mode", "law").values
     first = name == next(iter(data.data_vars))
-    rounding = _ROUNDING * max((abs(x) for x in values.flat if math.isfinite(x)), default=0.0)
     out = {}
     for k, mode in enumerate(values):
         for j, value in enumerate(mode):
-            known = "-" if math.isnan(value) else f"{0.0 if abs(value) < rounding else value:.3g}"
+            known = "-" if math.isnan(value) else f"{value:.3g}"
             out[k, j] = known if status[k, j] == "complete" else str(status[k, j]) if first else ""
     return out
+
+
+def _unless_rounding(data: xr.Dataset, name: str) -> xr.DataArray:
+    if (name, "peak_torque_max" in data) != ("internal_torque_max", True):
+        return data[name]
+    return data[name].where(~(data[name] < _ROUNDING * data["peak_torque_max"]), 0.0)
 
 
 def _level(heads: Sequence[str]) -> list[str]:
@@ -92,19 +96,22 @@ def _fitting(columns: dict[str, dict[tuple[int, int], str]], room: int) -> Itera
 
 
 def _reasons(result: LawComparison) -> Iterator[str]:
-    """Why laws could not run in a mode, or how they are doubtful; once where it is the same in several modes."""
-    data, said = result.data, dict[tuple[str, str, str], list[str]]()
+    """Why laws did not run to the end in a mode, or how they are doubtful; once where it is the same of several."""
+    said = dict[tuple[str, str], list[str]]()
+    for name, cell in _cells(result):
+        if reason := str(cell["reason"].item()):
+            said.setdefault((str(cell["status"].item()), reason), []).append(name)
+    for (status, reason), names in said.items():
+        yield f"{'; '.join(names)}: {status}, {reason}"
+
+
+def _doubtful(result: LawComparison) -> Iterator[str]:
+    """Which laws bend links beyond what the model can describe, in which mode."""
+    if names := [name for name, cell in _cells(result) if cell[VALIDITY] > 1.0]:
+        yield f"beyond what the model can describe ({VALIDITY} above 1): {'; '.join(names)}"
+
+
+def _cells(result: LawComparison) -> Iterator[tuple[str, xr.Dataset]]:
     for law in result.laws:
         for mode in result.modes:
-            cell = data.sel(law=law, mode=mode)
-            reason = str(cell["reason"].item())
-            if reason:
-                said.setdefault((law, str(cell["status"].item()), reason), []).append(mode)
-    for (law, status, reason), modes in said.items():
-        yield f"{law}, {'mode' if len(modes) == 1 else 'modes'} {', '.join(modes)}: {status}, {reason}"
-
-
-def _doubtful(data: xr.Dataset) -> Iterator[str]:
-    count = int((data[VALIDITY] > 1.0).sum())
-    if count:
-        yield beyond_limits(count)
+            yield f"{law} in {mode}", result.data.sel(law=law, mode=mode)

@@ -24,9 +24,11 @@ _FIRST = ("tracking_rms_motion", "tracking_rms", "residual_vibration", "peak_tor
 _PANELS = 3
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 # Part of a line that the modes of a law share, and height of a mode's share [mm].
-_BAND, _SHARE = 0.7, 2.6
+_BAND, _SHARE = 0.6, 2.6
 # Values of a panel that differ by more are on a logarithmic axis.
 _DECADE = 10.0
+# And by more than this so that panels between names have no room for numbers between powers of ten.
+_WIDE = 40.0
 
 
 @drawn
@@ -93,7 +95,7 @@ def _scale(panel: Axes, values: NDArray[Any]) -> None:
     panel.grid(axis="x", color="0.9", linewidth=0.4)
     if positive.size and positive.max() > _DECADE * positive.min():
         panel.margins(x=0.08)
-        mark_powers(panel, "x")
+        mark_powers(panel, "x", wide=_WIDE)
     else:
         panel.set_xlim(0.0, 1.08 * positive.max() if positive.size else 1.0)
 
