@@ -51,9 +51,12 @@ def _compare(
     with counting(console) as report:
         result = study.run(workers=Workers(number=request.workers), on_progress=report)
     if not result.begun:
+        console.print("interrupted before any law had run; nothing is written", soft_wrap=True)
         return exit_code(False, interrupted=result.interrupted)
     result.save_in(folder)
-    doubts = collected(check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes, request.plan.assembly))
+    doubts = collected(
+        check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes, request.plan.assembly)
+    )
     tell(result.to_dict(), lambda out: print_laws(out, result), as_json=request.json, doubts=doubts)
     write_drawn(result.data, folder)
     if not request.json:
@@ -61,9 +64,7 @@ def _compare(
     return exit_code(_any_complete(result), interrupted=result.interrupted)
 
 
-def _study(
-    request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]
-) -> LawStudy:
+def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> LawStudy:
     """The study, planned along every path; errors name the option or the field at fault."""
     tasks = {name: plan_study(model, model.mechanism, path, name, request.plan) for name, path in paths.items()}
     with flagged(request):

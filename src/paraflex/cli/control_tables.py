@@ -10,14 +10,9 @@ import xarray as xr
 from rich.console import Console
 
 from paraflex.cli.tables import plain_table, print_titled
-from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.metrics import VALIDITY, metric_label
-from paraflex.studies.law_comparison import LawComparison
-from paraflex.units import DisplayUnit, printed_unit
+from paraflex.studies.law_comparison import LawComparison, unit_shown
 
-# Of what laws are judged by, in units in which few digits are needed.
-_UNITS = {"m": DisplayUnit("mm", 1e3), "m/s": DisplayUnit("mm/s", 1e3)}
-_SHARE = DisplayUnit("%", 100.0)
 # Letters of a line of a heading, and room between two columns.
 _HEAD, _BETWEEN = 9, 2
 # Internal torques below this share of the peak torque are rounding.
@@ -33,8 +28,6 @@ def print_laws(console: Console, result: LawComparison) -> None:
     names = [["" if law else result.modes[mode], result.laws[law]] for mode, law in cells]
     taken = sum(max(map(len, texts)) + _BETWEEN for texts in zip(*names, ("mode", "law"), strict=True))
     title = f"{data.attrs['mechanism']}: control laws"
-    if "tracking_rms" in metrics or "tracking_rms_motion" in metrics:
-        title += f", errors {SPAN_WORDS[ErrorSpan(data.attrs['error'])]}"
     for heads in _fitting(columns, console.width - taken):
         rows = ([*names[k], *(columns[head][cell] for head in heads)] for k, cell in enumerate(cells))
         print_titled(console, title, plain_table("mode", "law", numbers=_level(heads), rows=rows))
@@ -42,23 +35,18 @@ def print_laws(console: Console, result: LawComparison) -> None:
     for line in (*_reasons(result), *_doubtful(result)):
         console.print(line, soft_wrap=True)
     if result.interrupted:
-        console.print("interrupted: cells marked so were not run")
+        console.print("interrupted: what is not run begins anew with the same command", soft_wrap=True)
 
 
 def _heading(data: xr.Dataset, name: str) -> str:
-    unit = _unit(data, name).name
+    unit = unit_shown(data, name).name
     lines = textwrap.wrap(metric_label(name), _HEAD, break_long_words=False)
     return "\n".join([*lines, f"[{unit}]" if unit else ""])
 
 
-def _unit(data: xr.Dataset, name: str) -> DisplayUnit:
-    unit = data[name].attrs["units"]
-    return _SHARE if name.endswith("_share") else _UNITS.get(unit, printed_unit(unit))
-
-
 def _column(data: xr.Dataset, name: str) -> dict[tuple[int, int], str]:
     """Texts by place of mode and law; that of a cell without numbers is its status, in the first column alone."""
-    values = _unit(data, name).factor * _unless_rounding(data, name).transpose("mode", "law").values
+    values = unit_shown(data, name).factor * _unless_rounding(data, name).transpose("mode", "law").values
     status = data["status"].transpose("mode", "law").values
     first = name == next(iter(data.data_vars))
     out = {}

@@ -243,7 +243,10 @@ def run_mode(planned: Planned, mode: str, options: IntegrationOptions, watch: Ca
 
 
 def measured_mode(
-    planned: Planned, mode: str, options: IntegrationOptions, metrics: Sequence[str],
+    planned: Planned,
+    mode: str,
+    options: IntegrationOptions,
+    metrics: Sequence[str],
     watch: Callable[[float], None] | None = None,
 ) -> tuple[Row, Runs | None]:
     """Metrics of a mode and how its run ended, by column, and the run; of one that an error ended the reason alone.

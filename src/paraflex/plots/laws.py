@@ -25,6 +25,8 @@ _PANELS = 3
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 # Part of a line that the modes of a law share, and height of a mode's share [mm].
 _BAND, _SHARE = 0.6, 2.6
+# Where failures are marked, of the width of a panel.
+_EDGE = 0.02
 # Values of a panel that differ by more are on a logarithmic axis.
 _DECADE = 10.0
 # And by more than this so that panels between names have no room for numbers between powers of ten.
@@ -84,10 +86,12 @@ def _draw_mode(
         "markersize": 4.0,
     }  # fmt: skip
     panel.plot(np.where(beyond, np.nan, values), places, label=label, **look)
-    panel.plot(np.where(beyond, values, np.nan), places, **look | {"markerfacecolor": "white"})
+    hollow: dict[str, Any] = look | {"markerfacecolor": "white"}
+    panel.plot(np.where(beyond, values, np.nan), places, **hollow)
     missing = np.isnan(values)
-    edge = {"transform": panel.get_yaxis_transform(), "clip_on": False}
-    panel.plot(np.full(missing.sum(), 0.02), places[missing], **look | {"marker": "x"} | edge)
+    edge: dict[str, Any] = look | {"marker": "x", "transform": panel.get_yaxis_transform(), "clip_on": False}
+    if missing.any():
+        panel.plot(np.full(missing.sum(), _EDGE), places[missing], **edge)
 
 
 def _scale(panel: Axes, values: NDArray[Any]) -> None:

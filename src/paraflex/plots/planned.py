@@ -50,6 +50,7 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     ),
     "link_deflections": lambda found: bool(found["tip_transverse"].any()),
     "controllers": lambda found: bool(controller_names(found)),
+    "law_comparison": lambda found: bool((found["status"] == "complete").any()),
     "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
 

@@ -32,7 +32,7 @@ def scaled_label(name: str, scale: float) -> str:
 
 
 def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y", *, wide: float = 200.0) -> None:
-    """Make an axis logarithmic, with numbers at powers of ten, or also at 2 and 5 unless values differ by `wide` times."""
+    """Make an axis logarithmic, with numbers at powers of ten; also at 2 and 5 below a ratio `wide` of its values."""
     axis = panel.yaxis if direction == "y" else panel.xaxis
     (panel.set_yscale if direction == "y" else panel.set_xscale)("log")
     low, high = axis.get_minpos(), axis.get_data_interval()[1]

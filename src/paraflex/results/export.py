@@ -59,7 +59,8 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
         for each of their labels, `torque_tau1` or `joint_force_B1_x`; of equilibria it is `steps`, of reduced models
         `frequencies`. `figures`: a row a model and mode. `shapes`: a row a model, mode, time and drawn point;
         `sections`: a row a model, mode, time and place along a beam; `controller_NAME`: a row a mode and sample of a
-        controller; of control laws `laws` alone, a row a law and mode. Their `attrs` hold `units` and `meanings` of columns.
+        controller. Of control laws it is `laws` alone, a row a law and mode. Their `attrs` hold `units` and `meanings`
+        of columns.
     """
     if kind_of(data) == "linear":
         raise InputError(

@@ -30,7 +30,7 @@ _NAMED = ("motion", "linear", "statics", "reduction", "laws")
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """Kind: "verification", "motion" (without a path), "linear" (models), "reduction", "statics", "laws", "tracking"."""
+    """Kind: "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking"."""
     if "model" in data.dims:
         return "verification"
     return data.attrs["kind"] if data.attrs.get("kind") in _NAMED else "tracking"

@@ -17,6 +17,7 @@ from paraflex.folders import LAW_COMPARISON
 from paraflex.results.export import export, result_tables
 from paraflex.results.metrics import METRICS, Members, metric_unit
 from paraflex.results.numbers import finite_or_none
+from paraflex.units import DisplayUnit, printed_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +29,7 @@ NOT_RUN = "not run"
 CSV = "laws.csv"
 _TOGETHER = ", "
 _ROWS = ("law", "mode")
+_UNITS, _SHARE = {"m": DisplayUnit("mm", 1e3), "m/s": DisplayUnit("mm/s", 1e3)}, DisplayUnit("%", 100.0)
 _OUTCOME = {
     "status": f"how the run ended: {', '.join(STATUSES)}, or {NOT_RUN}",
     "reason": "why it is not complete, or is doubtful",
@@ -138,9 +140,19 @@ def metric_names(data: xr.Dataset) -> tuple[str, ...]:
     return tuple(str(name) for name in data.data_vars if str(name).partition(".")[0] in METRICS)
 
 
+def unit_shown(data: xr.Dataset, metric: str) -> DisplayUnit:
+    """The unit in which a metric of laws has few digits in tables: errors are in mm, shares in %."""
+    unit = data[metric].attrs["units"]
+    return _SHARE if metric.endswith("_share") else _UNITS.get(unit, printed_unit(unit))
+
+
 def law_dataset(
-    laws: Mapping[str, tuple[Sequence[str], str]], modes: Sequence[str], cells: Mapping[tuple[str, str], Row],
-    metrics: Sequence[str], members: Members, attrs: Mapping[str, Any],
+    laws: Mapping[str, tuple[Sequence[str], str]],
+    modes: Sequence[str],
+    cells: Mapping[tuple[str, str], Row],
+    metrics: Sequence[str],
+    members: Members,
+    attrs: Mapping[str, Any],
 ) -> xr.Dataset:
     """The dataset of some cells.
 
@@ -176,4 +188,3 @@ def law_dataset(
     data["controllers"].attrs["long_name"] = "controllers that act, beside the planned torques"
     data["path"] = ("law", np.array([path for _, path in laws.values()], dtype=str), {"long_name": "path followed"})
     return data.assign_attrs(dict(attrs) | {"kind": KIND})
-

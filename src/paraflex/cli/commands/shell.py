@@ -33,7 +33,10 @@ _BEGINS = "interrupted; the same command begins anew"
 
 
 class ListedCommand(NamedTuple):
-    """A command: its name, after that of its group where it is in one, its request, the module of `paraflex.cli` and the function there, and its help."""
+    """A command: its name, its request, the module of `paraflex.cli` and the function there, and its help.
+
+    The name of a command in a group follows that of the group.
+    """
 
     name: str
     request: type
@@ -76,7 +79,7 @@ COMMANDS = (
     ListedCommand("control compare", CompareLawsRequest, "control.compare_laws_command", """
         Run the controllers of a model, and the open loop, in several modes: errors, vibration, torques, energy.
 
-        Writes laws.csv, laws.json, laws.nc and figures/. A law that cannot run in a mode is marked with its reason."""),
+        Writes laws.csv, laws.json, laws.nc and figures/. A law that cannot run in a mode has its reason."""),
     ListedCommand("sensitivity", SensitivityRequest, "sensitivity.sensitivity_command", """
         Differentiate what runs are judged by; write sensitivity.json, a table and figures/."""),
     ListedCommand("sweep", SweepRequest, "sweep.sweep_command", """
