@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 from mkdocs.structure.files import File, Files
@@ -41,10 +42,21 @@ def on_files(files: Files, config: Any) -> Files:
 def command_line_page() -> str:
     """All commands that are not hidden, in the order of `paraflex --help`."""
     group: Any = get_command(app)
-    commands = {name: command for name, command in group.commands.items() if not command.hidden}
-    rows = "".join(f"| [`{name}`](#{name}) | {_first(command.help)} |\n" for name, command in commands.items())
+    commands = dict(_of(group))
+    rows = "".join(
+        f"| [`{name}`](#{name.replace(' ', '-')}) | {_first(command.help)} |\n" for name, command in commands.items()
+    )
     general = _options("Of `paraflex` itself", [*group.params, *_completion()])
     return f"{HEAD}{rows}\n{general}\n" + "\n".join(_command(name, command) for name, command in commands.items())
+
+
+def _of(group: Any, before: str = "") -> Iterator[tuple[str, Any]]:
+    """Names and commands of a group, and of the groups in it, that are not hidden."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _of(command, f"{before}{name} ")
+        elif not command.hidden:
+            yield f"{before}{name}", command
 
 
 def _command(name: str, command: Any) -> str:

@@ -187,7 +187,7 @@ def reduced_tasks(
 
 @checked_arguments(model="give a model, or the name or file of one")
 def compare_laws(
-    model: Model | str,
+    model: Model | str | Path,
     modes: Sequence[str] = (),
     laws: Sequence[str] | Mapping[str, Any] = (),
     *,
@@ -204,7 +204,7 @@ def compare_laws(
 
     Parameters
     ----------
-    model : Model or str
+    model : Model, str or Path
         A model, or the name or file of one.
     modes : sequence of str
         By default those of its study.
@@ -232,7 +232,7 @@ def compare_laws(
     AssemblyError
         See `plan`.
     """
-    model = load(model) if isinstance(model, str) else model
+    model = model if isinstance(model, Model) else load(model)
     chosen = {OPEN_LOOP: ()} | dict(laws) if isinstance(laws, Mapping) else laws_of(model, laws)
     found = model.modes(modes)
     if not found:
