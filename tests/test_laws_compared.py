@@ -288,7 +288,7 @@ def test_the_figure_shows_every_cell(compared):
         factor = {"[mm]": 1e3, "[µm]": 1e6}[panel.get_xlabel()]
         assert np.asarray(line.get_xdata()) == pytest.approx(factor * errors.sel(mode=mode).values, nan_ok=True)
         assert np.asarray(line.get_ydata()).round().tolist() == [0.0, 1.0, 2.0, 3.0]
-    crosses = [line for line in panel.get_lines() if line.get_marker() == "x" and len(line.get_xdata())]
+    crosses = [line for line in panel.get_lines() if line.get_marker() == "x" and np.size(line.get_xdata())]
     assert [np.asarray(line.get_ydata()).round().tolist() for line in crosses] == [[3.0]]
     assert to_hex(crosses[0].get_color()) == VERMILLION.lower()
     assert "failed" in shown
@@ -298,7 +298,7 @@ def test_the_figure_marks_models_that_do_not_hold(compared):
     data = compared.data.copy()
     data["validity"] = data["validity"].where(data["law"] != "pd", 2.0)
     panel = plots.law_comparison(data).axes[0]
-    hollow = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white" and len(line.get_xdata())]
+    hollow = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white" and np.size(line.get_xdata())]
     there = [np.flatnonzero(np.isfinite(np.asarray(line.get_xdata(), dtype=float))).tolist() for line in hollow]
     assert there == [[1], [1]]
     filled = next(line for line in panel.get_lines() if line.get_label() == "mode ++++")
@@ -413,7 +413,7 @@ def test_modes_that_cannot_be_driven_are_marked_and_alone_are_exit_code_1(tmp_pa
 def test_ctrl_c_ends_it_in_one_line(tmp_path):
     long = ["--duration", "300", "--samples", "300001", "--controller", "pd"]
     said = interrupted("control", "compare", str(LAWS), *long, "--output", str(tmp_path / "out"))
-    assert "interrupted before any law had run; nothing is written" in said
+    assert "interrupted before any law had run; nothing is written" in str(said)
     assert not (tmp_path / "out").exists()
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from typing import Any
 
 from mkdocs.structure.files import File, Files
 from typer.main import get_command
 
-from paraflex.cli.app import app
+from paraflex.cli.app import all_commands, app
 
 PAGE = "reference/command-line.md"
 
@@ -42,21 +41,12 @@ def on_files(files: Files, config: Any) -> Files:
 def command_line_page() -> str:
     """All commands that are not hidden, in the order of `paraflex --help`."""
     group: Any = get_command(app)
-    commands = dict(_of(group))
+    commands = {name: command for name, command in all_commands(group).items() if not command.hidden}
     rows = "".join(
         f"| [`{name}`](#{name.replace(' ', '-')}) | {_first(command.help)} |\n" for name, command in commands.items()
     )
     general = _options("Of `paraflex` itself", [*group.params, *_completion()])
     return f"{HEAD}{rows}\n{general}\n" + "\n".join(_command(name, command) for name, command in commands.items())
-
-
-def _of(group: Any, before: str = "") -> Iterator[tuple[str, Any]]:
-    """Names and commands of a group, and of the groups in it, that are not hidden."""
-    for name, command in group.commands.items():
-        if hasattr(command, "commands"):
-            yield from _of(command, f"{before}{name} ")
-        elif not command.hidden:
-            yield f"{before}{name}", command
 
 
 def _command(name: str, command: Any) -> str:

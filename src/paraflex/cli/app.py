@@ -6,7 +6,7 @@ import errno
 import gc
 import os
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -36,6 +36,15 @@ for _one in COMMANDS:
 
 for _group, _commands in _groups.items():
     app.add_typer(_commands, name=_group)
+
+
+def all_commands(group: Any) -> dict[str, Any]:
+    """Commands of Click by name, in the order of the help; those of a group in it have its name before theirs."""
+    found = {}
+    for name, command in group.commands.items():
+        inner = all_commands(command) if hasattr(command, "commands") else None
+        found |= {name: command} if inner is None else {f"{name} {one}": each for one, each in inner.items()}
+    return found
 
 
 def _show_version(wanted: bool) -> None:
