@@ -112,7 +112,7 @@ def test_a_study_with_few_coordinates_is_compared_with_them(five_bar):
     assert float(cell(found, "pd", "++")["tracking_max"]) == pytest.approx(distance.max(), rel=1e-12)
 
 
-def test_python_laws_are_compared_and_start_anew_in_every_mode(five_bar):
+def test_python_laws_are_compared_and_start_anew_in_every_run(five_bar):
     """An object with a state gives the same whatever ran before it."""
 
     class Growing:
@@ -123,16 +123,14 @@ def test_python_laws_are_compared_and_start_anew_in_every_mode(five_bar):
             self.torque += 1e-3
             return np.full(2, self.torque)
 
-    def made():
-        return pf.SampledController(Growing(), period=1e-3, name="growing")
-
-    names = {"first": [made()], "second": [made()]}
-    found = pf.compare_laws(five_bar, ["++", "left,right"], names, workers=1, **SHORT)
-    assert found.laws == ("open loop", "first", "second")
-    assert np.ptp(found.data["peak_torque_max"].sel(law=["first", "second"]).values) == 0.0
-    assert float(cell(found, "first", "++")["peak_torque_max"]) != float(
-        cell(found, "open loop", "++")["peak_torque_max"]
-    )
+    laws = {"grows": [pf.SampledController(Growing(), period=1e-3, name="growing")]}
+    both = pf.compare_laws(five_bar, laws=laws, paths=["square", "line"], workers=1, **SHORT)
+    alone = pf.compare_laws(five_bar, laws=laws, paths=["line"], **SHORT)
+    assert both.laws[2:] == ("grows, square", "grows, line")
+    for metric in ("tracking_rms_motion", "motor_energy"):
+        found = float(cell(both, "grows, line", "++")[metric])
+        assert found == float(cell(alone, "grows", "++")[metric])
+        assert found != float(cell(alone, "open loop", "++")[metric])
 
 
 # --- Failures ---------------------------------------------------------------------------------------------------------
@@ -206,6 +204,8 @@ def test_nothing_is_written_of_a_comparison_that_was_not_begun(five_bar, tmp_pat
         ({"metrics": ["tracking"]}, r"metrics: unknown metric \(got 'tracking'\)"),
         ({"metrics": ["travel"]}, r"metrics: a metric of statics"),
         ({"workers": 0}, r"--workers: must be positive"),
+        ({"laws": {"a": [lambda k, t, y: y]}}, r"laws.a: not a list of controllers .*SampledController"),
+        ({"laws": {"a": pid()}}, r"laws.a: not a list of controllers"),
         ({"model": 3}, r"model: not .*give a model, or the name or file of one"),
     ],
 )
@@ -291,7 +291,7 @@ def test_the_figure_shows_every_cell(compared):
     crosses = [line for line in panel.get_lines() if line.get_marker() == "x" and np.size(line.get_xdata())]
     assert [np.asarray(line.get_ydata()).round().tolist() for line in crosses] == [[3.0]]
     assert to_hex(crosses[0].get_color()) == VERMILLION.lower()
-    assert "failed" in shown
+    assert "not run to the end" in shown
 
 
 def test_the_figure_marks_models_that_do_not_hold(compared):

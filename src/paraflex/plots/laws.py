@@ -35,7 +35,7 @@ _WIDE = 40.0
 
 @drawn
 def law_comparison(data: xr.Dataset) -> Figure:
-    """Tracking error, residual vibration and largest torque of every law, modes side by side; "x" where it failed."""
+    """Tracking error, residual vibration and largest torque of every law, by mode; "x" where a run has no end."""
     shown = _metrics(data)
     laws, modes = names_of(data, "law"), names_of(data, "mode")
     figure, axes = panels(1, len(shown))
@@ -108,6 +108,6 @@ def _explain(panel: Axes, data: xr.Dataset) -> None:
     """Entries of the legend for failures, and for models that do not hold."""
     mark: dict[str, Any] = {"linestyle": "none", "color": BLACK, "markersize": 4.0}
     if (data["status"] != "complete").any():
-        panel.plot([], [], marker="x", label="failed", **mark)
+        panel.plot([], [], marker="x", label="not run to the end", **mark)
     if VALIDITY in data and (data[VALIDITY] > 1.0).any():
         panel.plot([], [], marker="o", markerfacecolor="white", label="beyond what the model can describe", **mark)

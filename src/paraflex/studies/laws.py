@@ -12,6 +12,7 @@ from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
 from paraflex.campaign import THREADS, LostWorker, OnProgress, Progress, Row, Study, Workers, hold_for, outcomes
+from paraflex.control.chain import SampledController
 from paraflex.control.described import NONE, ControllerDescription
 from paraflex.designs.measure import members_of, metrics_of
 from paraflex.designs.run import measured_mode, under_control
@@ -73,6 +74,8 @@ class LawStudy(Study[LawComparison], CheckedFields):
         for name in ("tasks", "laws", "modes"):
             if not getattr(self, name):
                 raise InputError("nothing to compare", field=name, remedy="give one at least")
+        for law, together in self.laws.items():
+            _check_law(law, together)
         names = self.metrics or (HEADLINE[self.error], _LARGEST[self.error], *_JUDGED)
         object.__setattr__(self, "metrics", metrics_of(names, self.error, self._task.mechanism))
 
@@ -147,6 +150,14 @@ class LawStudy(Study[LawComparison], CheckedFields):
         columns = [column for name in self.metrics for column in METRICS[name].columns(members)]
         about = provenance(mechanism, options.method.title, options, self.parameters) | {"error": self.error.value}
         return law_dataset(laws, modes, found, columns, members, about)
+
+
+def _check_law(law: str, together: Any) -> None:
+    """None for a list of controllers that have names."""
+    kinds = (ControllerDescription, SampledController)
+    if not isinstance(together, list | tuple) or not all(isinstance(one, kinds) for one in together):
+        remedy = "give those of a model, or pf.SampledController(law, name=...)"
+        raise refused(together, f"laws.{law}", "a list of controllers", remedy)
 
 
 def laws_of(model: Model, names: Sequence[str] = ()) -> dict[str, tuple[ControllerDescription, ...]]:
