@@ -10,11 +10,13 @@ from paraflex.cli import app as program
 from paraflex.errors import InputError
 from paraflex.report.provenance import run_command_line
 
-COMMANDS = get_command(program.app).commands
+COMMANDS = program.all_commands(get_command(program.app))
 NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}
 STUDIES = ("sensitivity", "sweep", "optimise", "optimize", "identify", "indices")
 NEEDED |= {name: ["study.toml"] for name in STUDIES}
-MODEL_COMMANDS = ("run", "verify", "compare-methods", "modes", "linearise", "reduce", "statics", "draw", "info")
+MODEL_COMMANDS = (
+    "run", "verify", "compare-methods", "control compare", "modes", "linearise", "reduce", "statics", "draw", "info",
+)  # fmt: skip
 
 
 def options():
@@ -77,7 +79,7 @@ def test_without_a_name_it_is_the_papers(monkeypatch, command):
 
 @pytest.mark.parametrize("command", MODEL_COMMANDS)
 def test_two_different_models_are_refused_with_exit_code_2(monkeypatch, capsys, command):
-    monkeypatch.setattr("sys.argv", ["paraflex", command, "five_bar", "--mechanism", "raparm_i"])
+    monkeypatch.setattr("sys.argv", ["paraflex", *command.split(), "five_bar", "--mechanism", "raparm_i"])
     with pytest.raises(SystemExit) as end:
         program.main()
     assert end.value.code == 2

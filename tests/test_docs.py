@@ -161,10 +161,10 @@ def test_every_command_and_option_stands_on_the_page():
     from typer.main import get_command
 
     from command_line import command_line_page
-    from paraflex.cli.app import app
+    from paraflex.cli.app import all_commands, app
 
     page = command_line_page()
-    for name, command in get_command(app).commands.items():
+    for name, command in all_commands(get_command(app)).items():
         assert (f"\n## {name}\n" in page) == (not command.hidden), name
         for parameter in command.params:
             assert all(f"`{option}`" in page for option in parameter.opts if option.startswith("-"))

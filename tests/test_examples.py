@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib.util
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import build_system, consistent_state, natural_frequencies
 from paraflex.studies import load_identification, load_optimisation, load_sensitivities, load_sweep
+from shell import paraflex
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -47,11 +49,12 @@ STUDIES = {
     "identification": load_identification, "optimisation": load_optimisation, "sensitivity_study": load_sensitivities,
     "thickness_study": load_sweep,
 }  # fmt: skip
+MODELS = ("laws",)
 
 
 def test_every_study_can_be_read_and_its_first_design_runs():
     """To their ends they are run by benchmarks/documented.py, which keeps what they find."""
-    assert {path.stem for path in EXAMPLES.glob("*.toml")} == set(STUDIES)
+    assert {path.stem for path in EXAMPLES.glob("*.toml")} == {*STUDIES, *MODELS}
     for name, load in STUDIES.items():
         study = load(EXAMPLES / f"{name}.toml")
         setting, values = study.setting, [parameter.low for parameter in study.parameters]
@@ -156,3 +159,40 @@ def test_closed_loop_with_little_damping(damping, states, stable):
     task = pf.plan(example.manipulator(0.1, damping), pf.load("raparm_i").paths["square"], duration=0.7)
     radius = example.largest_radius(task, example.design_of(task, states), damping)
     assert (radius < 1.0) == stable
+
+
+@pytest.fixture(scope="module")
+def laws(tmp_path_factory):
+    """What the command on the page of control gives, by row and mode."""
+    along = ["--path", "square", "--path", "shaped"]
+    done = paraflex("control", "compare", EXAMPLES / "laws.toml", *along, "--json", cwd=tmp_path_factory.mktemp("laws"))
+    assert done.returncode == 0, done.stderr
+    return {name: law["modes"] for name, law in json.loads(done.stdout)["laws"].items()}
+
+
+# Of a cell of the page's table, with the factors of its units.
+CELL = {"tracking_rms_motion": 1e3, "residual_vibration": 1e3, "peak_torque_max": 1.0, "internal_torque_max": 1.0}
+
+
+def test_the_table_of_laws_on_the_page_is_what_the_command_gives(laws):
+    page = (EXAMPLES.parent / "docs" / "control.md").read_text(encoding="utf-8")
+    head, _, *rows = page[page.index("| law |") :].split("\n\n")[0].splitlines()
+    modes = [cell.strip(" `") for cell in head.strip("|").split("|")[1:]]
+    assert [row.split("|")[1].strip() for row in rows] == list(laws)
+    for row in rows:
+        name, *cells = (cell.strip() for cell in row.strip("|").split("|"))
+        for mode, cell in zip(modes, cells, strict=True):
+            found = laws[name][mode]
+            assert (cell == "–") == (found["status"] != "complete"), (name, mode)
+            for text, (metric, factor) in zip(cell.split(", ") if cell != "–" else (), CELL.items(), strict=False):
+                assert factor * found[metric] == pytest.approx(float(text), rel=0.01, abs=1e-6), (name, mode, metric)
+
+
+def test_steps_from_sample_to_sample_are_fine_enough_for_the_laws(laws):
+    """Error control agrees, of the law with the largest gains for gauges too."""
+    options = pf.IntegrationOptions(method="esdirk4", tolerance=1e-6)
+    finely = pf.compare_laws(EXAMPLES / "laws.toml", ["++++"], ["unprojected", "pd+gauges"], options=options)
+    for law in ("open loop", "unprojected", "pd+gauges"):
+        for metric in CELL:
+            coarse, fine = laws[f"{law}, square"]["++++"][metric], float(finely.data[metric].sel(law=law, mode="++++"))
+            assert coarse == pytest.approx(fine, rel=5e-3, abs=1e-7), (law, metric)

@@ -138,7 +138,7 @@ def test_a_run_says_what_it_doubts_once_before_its_numbers_and_keeps_it(tmp_path
     assert done.stderr.count("[density]") == 1
 
 
-@pytest.mark.parametrize("command", ["sweep", "verify", "modes", "compare-methods"])
+@pytest.mark.parametrize("command", ["sweep", "verify", "modes", "compare-methods", "control compare"])
 def test_other_commands_say_what_they_doubt_when_they_end(tmp_path, command):
     file = slipped(tmp_path, "gantry", "7850.0", "7.85")
     study = tmp_path / "study.toml"
@@ -153,8 +153,9 @@ def test_other_commands_say_what_they_doubt_when_they_end(tmp_path, command):
         "verify": ["-m", file.name, "--model", "rigid", *short],
         "modes": [file.name],
         "compare-methods": ["-m", file.name, "--method", "tr-bdf2", *short],
+        "control compare": [file.name, *short],
     }[command]
-    done = paraflex(command, *asked, cwd=tmp_path)
+    done = paraflex(*command.split(), *asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert (done.stdout + done.stderr).count("[density]") == 1
 

@@ -69,6 +69,7 @@ FILES = {
     "linear": "linear.nc",
     "reduction": "reduced.nc",
     "statics": "statics.nc",
+    "laws": "laws.nc",
     "methods": "compare-methods.json",
     "sweep": "results.parquet",
     "optimisation": "result.json",
@@ -121,6 +122,10 @@ def _runs(folder: Path) -> None:
     save_results(pf.reduction_dataset(models, 16, along=along), folder / "reduction" / "reduced.nc")
     gentle = ControllerDescription("pd", PIDDescription(1.0), 1e-3, delay=1e-3, limits=1e-4)
     run = tracking_dataset([simulate_controlled(task, "++", [gentle])])
+    # One of them fails where it has no motor.
+    one = ControllerDescription("one", PIDDescription(1.0), 1e-3, outputs=("left",))
+    laws = {"pd": [gentle], "one, with a long name": [one]}
+    pf.compare_laws(model, ["++", "right"], laws, duration=0.05, samples=26).save(folder / "laws")
     # A second mode by name; the first is all that the motors can do.
     data = xr.concat([run, run.assign_coords(mode=["+-"])], "mode", combine_attrs="override")
     (folder / "tracking").mkdir()

@@ -122,13 +122,13 @@ def test_commands_set_values_and_results_tell_them(tmp_path, monkeypatch):
     assert json.dumps(facts) != json.dumps(plain)
 
 
-@pytest.mark.parametrize("command", ["run", "verify", "compare-methods", "modes", "info"])
+@pytest.mark.parametrize("command", ["run", "verify", "compare-methods", "control compare", "modes", "info"])
 def test_every_command_that_takes_a_model_takes_settings(command):
-    wrong = paraflex(command, "five_bar", "--set", "bar.thickness=6 kg")
+    wrong = paraflex(*command.split(), "five_bar", "--set", "bar.thickness=6 kg")
     assert wrong.returncode == 2
     assert "five_bar.toml: section.bar.thickness: a quantity in kg where one in m is asked for" in wrong.stderr
     for text in ("bar.thickness", "=3", "bar.thickness="):
-        wrong = paraflex(command, "five_bar", "--set", text)
+        wrong = paraflex(*command.split(), "five_bar", "--set", text)
         assert wrong.returncode == 2
         assert "--set: no field and value" in wrong.stderr
 

@@ -13,10 +13,12 @@ import xarray as xr
 import paraflex as pf
 from made_up import STUDY, made_up, write_study
 from paraflex.campaign import Progress, Result, Study, Workers
+from paraflex.control import ControllerDescription, PIDDescription
 from paraflex.errors import InputError
 from paraflex.studies import (
     ComparisonOptions,
     ComparisonStudy,
+    LawStudy,
     TrackingStudy,
     VerificationOptions,
     VerificationStudy,
@@ -47,6 +49,7 @@ FILES = {
     "tracking": {"results.nc", "summary.json"},
     "verification": {"verify.nc", "verify.json"},
     "comparison": {"compare-methods.json"},
+    "laws": {"laws.nc", "laws.json", "laws.csv"},
     "sensitivity": {"sensitivity.json", "sensitivity.csv", "sensitivity.parquet"},
 }
 
@@ -70,12 +73,14 @@ def studies(task, tmp_path_factory):
     differentiated = differentiated.replace("samples = 26", "samples = 5").replace("lump.end.mass", "lump.tool.mass")
     sensitivity = load_sensitivities(write_study(folder, differentiated, "sensitivity.toml"))
     read = {kind: load(write_study(folder, text, f"{kind}.toml")) for kind, (load, text) in OF_FILES.items()}
+    gentle = ControllerDescription("pd", PIDDescription(1.0), 1e-3)
     return read | {
         "tracking": TrackingStudy(task, ["++"], LOOSE),
         "verification": VerificationStudy(task, ["++"], ("rigid", "linear"), VerificationOptions(tolerance=1e-3)),
         "comparison": ComparisonStudy(
             tracking_case(task, "++"), ["esdirk5", "tr-bdf2"], ComparisonOptions((1e-3,), repetitions=1)
         ),
+        "laws": LawStudy({"line": task}, {"open loop": (), "pd": [gentle]}, ["++"], LOOSE),
         "sensitivity": sensitivity,
     }
 
@@ -116,7 +121,7 @@ def test_it_is_saved_elsewhere_the_same(done, kind, tmp_path):
     assert result.save(tmp_path / "copy") == tmp_path / "copy"
     kept = {"study.json"} & {file.name for file in folder.iterdir()}
     assert {file.name for file in (tmp_path / "copy").iterdir()} == FILES[kind] | {"manifest.json", ".lock"} | kept
-    for name in FILES[kind] - {"results.nc", "verify.nc"}:
+    for name in FILES[kind] - {"results.nc", "verify.nc", "laws.nc"}:
         assert (tmp_path / "copy" / name).read_bytes() == (folder / name).read_bytes(), name
     result.save(folder)
 

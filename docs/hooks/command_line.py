@@ -8,7 +8,7 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 from typer.main import get_command
 
-from paraflex.cli.app import app
+from paraflex.cli.app import all_commands, app
 
 PAGE = "reference/command-line.md"
 
@@ -41,8 +41,10 @@ def on_files(files: Files, config: Any) -> Files:
 def command_line_page() -> str:
     """All commands that are not hidden, in the order of `paraflex --help`."""
     group: Any = get_command(app)
-    commands = {name: command for name, command in group.commands.items() if not command.hidden}
-    rows = "".join(f"| [`{name}`](#{name}) | {_first(command.help)} |\n" for name, command in commands.items())
+    commands = {name: command for name, command in all_commands(group).items() if not command.hidden}
+    rows = "".join(
+        f"| [`{name}`](#{name.replace(' ', '-')}) | {_first(command.help)} |\n" for name, command in commands.items()
+    )
     general = _options("Of `paraflex` itself", [*group.params, *_completion()])
     return f"{HEAD}{rows}\n{general}\n" + "\n".join(_command(name, command) for name, command in commands.items())
 

@@ -126,6 +126,7 @@ from .studies import (
     run_study as run_study,
     verify as verify,
     compare_methods as compare_methods,
+    compare_laws as compare_laws,
     tracking_case as tracking_case,
     motion_case as motion_case,
     sweep as sweep,

@@ -6,7 +6,7 @@ import errno
 import gc
 import os
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,7 +14,7 @@ from paraflex.cli import BAD_INPUT, TROUBLE
 from paraflex.cli.collected import collecting
 from paraflex.cli.commands.once import Command
 from paraflex.cli.commands.requests import with_options
-from paraflex.cli.commands.shell import COMMANDS
+from paraflex.cli.commands.shell import COMMANDS, GROUPS
 from paraflex.cli.signals import exit_code
 from paraflex.errors import InputError, ParaflexError
 
@@ -26,10 +26,25 @@ app: typer.Typer = typer.Typer(
     rich_markup_mode=None,
 )
 
+_groups = {name: typer.Typer(help=about, no_args_is_help=True, rich_markup_mode=None) for name, about in GROUPS.items()}
 for _one in COMMANDS:
-    app.command(_one.name, cls=Command, help=_one.help)(with_options(_one.request, _one.answer))
+    _group, _, _name = _one.name.rpartition(" ")
+    _to = _groups[_group] if _group else app
+    _to.command(_name, cls=Command, help=_one.help)(with_options(_one.request, _one.answer))
     if _one.name == "optimise":
         app.command("optimize", cls=Command, hidden=True, help=_one.help)(with_options(_one.request, _one.answer))
+
+for _group, _commands in _groups.items():
+    app.add_typer(_commands, name=_group)
+
+
+def all_commands(group: Any) -> dict[str, Any]:
+    """Commands of Click by name, in the order of the help; those of a group in it have its name before theirs."""
+    found = {}
+    for name, command in group.commands.items():
+        inner = all_commands(command) if hasattr(command, "commands") else None
+        found |= {name: command} if inner is None else {f"{name} {one}": each for one, each in inner.items()}
+    return found
 
 
 def _show_version(wanted: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -44,6 +44,11 @@ class UnderControl(NamedTuple):
 
 # What is ready to be run.
 Planned = TrackingTask | UnderControl | OwnMotion | OwnStatics
+
+
+def under_control(task: TrackingTask, controllers: Sequence[ControllerDescription]) -> TrackingTask | UnderControl:
+    """A planned motion under controllers; the motion itself where there are none."""
+    return UnderControl(task, tuple(controllers)) if controllers else task
 
 
 class Task(NamedTuple):
@@ -105,20 +110,9 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
             row |= trouble(error)
         return Outcome(task, rows)
     for row in rows:
-        try:
-            run = run_mode(planned, row["mode"], options, watch)
-            row |= measure(run, setting.metrics) | {
-                "status": STATUS_COMPLETE,
-                "reason": coarseness(run, setting.metrics),
-                "time_reached": None if isinstance(run, Statics) else float(run.solution.t[-1]),
-            }
-        except Abandoned:
-            raise
-        # Whatever a strange design does, it is that design's row and not the end of the sweep.
-        except Exception as error:
-            row |= trouble(error)
-            continue
-        if setting.trajectories:
+        measured, run = measured_mode(planned, row["mode"], options, setting.metrics, watch)
+        row |= measured
+        if run is not None and setting.trajectories:
             kept[row["id"]] = _trajectory(run, options, row)
     return Outcome(task, rows, kept)
 
@@ -133,8 +127,7 @@ def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
     """
     model, options = setting.design(task.values)
     if setting.has_path:
-        planned, controllers = _planned(setting, model, task), model.acting()
-        return (UnderControl(planned, controllers) if controllers else planned), options
+        return under_control(_planned(setting, model, task), model.acting()), options
     _compile(model.mechanism)
     if setting.statics:
         return own_statics(model, setting.assembly), options
@@ -247,6 +240,35 @@ def run_mode(planned: Planned, mode: str, options: IntegrationOptions, watch: Ca
     if run.solution.status == "interrupted":
         raise Abandoned
     return run
+
+
+def measured_mode(
+    planned: Planned,
+    mode: str,
+    options: IntegrationOptions,
+    metrics: Sequence[str],
+    watch: Callable[[float], None] | None = None,
+) -> tuple[Row, Runs | None]:
+    """Metrics of a mode and how its run ended, by column, and the run; of one that an error ended the reason alone.
+
+    Raises
+    ------
+    Abandoned
+        See `run_task`.
+    """
+    try:
+        run = run_mode(planned, mode, options, watch)
+        row = measure(run, metrics) | {
+            "status": STATUS_COMPLETE,
+            "reason": coarseness(run, metrics),
+            "time_reached": None if isinstance(run, Statics) else float(run.solution.t[-1]),
+        }
+    except Abandoned:
+        raise
+    # Whatever a strange design does, it is that design's row and not the end of the sweep.
+    except Exception as error:
+        return trouble(error), None
+    return row, run
 
 
 def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:

@@ -21,6 +21,7 @@ _PIECE = 1 << 20
 RUN = "run"
 VERIFICATION = "verification"
 COMPARISON = "comparison of methods"
+LAW_COMPARISON = "comparison of control laws"
 SENSITIVITY = "sensitivity"
 RUN_COMPARISON = "comparison of runs"
 STUDY_OF_RUNS = "study of many runs"
@@ -31,6 +32,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     STUDY_OF_RUNS: ("study.json", "journal.sqlite", "results.parquet"),
     VERIFICATION: ("verify.json", "verify.nc"),
     COMPARISON: ("compare-methods.json",),
+    LAW_COMPARISON: ("laws.json", "laws.nc", "laws.csv"),
     RUN_COMPARISON: ("compare.json",),
     SENSITIVITY: ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
     LINEAR_MODELS: ("linear.json", "linear.nc"),

@@ -27,6 +27,7 @@ from .free_motion import (
     point_motions as point_motions,
     point_paths as point_paths,
 )
+from .laws import law_comparison as law_comparison
 from .linear import (
     bode as bode,
     pole_zero_map as pole_zero_map,

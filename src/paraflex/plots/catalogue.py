@@ -209,6 +209,10 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
         CatalogueFigure("buckling_shapes", "equilibria", "how the mechanism buckles, as seen from the last step",
                         written_as="buckling_shapes", variables=("buckling_shape",)),
     ),
+    "laws": (
+        CatalogueFigure("law_comparison", "laws", "error, vibration and largest torque of control laws in all modes",
+                        written_as="law_comparison"),
+    ),
     "methods": (
         CatalogueFigure("work_precision", "methods", "wall time and steps over error",
                         written_as="work_precision"),

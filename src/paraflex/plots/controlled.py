@@ -12,15 +12,12 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import display_unit, peak, symbol
-from paraflex.plots.layout import panels
-from paraflex.plots.runs import MOST_LINES, finish_over_time
+from paraflex.plots.labels import display_unit, symbol
+from paraflex.plots.runs import finish_over_time, largest_columns, listed_panels
 from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import BLACK, COLOURS, look_of
 from paraflex.results.controllers import GIVEN, INPUT, OUTPUT, READINGS, SAMPLE, WANTED, ControllerData, controllers_of
 
-# Panels below one another.
-_MOST_ROWS = 4
 _WANTED = {"linestyle": (0, (1, 1)), "linewidth": 0.8}
 _LIMIT = {"color": "0.5", "linestyle": (0, (5, 1.5)), "linewidth": 0.7, "zorder": 1.0}
 _WORDS = {"rad": "angle", "m": "position", "rad/s": "rate", "m/s": "speed", "N m": "torque", "N": "force"}
@@ -45,10 +42,7 @@ def controllers(data: xr.Dataset, mode: str | None = None) -> Figure:
             "no controllers in these results", field="figure", value="controllers",
             remedy="run it with --controller, or with [study] controllers in the model",
         )  # fmt: skip
-    columns = 1 if len(found) <= _MOST_ROWS else 2
-    figure, axes = panels(-(-len(found) // columns), columns)
-    for panel in axes.flat[len(found) :]:
-        panel.set_visible(False)
+    figure, axes = listed_panels(len(found))
     for panel, shown in zip(axes.flat, found, strict=False):
         (_draw_torques if shown.dim == OUTPUT else _draw_readings)(panel, shown)
         words = "readings" if shown.dim == INPUT else "torques" if shown.unit == "N m" else "forces"
@@ -69,9 +63,8 @@ def _panels(one: ControllerData) -> Iterator[_Panel]:
 
 def _largest(shown: _Panel, variable: str) -> list[str]:
     """Names of the largest, in their own order."""
-    values = {name: peak(shown.controller.data[variable].sel({shown.dim: name}).values) for name in shown.names}
-    most = sorted(shown.names, key=lambda name: -values[name])[:MOST_LINES]
-    return [name for name in shown.names if name in most]
+    values = shown.controller.data[variable].sel({shown.dim: shown.names}).transpose(..., shown.dim).values
+    return [shown.names[k] for k in largest_columns(values)]
 
 
 def _draw_torques(panel: Axes, shown: _Panel) -> None:

@@ -50,6 +50,7 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     ),
     "link_deflections": lambda found: bool(found["tip_transverse"].any()),
     "controllers": lambda found: bool(controller_names(found)),
+    "law_comparison": lambda found: bool((found["status"] == "complete").any()),
     "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
 
@@ -159,7 +160,7 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:
     """The modes asked for, else all; none for results without modes."""
-    if source.kind in ("tracking", "verification", "linear"):
+    if source.kind in ("tracking", "verification", "linear", "laws"):
         known = names_of(source.data, "mode")
     elif source.kind == "sensitivity":
         known = list(dict.fromkeys(run["mode"] for run in source.data["runs"]))

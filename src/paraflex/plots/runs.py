@@ -24,6 +24,8 @@ STOPPED: dict[str, Any] = _MARK | {"marker": "x", "markeredgewidth": 1.2, "zorde
 START: dict[str, Any] = _MARK | {"marker": "s", "zorder": 4.0, "label": "start"}
 # Most lines that are distinguishable in one panel.
 MOST_LINES = 7
+# Most panels below one another in one column.
+_MOST_ROWS = 4
 # Variables of the end-effector's motion, what they are, and what their values are multiplied by.
 END_EFFECTOR = (
     ("end_effector", "position", 1e3),
@@ -63,6 +65,21 @@ def draw_desired(axes: Axes, x: ArrayLike, y: ArrayLike) -> None:
     axes.plot(x, y, **DESIRED)
 
 
+def listed_panels(count: int) -> tuple[Figure, NDArray[Any]]:
+    """So many panels below one another, the first of `axes.flat`; in two columns where one is too long."""
+    columns = 1 if count <= _MOST_ROWS else 2
+    figure, axes = panels(-(-count // columns), columns)
+    for panel in axes.flat[count:]:
+        panel.set_visible(False)
+    return figure, axes
+
+
+def largest_columns(values: NDArray[np.float64]) -> list[int]:
+    """Columns of values (samples, n) with the largest peaks, no more than are distinguishable, in their own order."""
+    order = np.argsort([-peak(each) for each in values.T], kind="stable")
+    return sorted(order[:MOST_LINES].tolist())
+
+
 def shade_rest(axes: Axes, data: xr.Dataset) -> None:
     """Extend the time axis to the whole run and shade the time after the desired motion."""
     time = data["time"].values
@@ -85,10 +102,10 @@ def finish_over_time(figure: Figure, axes: NDArray[Any], data: xr.Dataset, panel
 def largest_over_time(data: xr.Dataset, run: xr.Dataset, values: NDArray[np.float64], dim: str, label: str) -> Figure:
     """One panel of quantities (time, dim) of a run; if there are too many, those with the largest peaks."""
     peaks = np.array([peak(each) for each in values.T])
-    largest = [k for k in np.argsort(-peaks, kind="stable")[:MOST_LINES] if peaks[k] > 0.0]
+    largest = [k for k in largest_columns(values) if peaks[k] > 0.0]
     names = names_of(run, dim)
     figure, axes = panels(1, 1)
-    draw_curves(axes[0, 0], run, {symbol(names[k]): values[:, k] for k in sorted(largest)})
+    draw_curves(axes[0, 0], run, {symbol(names[k]): values[:, k] for k in largest})
     axes[0, 0].set_ylabel(label)
     kind = "bodies" if dim == "body" else f"{dim}s"
     axes[0, 0].set_title(shown_of(len(largest), int(np.count_nonzero(peaks)), f"largest {kind}"))

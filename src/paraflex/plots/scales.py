@@ -31,12 +31,12 @@ def scaled_label(name: str, scale: float) -> str:
     return plain(name) + (f" [{power_of_ten(scale)}]" if scale != 1.0 else "")
 
 
-def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y") -> None:
-    """Make an axis logarithmic, with numbers at powers of ten, or also at 2 and 5 if it spans few of them."""
+def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y", *, wide: float = 200.0) -> None:
+    """Make an axis logarithmic, with numbers at powers of ten; also at 2 and 5 below a ratio `wide` of its values."""
     axis = panel.yaxis if direction == "y" else panel.xaxis
     (panel.set_yscale if direction == "y" else panel.set_xscale)("log")
     low, high = axis.get_minpos(), axis.get_data_interval()[1]
-    several = high > 200.0 * low
+    several = high > wide * low
     axis.set_major_locator(LogLocator(numticks=12) if several else LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
     axis.set_minor_formatter(NullFormatter())

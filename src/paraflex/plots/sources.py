@@ -17,8 +17,8 @@ from paraflex.writing import read_values
 _OURS = "name a folder or file that paraflex wrote"
 # Files of results; the first one found determines the kind of a folder.
 _RESULT_FILES = (
-    "results.nc", "verify.nc", "linear.nc", "statics.nc", "reduced.nc", "compare-methods.json", "sensitivity.json",
-    "indices.json", "result.json",
+    "results.nc", "verify.nc", "linear.nc", "statics.nc", "reduced.nc", "laws.nc", "compare-methods.json",
+    "sensitivity.json", "indices.json", "result.json",
 )  # fmt: skip
 _BEGINNINGS = {NETCDF: "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", PARQUET: "parquet"}
 
@@ -30,8 +30,8 @@ class Source:
     Attributes
     ----------
     kind : str
-        "tracking", "motion", "verification", "linear", "statics", "reduction", "methods", "sweep", "optimisation",
-        "identification", "indices", "sensitivity" or "modes".
+        "tracking", "motion", "verification", "linear", "statics", "reduction", "laws", "methods", "sweep",
+        "optimisation", "identification", "indices", "sensitivity" or "modes".
     data : xarray.Dataset, mapping, list or DesignTable
         As the functions of `paraflex.plots` take it.
     folder : Path

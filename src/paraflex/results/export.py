@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 EXPORT_FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
 TIME_SERIES, FIGURES_TABLE, SHAPES, SECTIONS = "time_series", "figures", "shapes", "sections"
+LAWS = "laws"
 # Dimensions that rows of tables are of, outermost first, before that along which results go.
-_ROW_DIMENSIONS = ("model", "mode")
+_ROW_DIMENSIONS = ("model", "law", "mode")
 # The dimension along which results of a kind go, and its table; of others time.
 _ALONG = {"statics": ("step", "steps"), "reduction": ("frequency", "frequencies")}
 # MATLAB takes longer names apart.
@@ -58,13 +59,16 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
         for each of their labels, `torque_tau1` or `joint_force_B1_x`; of equilibria it is `steps`, of reduced models
         `frequencies`. `figures`: a row a model and mode. `shapes`: a row a model, mode, time and drawn point;
         `sections`: a row a model, mode, time and place along a beam; `controller_NAME`: a row a mode and sample of a
-        controller. Their `attrs` hold `units` and `meanings` of columns.
+        controller. Of control laws it is `laws` alone, a row a law and mode. Their `attrs` hold `units` and `meanings`
+        of columns.
     """
     if kind_of(data) == "linear":
         raise InputError(
             "linear models are matrices, not a table", field="to",
             remedy='export them as "mat" or "netcdf"; linear.json has poles and zeros',
         )  # fmt: skip
+    if kind_of(data) == LAWS:
+        return {LAWS: _table(data, list(data.data_vars), _ROW_DIMENSIONS)}
     drawn = [name for name in data.data_vars if "station" in data[name].dims]
     forces = [name for name in data.data_vars if SECTION in data[name].dims]
     dim, first = _ALONG.get(kind_of(data), ("time", TIME_SERIES))

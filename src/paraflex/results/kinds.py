@@ -21,15 +21,19 @@ _MADE_BY = {
     "linear": "linear_dataset",
     "statics": "statics_dataset",
     "reduction": "reduction_dataset",
+    "laws": "compare_laws",
 }
+
+# Kinds that datasets name themselves.
+_NAMED = ("motion", "linear", "statics", "reduction", "laws")
 
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """Kind: "verification", "motion" (without a path), "linear" (models), "reduction", "statics", "tracking"."""
+    """Kind: "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking"."""
     if "model" in data.dims:
         return "verification"
-    return data.attrs["kind"] if data.attrs.get("kind") in ("motion", "linear", "statics", "reduction") else "tracking"
+    return data.attrs["kind"] if data.attrs.get("kind") in _NAMED else "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:

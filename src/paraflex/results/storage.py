@@ -21,7 +21,7 @@ from paraflex.writing import sealed_file
 SCHEMA = 3
 _FOLLOWING = 3
 # What commands call the file in their folder, and where a sweep keeps its runs.
-FILES = ("results.nc", "verify.nc", "linear.nc", "statics.nc", "reduced.nc")
+FILES = ("results.nc", "verify.nc", "linear.nc", "statics.nc", "reduced.nc", "laws.nc")
 _TRAJECTORIES = "trajectories"
 _MOST_NAMED = 3
 # Smaller arrays are written as they are: what describes the compression takes more than it gains [bytes].

@@ -24,6 +24,8 @@ from paraflex.studies.comparison import (
     MethodComparison as MethodComparison,
     Reference as Reference,
 )
+from paraflex.studies.law_comparison import LawComparison as LawComparison
+from paraflex.studies.laws import LawStudy as LawStudy, compare_laws as compare_laws
 from paraflex.studies.optimisation.confidence import Confidence as Confidence
 from paraflex.studies.optimisation.identify import (
     IdentificationResult as IdentificationResult,

@@ -10,9 +10,11 @@ from paraflex.display import facts, page, sentence, table, view
 from paraflex.results import summary
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
+from paraflex.results.metrics import metric_label
 from paraflex.results.validity import validity_line
 from paraflex.studies.agreement import Verification
 from paraflex.studies.comparison import MethodComparison
+from paraflex.studies.law_comparison import LawComparison, unit_shown
 from paraflex.studies.optimisation.identify import IdentificationResult
 from paraflex.studies.optimisation.indices import IndicesResult
 from paraflex.studies.optimisation.optimise import OptimisationResult
@@ -178,6 +180,24 @@ def comparison_html(comparison: MethodComparison) -> str:
         table(heads, rows[:_MOST_LISTED]),
         _more(len(rows)),
     )
+
+
+@view.register(LawComparison)
+def laws_html(comparison: LawComparison) -> str:
+    """Every law in every mode: how it ended, and its metrics."""
+    found, data = comparison.to_dict(), comparison.dataset
+    units = {name: unit_shown(data, name) for name in comparison.metrics}
+    cells = [(law, mode, cell) for law, one in found["laws"].items() for mode, cell in one["modes"].items()]
+    rows = [
+        (mode, law, cell["status"], *(cell[name] if cell[name] is None else unit.factor * cell[name]
+                                      for name, unit in units.items()))
+        for law, mode, cell in sorted(cells, key=lambda each: comparison.modes.index(each[1]))
+    ]  # fmt: skip
+    heads = [metric_label(name) + (f" [{unit.name}]" if unit.name else "") for name, unit in units.items()]
+    why = [sentence(f"{law} in {mode}: {cell['reason']}") for law, mode, cell in cells if "reason" in cell]
+    state = _state(comparison.complete, comparison.interrupted)
+    return page(f"{found['mechanism']}, control laws compared: {state}", table(("mode", "law", "status", *heads), rows),
+                *why)  # fmt: skip
 
 
 def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:

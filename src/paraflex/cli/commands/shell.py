@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import typer
 
+from paraflex.cli.commands.control import CompareLawsRequest
 from paraflex.cli.commands.models import (
     DrawRequest,
     InfoRequest,
@@ -32,7 +33,10 @@ _BEGINS = "interrupted; the same command begins anew"
 
 
 class ListedCommand(NamedTuple):
-    """A command: its name, its request, the module of `paraflex.cli` and the function there, and its help."""
+    """A command: its name, its request, the module of `paraflex.cli` and the function there, and its help.
+
+    The name of a command in a group follows that of the group.
+    """
 
     name: str
     request: type
@@ -54,6 +58,8 @@ class ListedCommand(NamedTuple):
             return exit_code()
 
 
+# Groups of commands by name, and what they are about.
+GROUPS = {"control": "Sampled controllers of a model."}
 # They keep every run.
 _STUDIES = (SweepRequest, SearchRequest, IndicesRequest)
 # In the order of `paraflex --help`.
@@ -70,6 +76,10 @@ COMMANDS = (
         Write the report of results that are there: one HTML file that needs no network."""),
     ListedCommand("compare-methods", CompareMethodsRequest, "compare_methods.compare_methods_command", """
         Time every method of integration against its error; write compare-methods.json and figures/."""),
+    ListedCommand("control compare", CompareLawsRequest, "control.compare_laws_command", """
+        Run the controllers of a model, and the open loop, in several modes: errors, vibration, torques, energy.
+
+        Writes laws.csv, laws.json, laws.nc and figures/. A law that cannot run in a mode has its reason."""),
     ListedCommand("sensitivity", SensitivityRequest, "sensitivity.sensitivity_command", """
         Differentiate what runs are judged by; write sensitivity.json, a table and figures/."""),
     ListedCommand("sweep", SweepRequest, "sweep.sweep_command", """

@@ -1,0 +1,70 @@
+"""Requests about control laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from typer import Option
+
+from paraflex.cli.commands.options import (
+    METRES,
+    SECONDS,
+    Json,
+    MethodOption,
+    ModelChoice,
+    PlanChoice,
+    ReplaceOption,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareLawsRequest:
+    """What `paraflex control compare` is asked for; None takes the model's or the program's default."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    controllers: Annotated[
+        list[str],
+        Option(
+            "--controller",
+            metavar="NAME",
+            help="A controller of the model, or several that act together, a+b; repeatable. Default: each by itself. "
+            "The open loop is always there, with none it is alone.",
+        ),
+    ] = field(default_factory=list)
+    modes: Annotated[
+        list[str],
+        Option("--mode", "--modes", metavar="MODE", help="Actuation mode; repeatable. Default: the study's."),
+    ] = field(default_factory=list)
+    paths: Annotated[
+        list[str],
+        Option(
+            "--path",
+            metavar="NAME|FILE",
+            help="A path of the model or a TOML file with one; repeatable, each law then has a row for each. Default: "
+            "the study's first.",
+        ),
+    ] = field(default_factory=list)
+    metrics: Annotated[
+        list[str],
+        Option(
+            "--metric",
+            metavar="NAME",
+            help="A metric, as studies have them; repeatable. Default: errors, vibration, settling, torques, energy.",
+        ),
+    ] = field(default_factory=list)
+    tolerance: Annotated[
+        float | None, Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 1e-5.")
+    ] = None
+    method: MethodOption = None
+    step: Annotated[
+        float | None,
+        Option(metavar="S", parser=SECONDS, help="A fixed step. Default: the study's, else chosen by errors."),
+    ] = None
+    plan: PlanChoice = field(default_factory=PlanChoice)
+    workers: Annotated[
+        int | None, Option(metavar="N", help="Runs at a time. Default: one a processor; results are the same.")
+    ] = None
+    out: Annotated[str, Option("--output", "--out", metavar="DIR", help="Folder for table and figure.")] = "laws"
+    force: ReplaceOption = False
+    json: Json = False

@@ -1,0 +1,105 @@
+"""What `paraflex control compare` prints."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+
+import xarray as xr
+from rich.console import Console
+
+from paraflex.cli.tables import plain_table, print_titled
+from paraflex.results.metrics import VALIDITY, metric_label
+from paraflex.studies.law_comparison import LawComparison, unit_shown
+
+# Letters of a line of a heading, and room between two columns.
+_HEAD, _BETWEEN = 9, 2
+# Internal torques below this share of the peak torque are rounding.
+_ROUNDING = 1e-8
+
+
+def print_laws(console: Console, result: LawComparison) -> None:
+    """A block of rows for each mode, a row for each law; of columns as many side by side as there is room for."""
+    data = result.data
+    metrics = [name for name in result.metrics if name != VALIDITY]
+    columns = {_heading(data, name): _column(data, name) for name in metrics}
+    cells = [(mode, law) for mode in range(data.sizes["mode"]) for law in range(data.sizes["law"])]
+    names = [["" if law else result.modes[mode], result.laws[law]] for mode, law in cells]
+    taken = sum(max(map(len, texts)) + _BETWEEN for texts in zip(*names, ("mode", "law"), strict=True))
+    title = f"{data.attrs['mechanism']}: control laws"
+    for heads in _fitting(columns, console.width - taken):
+        rows = ([*names[k], *(columns[head][cell] for head in heads)] for k, cell in enumerate(cells))
+        print_titled(console, title, plain_table("mode", "law", numbers=_level(heads), rows=rows))
+        title = "continued"
+    for line in (*_reasons(result), *_doubtful(result)):
+        console.print(line, soft_wrap=True)
+    if result.interrupted:
+        console.print("interrupted: what is not run begins anew with the same command", soft_wrap=True)
+
+
+def _heading(data: xr.Dataset, name: str) -> str:
+    unit = unit_shown(data, name).name
+    lines = textwrap.wrap(metric_label(name), _HEAD, break_long_words=False)
+    return "\n".join([*lines, f"[{unit}]" if unit else ""])
+
+
+def _column(data: xr.Dataset, name: str) -> dict[tuple[int, int], str]:
+    """Texts by place of mode and law; that of a cell without numbers is its status, in the first column alone."""
+    values = unit_shown(data, name).factor * _unless_rounding(data, name).transpose("mode", "law").values
+    status = data["status"].transpose("mode", "law").values
+    first = name == next(iter(data.data_vars))
+    out = {}
+    for k, mode in enumerate(values):
+        for j, value in enumerate(mode):
+            known = "-" if math.isnan(value) else f"{value:.3g}"
+            out[k, j] = known if status[k, j] == "complete" else str(status[k, j]) if first else ""
+    return out
+
+
+def _unless_rounding(data: xr.Dataset, name: str) -> xr.DataArray:
+    if (name, "peak_torque_max" in data) != ("internal_torque_max", True):
+        return data[name]
+    return data[name].where(~(data[name] < _ROUNDING * data["peak_torque_max"]), 0.0)
+
+
+def _level(heads: Sequence[str]) -> list[str]:
+    """Headings of as many lines each, units on the last."""
+    most = max(head.count("\n") for head in heads)
+    return ["\n" * (most - head.count("\n")) + head for head in heads]
+
+
+def _fitting(columns: dict[str, dict[tuple[int, int], str]], room: int) -> Iterator[list[str]]:
+    """Headings of columns that stand side by side in so many letters, one at least."""
+    heads: list[str] = []
+    left = room
+    for head, texts in columns.items():
+        width = max(map(len, (*head.split("\n"), *texts.values()))) + _BETWEEN
+        if heads and width > left:
+            yield heads
+            heads, left = [], room
+        heads.append(head)
+        left -= width
+    yield heads
+
+
+def _reasons(result: LawComparison) -> Iterator[str]:
+    """Why laws did not run to the end in a mode, or how they are doubtful; once where it is the same of several."""
+    said = dict[tuple[str, str], list[str]]()
+    for name, cell in _cells(result):
+        if reason := str(cell["reason"].item()):
+            said.setdefault((str(cell["status"].item()), reason), []).append(name)
+    for (status, reason), names in said.items():
+        yield f"{'; '.join(names)}: {status}, {reason}"
+
+
+def _doubtful(result: LawComparison) -> Iterator[str]:
+    """Which laws bend links beyond what the model can describe, in which mode."""
+    if names := [name for name, cell in _cells(result) if cell[VALIDITY] > 1.0]:
+        yield f"beyond what the model can describe ({VALIDITY} above 1): {'; '.join(names)}"
+
+
+def _cells(result: LawComparison) -> Iterator[tuple[str, xr.Dataset]]:
+    for law in result.laws:
+        for mode in result.modes:
+            yield f"{law} in {mode}", result.data.sel(law=law, mode=mode)
