@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from paraflex.actuation import Effort, FeedForward, required_effort
 from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
+from paraflex.arguments import with_fields
 from paraflex.arrays import Numbers
 from paraflex.control.shaped import ShapedPath
 from paraflex.designs.derivatives.plans import Given
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
-from paraflex.designs.derivatives.steps import Stepped, complex_step, part, stepped, with_fields
+from paraflex.designs.derivatives.steps import Stepped, complex_step, part, stepped
 from paraflex.designs.run import Task
 from paraflex.designs.setting import Setting
 from paraflex.dynamics import (
