@@ -17,7 +17,7 @@ from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.limits import solvable
-from paraflex.mechanism import Mechanism, PointRef, in_frames
+from paraflex.mechanism import Mechanism, PointRef, in_frames, with_actuators
 
 
 @given_as("a system", "the system that dynamics.build_system makes")
@@ -169,7 +169,7 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     ProportionError
         One whose damping cannot be found, for numbers too far apart.
     """
-    mechanism = in_frames(mechanism)
+    mechanism = with_actuators(in_frames(mechanism))
     index = {body.name: i for i, body in enumerate(mechanism.bodies)}
     constraints = row_order(mechanism, index)
     modes = {} if like is None else {body.name: body.modes for body in like.bodies}
