@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import twins
+from paraflex.arguments import with_fields
 from paraflex.designs.derivatives.changes import Change
 from paraflex.designs.derivatives.plans import given, nominal_values, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
-from paraflex.arguments import with_fields
 from paraflex.designs.derivatives.steps import COMPLEX_STEP, complex_step, part
 from paraflex.designs.run import Task, plan_task
 from paraflex.dynamics import build_system, numbers_of

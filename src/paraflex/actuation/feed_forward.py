@@ -92,12 +92,12 @@ def _shaped(signal: InputSignals, delays: Array, weights: Array) -> InputSignals
         inside = piece >= 0
         piece = np.minimum(piece, len(signal.coefficients) - 1)[inside]
         moved = breaks[:-1][inside] - delay - signal.breaks[piece]
-        coefficients[inside] += weight * _about(signal.coefficients[piece], moved)
+        coefficients[inside] += weight * about(signal.coefficients[piece], moved)
         coefficients[~inside, 0] += weight * signal.coefficients[0, 0]
     return InputSignals(breaks, coefficients)
 
 
-def _about(coefficients: Array, places: Array) -> Array:
+def about(coefficients: Array, places: Array) -> Array:
     """Coefficients (k, 6) of polynomials about other places (k,)."""
     out = np.zeros_like(coefficients)
     for power in range(_DEGREE + 1):

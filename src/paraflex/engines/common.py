@@ -46,7 +46,7 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
         ],
         "structural damping": [f"body.{beam.name}.damping" for beam in beams if beam.damping is not None],
     } | {
-        f"a {group.word}": [f"{group.table}.{one.name}" for one in members]
+        group.one: [f"{group.table}.{one.name}" for one in members]
         for group, members in grouped(mechanism)
         if not group.engines
     }

@@ -28,8 +28,8 @@ class Amplifier(Enum):
 class Actuator(CheckedFields):
     """A direct-current motor (or a servo motor in its torque-producing axis) with a gear and an amplifier.
 
-    At the joint, w its rate: torque = n k_t i, and L i' + R i = u - k_e n w. The rotor's inertia J_m acts on the joint's
-    coordinate as n^2 J_m; what its carrier's own rotation adds, n J_m, is neglected as that of a fast gear.
+    At the joint, w its rate: torque = n k_t i, and L i' + R i = u - n k_e w. The rotor's inertia J_m acts on the
+    coordinate of the joint as n^2 J_m.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Actuator(CheckedFields):
         for other in others:
             if asked and getattr(self, other) is None:
                 word = other.replace("_", " ")
-                value = f'{given} = {getattr(getattr(self, given), "value", getattr(self, given))}'
+                value = f"{given} = {getattr(getattr(self, given), 'value', getattr(self, given))}"
                 raise InputError(
                     "is missing", field=f"actuator.{self.name}.{other}",
                     remedy=f"give the {word}, which {value} needs, or leave that out",
@@ -136,12 +136,12 @@ class Actuator(CheckedFields):
 
     @property
     def torque_per_current(self) -> float | None:
-        """n k_t, at the joint [N m/A, N/A]; None without a torque constant."""
+        """N k_t, at the joint [N m/A, N/A]; None without a torque constant."""
         return None if self.torque_constant is None else self.gear * self.torque_constant
 
     @property
     def voltage_per_rate(self) -> float | None:
-        """n k_e, of the joint's rate [V s/rad, V s/m]; None without a torque constant."""
+        """N k_e, of the joint's rate [V s/rad, V s/m]; None without a torque constant."""
         constant = self.torque_constant if self.back_emf is None else self.back_emf
         return None if constant is None else self.gear * constant
 

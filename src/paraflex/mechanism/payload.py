@@ -96,8 +96,10 @@ def _merged(body: RigidBody, place: np.ndarray, mass: float, inertia: float) -> 
     masses = np.array([body.mass, mass])
     places = np.array([body.centre_of_mass, place])
     centre = masses @ places / masses.sum()
-    inertia = body.inertia + inertia + masses @ np.sum((places - centre) ** 2, axis=1)
-    return with_fields(body, mass=masses.sum().item(), inertia=inertia.item(), centre_of_mass=tuple(centre.tolist()))
+    whole = body.inertia + inertia + masses @ np.sum((places - centre) ** 2, axis=1)
+    return with_fields(
+        body, mass=masses.sum().item(), inertia=np.array(whole).item(), centre_of_mass=tuple(centre.tolist())
+    )
 
 
 def _with_point_mass(body: ModalBody, point: str, mass: float, inertia: float) -> ModalBody:
