@@ -14,6 +14,9 @@ from paraflex.control.amplifiers import relaxing
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import InputSignals, build_system
+from paraflex.engines.common import check_engine
+from paraflex.engines.exudyn import simulate_exudyn
+from paraflex.engines.mujoco import simulate_mujoco
 from paraflex.errors import InputError
 from paraflex.files import model_from
 from paraflex.mechanism import with_actuators
@@ -494,8 +497,14 @@ def test_a_rotor_between_moving_bodies_is_refused():
         cart(turned, [pf.Actuator("s", rotor_inertia=1e-5)])
 
 
-def test_other_programs_refuse(square):
-    from paraflex.engines.common import check_engine
-
-    with pytest.raises(InputError, match=r"actuator\.servo: \w+ cannot express an actuator"):
-        check_engine("mujoco", square.mechanism)
+@pytest.mark.parametrize("engine", ["mujoco", "exudyn"])
+def test_other_programs_have_rotors_and_refuse_back_emf(square, engine):
+    """A rigid linkage of other programs follows the plan with our torques only where its rotors are the same."""
+    pytest.importorskip(engine)
+    task = square.remodelled(square.mechanism.rigid())
+    other = simulate_mujoco(task, "++++") if engine == "mujoco" else simulate_exudyn(task, "++++")
+    away = np.max(np.abs(other.end_effector.position - task.motion.desired.position))
+    assert away < 1e-6
+    voltage = replace(SERVO, amplifier="voltage", bandwidth=None)
+    with pytest.raises(InputError, match=r"actuator\.servo\.amplifier: \w+ cannot express back-EMF"):
+        check_engine(engine, replace(square.mechanism, actuators=(voltage,)))

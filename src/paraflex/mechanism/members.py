@@ -139,7 +139,7 @@ class Members(CheckedFields):
     )
     gears: tuple[Gear, ...] = group("gear", "gear", Gear, engines=True)
     loads: tuple[Load, ...] = group("load", "load", PointForce, AppliedTorque)
-    actuators: tuple[Actuator, ...] = group("actuator", "actuator", Actuator)
+    actuators: tuple[Actuator, ...] = group("actuator", "actuator", Actuator, engines=True)
     sensors: tuple[Sensor, ...] = group("sensor", "sensor", *SENSOR_KINDS.values(), engines=True, measures=True)
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
