@@ -216,8 +216,8 @@ def test_integrals_stay_while_torques_are_limited():
 
 def plant_of(**changes):
     settings = {
-        "mechanism": rotor().mechanism, "mode": None, "task": None, "state": None, "inputs": ("y1", "y2"), "input_units": ("", ""),
-        "outputs": ("u1",), "period": PERIOD, "delay": 0.0,
+        "mechanism": rotor().mechanism, "mode": None, "task": None, "state": None, "inputs": ("y1", "y2"),
+        "input_units": ("", ""), "outputs": ("u1",), "period": PERIOD, "delay": 0.0,
     }  # fmt: skip
     return Plant(**{**settings, **changes})
 

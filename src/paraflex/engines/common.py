@@ -32,7 +32,7 @@ def check_dwell(name: str, task: TrackingTask) -> None:
 
 
 def with_rotors(task: TrackingTask) -> TrackingTask:
-    """The same task with lumps at joints in place of actuators, for programs that know bodies alone."""
+    """The same task with lumps at joints in place of actuators, for programs that build bodies of their own."""
     return replace(task, mechanism=with_actuators(task.mechanism))
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arrays import Array
 from paraflex.dynamics import System, still_signals
-from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between, with_rotors
+from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
 from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
@@ -79,7 +79,6 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
     """
     check_engine("mujoco", task.mechanism)
     check_dwell("mujoco", task)
-    task = with_rotors(task)
     mujoco = import_engine("mujoco")
     options = options or MuJoCoOptions()
     began = time.perf_counter()
