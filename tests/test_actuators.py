@@ -26,6 +26,7 @@ from paraflex.results.record import record
 from paraflex.results.run_traces import run_traces
 from paraflex.studies import load_sensitivities, metric_gradients
 from rotors import ROTOR, J
+from shell import paraflex
 
 START = """
 [start.coordinates]
@@ -256,7 +257,8 @@ def test_a_rotor_is_a_body_on_a_gear(joint):
 
 
 def test_a_rotor_does_not_weigh():
-    """Equilibria are those without it: its mass n^2 J_m on a rail is none to gravity."""
+    """Equilibria are those without it: its mass n^2 J_m on a rail is none to gravity, nor a mass of the mechanism."""
+    assert build_system(cart(RAIL, [pf.Actuator("servo", gear=60.0, rotor_inertia=2e-4)])).total_mass == 2.0
     for joint in (RAIL, SLOT, PIN):
         found = []
         for actuators in ((), (pf.Actuator("servo", gear=60.0, rotor_inertia=2e-4),)):
@@ -496,6 +498,13 @@ def test_a_rotor_between_moving_bodies_is_refused():
     turned = pf.SlotJoint("rail", "cart.P", "ground.O")
     with pytest.raises(InputError, match="a joint that slides on cart"):
         cart(turned, [pf.Actuator("s", rotor_inertia=1e-5)])
+
+
+def test_info_has_the_numbers_of_a_datasheet(tmp_path):
+    rotor('amplifier = "voltage"\nvoltage_limit = 24.0').mechanism.save(tmp_path / "rotor.toml")
+    said = " ".join(paraflex("info", str(tmp_path / "rotor.toml")).stdout.split())
+    assert "servo: rotor 0.01 kg m^2, back-EMF 4.5 N m s/rad, stall 72 N m, no load 16 rad/s" in said
+    assert pf.Actuator("m", gear=60.0, rotor_inertia=2e-4).summary(slides=True) == "rotor 0.72 kg"
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "exudyn"])

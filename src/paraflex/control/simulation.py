@@ -145,6 +145,7 @@ class Simulation:
             self.system, self._initial, self._times = begun
         self.end: float = float(self._times[-1])
         self._amplifiers = Amplifiers(self.mechanism)
+        self._limited = self._amplifiers.limited & np.isin(np.arange(len(own)), self._active)
         self._pack()
         self._readings = Readings(self.system, measured_sensors(self.system.mechanism))
         self._watched = self._readings
@@ -428,13 +429,12 @@ class Simulation:
 
     def _within_limits(self, torques: Array) -> Array:
         """Torques (motors,) that with those of the plan are within the limits of amplifiers at the speed now."""
-        limited = self._amplifiers.limited & np.isin(np.arange(torques.size), self._active)
-        if not np.any(limited):
+        if not self._limited.any():
             return torques
         now = self._integration.run.now()
         low, high = self._amplifiers.limits(self._amplifiers.rates(self.system, now.q, now.v))
         planned = self._planned(now.t)
-        return np.where(limited, np.clip(torques, low - planned, high - planned), torques)
+        return np.where(self._limited, np.clip(torques, low - planned, high - planned), torques)
 
     def _hold(self) -> None:
         """Write the torques held into the signals."""

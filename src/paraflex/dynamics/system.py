@@ -17,7 +17,7 @@ from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.limits import solvable
-from paraflex.mechanism import Mechanism, PointRef, in_frames, with_actuators
+from paraflex.mechanism import Mechanism, PointRef, in_frames, rotor_mass, with_actuators
 
 
 @given_as("a system", "the system that dynamics.build_system makes")
@@ -63,7 +63,7 @@ class System:
     @property
     def total_mass(self) -> float:
         """Mass of all bodies [kg]."""
-        return float(self.packed.total_mass)
+        return float(self.packed.total_mass - rotor_mass(self.described))
 
     @property
     def size(self) -> float:

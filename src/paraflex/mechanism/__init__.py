@@ -76,6 +76,7 @@ from paraflex.mechanism.raparm import raparm_i as raparm_i
 from paraflex.mechanism.rotors import (
     actuator_motors as actuator_motors,
     actuators_by_motor as actuators_by_motor,
+    rotor_mass as rotor_mass,
     with_actuators as with_actuators,
 )
 from paraflex.mechanism.rows import chain_of_segments as chain_of_segments, four_bars_in_a_row as four_bars_in_a_row

@@ -198,6 +198,14 @@ class Actuator(CheckedFields):
             currents.append(self.voltage_limit / self.resistance)
         return per_current * min(currents)
 
+    def summary(self, *, slides: bool = False) -> str:
+        """What is known of it in a line, at a joint that turns or slides."""
+        of = ("kg", "N s/m", "N", "m/s") if slides else ("kg m^2", "N m s/rad", "N m", "rad/s")
+        words = ("rotor", "back-EMF", "stall", "no load", "lag")
+        values = (self.reflected_inertia, self.damping, self.stall_torque, self.no_load_speed, 1e3 * self.lag)
+        known = zip(words, values, (*of, "ms"), strict=True)
+        return ", ".join(f"{word} {value:.4g} {unit}" for word, value, unit in known if 0.0 < value < inf)
+
     def matching_gear(self, inertia: float) -> float:
         """The gear ratio with which a torque of the motor accelerates a load most: n^2 J_m equals its inertia.
 

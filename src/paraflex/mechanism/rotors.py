@@ -114,6 +114,13 @@ def with_actuators(mechanism: Any) -> Any:
     )  # fmt: skip
 
 
+def rotor_mass(mechanism: Members) -> float:
+    """What rotors add to the masses of bodies that slide, n^2 J_m each, which is no mass that anyone weighs [kg]."""
+    found = actuators_by_motor(mechanism)
+    sliding = (found[motor.name] for motor in mechanism.motors if motor.name in found and mechanism.slides(motor.joint))
+    return sum(one.reflected_inertia for one in sliding)
+
+
 def _weightless(motor: str, point: PointRef, mass: Any, gravity: Sequence[float]) -> PointForce:
     balance = PointForce(f"rotor of {motor}", point, (0.0, 0.0))
     return with_fields(balance, force=(-mass * gravity[0], -mass * gravity[1]))

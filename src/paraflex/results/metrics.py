@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from paraflex.mechanism import rotor_mass
 from paraflex.results.formulas import drift_speed, integral, largest_norm, overshoot, rms, settling_time, vibration
 from paraflex.results.traces import Trace
 from paraflex.units import WHERE_IT_SLIDES
@@ -308,7 +309,8 @@ _ALL = (
     Metric("section_moment_max", "largest magnitude of the bending moment in any beam", "N m",
            _section_moment, "largest bending moment", runs=_ANY),
     Metric("total_mass", "mass of all bodies", "kg",
-           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.system.bodies])), "mass", runs=_ANY),
+           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.system.bodies]) - rotor_mass(x.system.described)),
+           "mass", runs=_ANY),
     Metric("actuation_condition_max", "largest condition number of the actuation matrix", "1",
            _largest(lambda x: x.condition), "largest condition number", runs=(PATH,)),
     _of_the_solver("constraint_position_max", "largest constraint violation in position", "m"),
