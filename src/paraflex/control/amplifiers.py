@@ -30,6 +30,10 @@ def _breaks() -> Array:
 
 
 _BREAKS = _breaks()
+# Coefficients of exp(-x) in these pieces, and of nothing after them.
+_LEFT = np.vstack([
+    piecewise_quintic(_BREAKS, np.exp(-_BREAKS), -np.exp(-_BREAKS), np.exp(-_BREAKS)).coefficients, np.zeros((1, 6)),
+])  # fmt: skip
 
 
 class Amplifiers:
@@ -107,7 +111,7 @@ def relaxing(base: InputSignals, t: float, begin: float, target: float, lag: flo
     ----------
     base : InputSignals
     t : float
-        From when on the sum is wanted [s].
+        From when on the sum is wanted, before the end of the signal [s].
     begin, target : float
         [N m, N]
     lag : float
@@ -118,16 +122,19 @@ def relaxing(base: InputSignals, t: float, begin: float, target: float, lag: flo
     InputSignals
         Exact but for 1e-10 of the change.
     """
-    end = base.breaks[-1]
-    own = t + lag * _BREAKS
-    breaks = np.unique(np.concatenate([[t], own[own < end], base.breaks[base.breaks > t], [max(end, t + lag)]]))
-    piece = np.clip(np.searchsorted(base.breaks, breaks[:-1], side="right") - 1, 0, len(base.coefficients) - 1)
-    coefficients = about(base.coefficients[piece], breaks[:-1] - base.breaks[piece])
-    left = (begin - target) * np.exp(-(breaks - t) / lag)
-    left[breaks - t > _RELAXED * lag] = 0.0
-    coefficients += piecewise_quintic(breaks, left, -left / lag, left / lag**2).coefficients
+    own, end = t + lag * _BREAKS, base.breaks[-1]
+    first, last = np.searchsorted(base.breaks, (t, min(own[-1], end)), side="right")
+    between = base.breaks[first : min(last, base.breaks.size - 1)]
+    starts = np.sort(np.concatenate([own[own < end], between]))
+    starts = starts[np.diff(starts, append=np.inf) > 0.0]
+    piece = np.maximum(np.searchsorted(base.breaks, starts, side="right") - 1, 0)
+    part = np.minimum(np.searchsorted(own, starts, side="right") - 1, len(_LEFT) - 1)
+    both = np.concatenate([base.coefficients[piece], (begin - target) * _LEFT[part] / lag ** np.arange(6)])
+    planned, left = np.split(about(both, np.concatenate([starts - base.breaks[piece], starts - own[part]])), 2)
+    rest = slice(min(last, base.breaks.size - 1), None)
+    coefficients = np.vstack([planned + left, base.coefficients[rest]])
     coefficients[:, 0] += target
-    return InputSignals(breaks, coefficients)
+    return InputSignals(np.concatenate([starts, base.breaks[rest]]), coefficients)
 
 
 def with_room(signal: InputSignals, pieces: int | None = None) -> InputSignals:
