@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 
 from paraflex import load
-from paraflex.designs.derivatives.steps import with_fields
+from paraflex.arguments import with_fields
 from paraflex.dynamics import State, build_system, natural_frequencies
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition

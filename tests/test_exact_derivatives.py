@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import twins
+from paraflex.arguments import with_fields
 from paraflex.designs.derivatives.changes import Change
 from paraflex.designs.derivatives.plans import given, nominal_values, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
-from paraflex.designs.derivatives.steps import COMPLEX_STEP, complex_step, part, with_fields
+from paraflex.designs.derivatives.steps import COMPLEX_STEP, complex_step, part
 from paraflex.designs.run import Task, plan_task
 from paraflex.dynamics import build_system, numbers_of
 from paraflex.errors import InputError

@@ -8,7 +8,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from paraflex.designs.derivatives.steps import with_fields
+from paraflex.arguments import with_fields
 from paraflex.errors import InputError
 from paraflex.kinematics import (
     Circle,

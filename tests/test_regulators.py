@@ -16,6 +16,7 @@ from paraflex.control.controllers import Plant
 from paraflex.control.estimators import kalman_filter, riccati
 from paraflex.errors import InputError
 from paraflex.kinematics import Line
+from rotors import rotor
 
 # Quanser's arm with flexible links, first stage: a steel beam of 3 x 0.050 in, 0.202 m; repository
 # basta/quanser-2-dof-serial-flexible-link.
@@ -216,8 +217,8 @@ def test_integrals_stay_while_torques_are_limited():
 
 def plant_of(**changes):
     settings = {
-        "mechanism": None, "mode": None, "task": None, "state": None, "inputs": ("y1", "y2"), "input_units": ("", ""),
-        "outputs": ("u1",), "period": PERIOD, "delay": 0.0,
+        "mechanism": rotor().mechanism, "mode": None, "task": None, "state": None, "inputs": ("y1", "y2"),
+        "input_units": ("", ""), "outputs": ("u1",), "period": PERIOD, "delay": 0.0,
     }  # fmt: skip
     return Plant(**{**settings, **changes})
 

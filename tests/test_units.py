@@ -47,7 +47,7 @@ def test_units_of_a_dimension_are_multiples_of_its_si_unit():
         assert spelt(unit_named(text).dimension) == ("Hz" if unit == "1/s" else unit)
     for unit in FIELD_UNITS:
         assert unit_named(unit).factor == 1
-    assert spelt((3, 1, 0, -1)) == "kg m^3 rad^-1"
+    assert spelt((3, 1, 0, -1, 0)) == "kg m^3 rad^-1"
     assert UNITS["Nm"].dimension == unit_named("N m").dimension
     # An angle counts, so that frequencies are no speeds of rotation.
     assert unit_named("Hz").dimension != unit_named("rad/s").dimension

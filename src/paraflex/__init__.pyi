@@ -19,6 +19,8 @@ from .mechanism import (
     WeldJoint as WeldJoint,
     PointRef as PointRef,
     Motor as Motor,
+    Actuator as Actuator,
+    Amplifier as Amplifier,
     EndEffector as EndEffector,
     Payload as Payload,
     ActuationMode as ActuationMode,

@@ -91,6 +91,14 @@ class CheckedFields:
                 object.__setattr__(self, name, taken)
 
 
+def with_fields(record: C, **changes: Any) -> C:
+    """A dataclass with other fields, like `replace`, without checks of them: complex numbers pass."""
+    new = object.__new__(type(record))
+    for each in fields(record):  # pyright: ignore[reportArgumentType]
+        object.__setattr__(new, each.name, changes.get(each.name, getattr(record, each.name)))
+    return new
+
+
 class _Field:
     """The name of a field, composed only if an error needs it."""
 

@@ -34,7 +34,7 @@ from paraflex.integrators.linear_structure import Block, Response, march
 from paraflex.integrators.methods import GeneralisedAlpha
 from paraflex.kernel.bodies import motion_forces, system_energy
 from paraflex.kernel.packed import make_scratch
-from paraflex.mechanism import ActuationMode, Geometry, grouped
+from paraflex.mechanism import ActuationMode, Geometry, grouped, with_actuators
 from paraflex.tracking import TrackingRun, TrackingTask
 
 # A sample spacing may be this much longer than a whole number of steps: rounding of the division.
@@ -144,7 +144,8 @@ def simulate_ked(
 
 def _check(task: TrackingTask, step: float) -> None:
     mechanism = task.mechanism
-    beyond = {(group.table, group.words): members for group, members in grouped(mechanism) if group.resists}
+    beyond = {(group.table, group.words): members for group, members in grouped(with_actuators(mechanism))
+              if group.resists}  # fmt: skip
     beyond["damped beam", "damped beams"] = tuple(
         body for body in mechanism.bodies if getattr(body, "damping", None) is not None
     )

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from paraflex.actuation import Electrical, electrical, electrical_findings
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.display import Shown
@@ -77,9 +78,17 @@ class MotionRun(Shown):
         return assess(self.system, self.solution)
 
     @cached_property
+    def electrical(self) -> Electrical:
+        """Currents and voltages of the motors, by the mechanism's actuators."""
+        return electrical(self.system, self.system.described, self)
+
+    @cached_property
     def doubts(self) -> tuple[Finding, ...]:
-        """Findings on events in the run, and on implausible results."""
-        return (*self.solution.findings, *doubtful_results(self.system, self.solution))
+        """Findings on events in the run, on implausible results and limits of amplifiers."""
+        results = doubtful_results(self.system, self.solution)
+        described = self.system.described
+        amplifiers = electrical_findings(described, self.electrical) if described.actuators else ()
+        return (*self.solution.findings, *results, *amplifiers)
 
 
 @checked_arguments()

@@ -9,7 +9,17 @@ from functools import cached_property
 
 import numpy as np
 
-from paraflex.actuation import Effort, FeedForward, TorquePlan, actuation_condition, plan_torques, required_effort
+from paraflex.actuation import (
+    Effort,
+    Electrical,
+    FeedForward,
+    TorquePlan,
+    actuation_condition,
+    electrical,
+    electrical_findings,
+    plan_torques,
+    required_effort,
+)
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.display import Shown
@@ -259,7 +269,14 @@ class TrackingRun(Shown):
             replace(one, place=f"mode {self.mode.name}") if one.place == SAMPLES else one
             for one in self.solution.findings
         )
-        return (*of_run, *found)
+        described = whole.mechanism
+        amplifiers = electrical_findings(described, self.electrical, self.mode) if described.actuators else ()
+        return (*of_run, *found, *amplifiers)
+
+    @cached_property
+    def electrical(self) -> Electrical:
+        """Currents and voltages of the motors, by the mechanism's actuators."""
+        return electrical(self.task.system, (self.task.whole or self.task).mechanism, self)
 
     @cached_property
     def driven(self) -> Driven | None:

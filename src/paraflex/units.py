@@ -9,10 +9,10 @@ from fractions import Fraction
 from functools import cache
 from typing import NamedTuple
 
-# Exponents of metre, kilogram, second and radian. An angle counts, so that a speed in rpm is none in m/s.
-Dimension = tuple[int, int, int, int]
-PLAIN: Dimension = (0, 0, 0, 0)
-ANGLE: Dimension = (0, 0, 0, 1)
+# Exponents of metre, kilogram, second, radian and ampere. An angle counts, so that a speed in rpm is none in m/s.
+Dimension = tuple[int, int, int, int, int]
+PLAIN: Dimension = (0, 0, 0, 0, 0)
+ANGLE: Dimension = (0, 0, 0, 1, 0)
 
 
 class DisplayUnit(NamedTuple):
@@ -62,8 +62,10 @@ _COMMON = ("mm", "cm", "kg", "ms", "kN", "deg", "rad", "rpm", "MPa", "GPa")
 _ONE = Unit(Fraction(1), 0, PLAIN)
 
 
-def _unit(factor: str | int | Fraction, m: int = 0, kg: int = 0, s: int = 0, rad: int = 0, *, pi: int = 0) -> Unit:
-    return Unit(Fraction(factor), pi, (m, kg, s, rad))
+def _unit(
+    factor: str | int | Fraction, m: int = 0, kg: int = 0, s: int = 0, rad: int = 0, A: int = 0, *, pi: int = 0
+) -> Unit:
+    return Unit(Fraction(factor), pi, (m, kg, s, rad, A))
 
 
 _PREFIXES = {"G": "1e9", "M": "1e6", "k": "1e3", "m": "1e-3", "u": "1e-6", "µ": "1e-6", "μ": "1e-6", "n": "1e-9"}
@@ -77,6 +79,10 @@ _PREFIXED = {
     "Nm": _unit(1, m=2, kg=1, s=-2),
     "Pa": _unit(1, m=-1, kg=1, s=-2),
     "Hz": _unit(1, s=-1),
+    "A": _unit(1, A=1),
+    "V": _unit(1, m=2, kg=1, s=-3, A=-1),
+    "ohm": _unit(1, m=2, kg=1, s=-3, A=-2),
+    "H": _unit(1, m=2, kg=1, s=-2, A=-2),
 }
 _SINGLE = {
     "cm": _unit("1e-2", m=1),
@@ -178,8 +184,9 @@ def _mistyped(word: str) -> list[str]:
 
 # Units of fields of files, as their descriptions name them.
 FIELD_UNITS = (
-    "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad/s", "N m/rad", "N s/m", "N m/s", "N m", "N/m/s", "N/m",
-    "N/s", "m/s^2", "m^4", "m^2", "m/s", "rad/s", "rad", "Pa", "Hz", "1/s", "m", "s", "N",
+    "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad/s", "N m/rad", "N s/m", "N m/s", "N m/A", "N m", "N/m/s",
+    "N/m", "N/s", "m/s^2", "m^4", "m^2", "m/s", "rad/s", "rad/m", "rad", "Pa", "Hz", "1/s", "V s/rad", "V", "ohm", "m",
+    "s", "N", "A", "H",
 )  # fmt: skip
 
 # What a travel, a torque, a stiffness or a speed at a joint is where the joint slides.
@@ -193,5 +200,5 @@ def spelt(dimension: Dimension) -> str:
     for unit in FIELD_UNITS:
         if unit_named(unit).dimension == dimension:
             return unit
-    powers = zip(("kg", "m", "s", "rad"), (dimension[k] for k in (1, 0, 2, 3)), strict=True)
+    powers = zip(("kg", "m", "s", "rad", "A"), (dimension[k] for k in (1, 0, 2, 3, 4)), strict=True)
     return " ".join(name if power == 1 else f"{name}^{power}" for name, power in powers if power) or "1"

@@ -6,6 +6,11 @@ from paraflex.actuation.allocation import (
     allocate as allocate,
     required_effort as required_effort,
 )
+from paraflex.actuation.electrical import (
+    Electrical as Electrical,
+    electrical as electrical,
+    electrical_findings as electrical_findings,
+)
 from paraflex.actuation.feed_forward import (
     FeedForward as FeedForward,
     TorquePlan as TorquePlan,

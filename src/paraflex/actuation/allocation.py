@@ -19,7 +19,7 @@ from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
 from paraflex.kinematics import RigidMotion
-from paraflex.mechanism import ActuationMode
+from paraflex.mechanism import ActuationMode, with_actuators
 
 # Ratio of smallest to largest singular value below which a set of motors cannot drive the mechanism.
 SINGULAR_RATIO = 1e-6
@@ -71,11 +71,11 @@ def motor_rows(motion: RigidMotion) -> Array:
 
 
 def add_springs_and_dampers(motion: RigidMotion, forces: Array) -> None:
-    """Add the forces against springs, dampers and friction at joints to forces (k, n)."""
+    """Add the forces against springs, dampers, back-EMF and friction at joints to forces (k, n)."""
     for spring in motion.mechanism.springs:
         value, _, rows = joint_coordinate(motion.system, spring.joint, motion.q)
         forces += (spring.stiffness * (value - spring.rest))[:, None] * rows
-    for damper in motion.mechanism.dampers:
+    for damper in with_actuators(motion.mechanism).dampers:
         _, rate, rows = joint_coordinate(motion.system, damper.joint, motion.q, motion.v)
         forces += (damper.coefficient * rate)[:, None] * rows
     for friction in motion.mechanism.frictions:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from math import comb, factorial
+from math import factorial
 
 import numpy as np
 import scipy
@@ -92,18 +92,18 @@ def _shaped(signal: InputSignals, delays: Array, weights: Array) -> InputSignals
         inside = piece >= 0
         piece = np.minimum(piece, len(signal.coefficients) - 1)[inside]
         moved = breaks[:-1][inside] - delay - signal.breaks[piece]
-        coefficients[inside] += weight * _about(signal.coefficients[piece], moved)
+        coefficients[inside] += weight * about(signal.coefficients[piece], moved)
         coefficients[~inside, 0] += weight * signal.coefficients[0, 0]
     return InputSignals(breaks, coefficients)
 
 
-def _about(coefficients: Array, places: Array) -> Array:
-    """Coefficients (k, 6) of polynomials about other places (k,)."""
-    out = np.zeros_like(coefficients)
-    for power in range(_DEGREE + 1):
-        for order in range(power + 1):
-            out[:, order] += comb(power, order) * coefficients[:, power] * places ** (power - order)
-    return out
+def about(coefficients: Array, places: Array) -> Array:
+    """Coefficients (k, 6) of polynomials about other places (k,): Horner's scheme, repeated."""
+    out = coefficients.T.copy()
+    for order in range(_DEGREE):
+        for power in range(_DEGREE - 1, order - 1, -1):
+            out[power] += places * out[power + 1]
+    return out.T
 
 
 @dataclass(frozen=True)

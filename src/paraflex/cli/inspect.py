@@ -18,6 +18,7 @@ from paraflex.errors import ProportionError
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
 from paraflex.mechanism import (
+    Actuator,
     AngleLaw,
     AppliedTorque,
     ConstantSpeed,
@@ -25,6 +26,7 @@ from paraflex.mechanism import (
     PointForce,
     PrescribedAngle,
     Relation,
+    actuator_motors,
     grouped,
     loops,
 )
@@ -113,6 +115,7 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "bodies": len(mechanism.bodies),
         "joints": len(mechanism.joints),
         "motors": [motor.name for motor in mechanism.motors],
+        "actuators": [_actuator(mechanism, one) for one in mechanism.actuators],
         "prescribed": [_drive(one, "m/s" if mechanism.slides(one.joint) else "rad/s") for one in mechanism.prescribed],
         "loads": [_load(one) for one in mechanism.loads],
         "coordinates": system.n,
@@ -135,6 +138,13 @@ def _payload_facts(mechanism: Mechanism) -> dict[str, Any] | None:
         return None
     numbers = {"mass": carried.mass, "inertia": carried.inertia, "offset": list(carried.offset)}
     return {"point": str(effector.point), **numbers}
+
+
+def _actuator(mechanism: Mechanism, actuator: Actuator) -> str:
+    """Name and numbers of an actuator at the joints of its motors, of both kinds where they turn and slide."""
+    names = actuator_motors(actuator, mechanism)
+    kinds = dict.fromkeys(mechanism.slides(motor.joint) for motor in mechanism.motors if motor.name in names)
+    return f"{actuator.name}: {'; '.join(actuator.summary(slides=kind) for kind in kinds)}"
 
 
 def _load(load: PointForce | AppliedTorque) -> str:

@@ -83,6 +83,7 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("joints", "joints"),
         ("independent loops", "loop_count"),
         ("motors", "motors"),
+        ("actuators", "actuators"),
         ("prescribed motions", "prescribed"),
         ("loads", "loads"),
         ("coordinates", "coordinates"),
@@ -100,7 +101,7 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("paths", "paths"),
     ):
         # Most mechanisms have no gears and the like.
-        if key in facts and (facts[key] or key not in (*related, "prescribed", "loads")):
+        if key in facts and (facts[key] or key not in (*related, "actuators", "prescribed", "loads")):
             value = facts[key]
             if key == "total_mass" and facts["payload"]:
                 table.add_row(label, f"{value:g}, its payload among it")

@@ -14,6 +14,7 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
+from paraflex.control.amplifiers import largest_commands
 from paraflex.control.controllers import Plant
 from paraflex.control.discrete import DiscreteModel, discrete_model
 from paraflex.control.filters import transfer_function
@@ -98,7 +99,8 @@ class SampledController:
         descending powers of s. It starts settled at the first reading, and takes readings for straight lines between
         samples.
     limits : float, pair or mapping of str to either, optional
-        Of torques, of all or by motor: their largest magnitude, or (lowest, highest) [N m, N].
+        Of torques, of all or by motor: their largest magnitude, or (lowest, highest) [N m, N]; never beyond what the
+        motors' amplifiers take, n k_t I or n k_t U/R.
     rates : float or mapping of str to float, optional
         Largest change of torques in a second [N m/s, N/s].
     name : str
@@ -174,8 +176,9 @@ class SampledController:
         resolution, filters, limits, rates = self.check(plant.inputs, plant.outputs)
         self.resolution: Array = np.array([0.0 if one is None else one for one in resolution])
         self._filters = [None if given is None else _SettledFilter(given, plant.period) for given in filters]
-        self._lowest = np.array([-np.inf if one is None else one[0] for one in limits])
-        self._highest = np.array([np.inf if one is None else one[1] for one in limits])
+        most = largest_commands(plant.mechanism, plant.outputs)
+        self._lowest = np.maximum([-np.inf if one is None else one[0] for one in limits], -most)
+        self._highest = np.minimum([np.inf if one is None else one[1] for one in limits], most)
         self._most = np.array([np.inf if one is None else one * plant.period for one in rates])
         self._given: Array = np.zeros(len(plant.outputs))
         if hasattr(self.law, "start"):

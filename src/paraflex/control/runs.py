@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arguments import given_as
 from paraflex.arrays import Array
@@ -21,11 +22,14 @@ class Controlled:
     ----------
     acting : (k, motors) array
         Torques of all motors at the samples reached, before they change where they do so just then [N m, N].
+    commanded : (k, motors) array
+        Those given, which act with the lag of actuators.
     controllers : tuple of ControllerRecord
         What each controller did; none where torques were given by `Simulation.step`.
     """
 
     acting: Array | None = None
+    commanded: Array | None = None
     controllers: tuple[ControllerRecord, ...] = ()
 
     @property
@@ -62,15 +66,18 @@ class TorqueLog:
 
     Parameters
     ----------
-    motors : int
+    lags : (motors,) array
+        Time constants with which they follow what is given; zero where they do at once [s].
     start : float
         Of the run [s].
     """
 
-    def __init__(self, motors: int, start: float) -> None:
-        self._start = start
+    def __init__(self, lags: Array, start: float) -> None:
+        self._lags, self._start = lags, start
         self._times: list[float] = []
-        self._torques: list[Array] = [np.zeros(motors)]
+        # Before anything is given there are no torques. Those given, and those that acted then.
+        self._given: list[Array] = [np.zeros(lags.size)]
+        self._begun: list[Array] = [np.zeros(lags.size)]
 
     @property
     def begun(self) -> bool:
@@ -82,20 +89,50 @@ class TorqueLog:
         return len(self._times)
 
     def note(self, t: float, torques: Array) -> None:
-        """Add torques (motors,) that act from a time on."""
+        """Add torques (motors,) that are given from a time on."""
+        acting = self.now(t)
         self._times.append(t)
-        self._torques.append(torques)
+        self._given.append(torques)
+        self._begun.append(acting)
+
+    @property
+    def last(self) -> tuple[float, Array, Array]:
+        """When torques changed last, those that acted then and those given from then on (motors,)."""
+        return self._times[-1] if self._times else 0.0, self._begun[-1], self._given[-1]
 
     def copy(self) -> TorqueLog:
         """The same so far, to go on from apart."""
-        other = TorqueLog(0, self._start)
-        other._times, other._torques = self._times.copy(), self._torques.copy()
+        other = TorqueLog(self._lags, self._start)
+        other._times, other._given, other._begun = self._times.copy(), self._given.copy(), self._begun.copy()
         return other
 
+    def now(self, t: float) -> Array:
+        """Torques (motors,) that act at a time after the last change."""
+        since, begun, given = self.last
+        return self._relaxed(np.array([t - since]), begun[None], given[None])[0]
+
     def at(self, times: Array, slack: float) -> Array:
-        """Torques (k, motors) at times (k,), those before a change within a slack [s]; the first at the start."""
+        """Torques (k, motors) that act at times (k,), those before a change within a slack [s]."""
+        number = self._number(times, slack)
+        since = np.array([0.0, *self._times])[number]
+        return self._relaxed(times - since, np.array(self._begun)[number], np.array(self._given)[number])
+
+    def given(self, times: Array, slack: float) -> Array:
+        """Torques (k, motors) that are given at times (k,), those before a change within a slack [s]."""
+        return np.array(self._given)[self._number(times, slack)]
+
+    def _number(self, times: Array, slack: float) -> NDArray[np.int64]:
+        """Of the torques given at times (k,); the first at the start."""
         changes = np.array(self._times)
         number = np.searchsorted(changes, times - slack, side="left")
         if changes.size and changes[0] <= self._start + slack:
             number = np.where(times <= changes[0] + slack, 1, number)
-        return np.array(self._torques)[number]
+        return number
+
+    def _relaxed(self, since: Array, begun: Array, given: Array) -> Array:
+        """Torques (k, motors) at times (k,) after changes."""
+        if not np.any(self._lags):
+            return given
+        lags = np.where(self._lags > 0.0, self._lags, 1.0)
+        left = np.exp(-np.maximum(since, 0.0)[:, None] / lags)
+        return given + np.where(self._lags > 0.0, left, 0.0) * (begun - given)

@@ -11,6 +11,7 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
+from paraflex.control.amplifiers import Amplifiers, relaxing, with_room
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.described import ControllerDescription
 from paraflex.control.inside import sampled_law
@@ -147,6 +148,8 @@ class Simulation:
             begun = motion_start(source, duration, samples, start, balanced=balanced)
             self.system, self._initial, self._times = begun
         self.end: float = float(self._times[-1])
+        self._amplifiers = Amplifiers(self.mechanism)
+        self._limited = self._amplifiers.limited & np.isin(np.arange(len(own)), self._active)
         self._pack()
         self._readings = Readings(self.system, measured_sensors(self.system.mechanism))
         self._watched = self._readings
@@ -157,7 +160,7 @@ class Simulation:
         )  # fmt: skip
         self._loop: Loop | None = None
         self._held = np.zeros(len(own))
-        self._log = TorqueLog(len(own), self._initial.time)
+        self._log = TorqueLog(self._amplifiers.lags, self._initial.time)
         self._integration.start()
         self._fresh = self.save()
 
@@ -168,6 +171,8 @@ class Simulation:
         )
         if not self._torques.signals:
             self._torques = replace(self._torques, signals=tuple(motors))
+        lags = self._amplifiers.lags
+        motors = [with_room(each) if lag else each for each, lag in zip(motors, lags, strict=True)]
         self._signals, knots = pack_signals(self.system.mechanism, motors, self.end)
         smooth = path_stops(self._torques.knots, self.mechanism)
         self._knots = np.sort(np.concatenate([smooth, knots]))
@@ -350,17 +355,20 @@ class Simulation:
     def _made(self, solution: Solution) -> ControlledTracking | ControlledMotion:
         """The run with a solution."""
         k = solution.t.size - bool(solution.event)
-        given = self._log.at(solution.t, _ROUNDING * (self.end - self._initial.time))
+        slack = _ROUNDING * (self.end - self._initial.time)
+        given, commanded = self._log.at(solution.t, slack), self._log.given(solution.t, slack)
         motors = {motor.name: unit for motor, unit in zip(self.mechanism.motors, self.mechanism.motor_units(),
                                                            strict=True)}  # fmt: skip
         records = () if self._loop is None else self._loop.records(motors.__getitem__)
         if self.task is None:
             times = solution.t if solution.event else self._times
-            return ControlledMotion(self.system, times, dict.fromkeys(motors, 0.0), solution, given, records)
-        acting = given[:k] + self._torques.evaluate(solution.t[:k])
+            none = dict.fromkeys(motors, 0.0)
+            return ControlledMotion(self.system, times, none, solution, given, commanded, records)
+        planned = self._torques.evaluate(solution.t[:k])
         title = self._options.method.title
         return ControlledTracking(self.task, self._torques, self._condition, solution, title,
-                                  acting=acting, controllers=records)  # fmt: skip
+                                  acting=given[:k] + planned, commanded=commanded[:k] + planned,
+                                  controllers=records)  # fmt: skip
 
     def _moment(self) -> Moment:
         return Moment(self.time, self._integration.run.attempts)
@@ -376,7 +384,8 @@ class Simulation:
 
     def _inside(self, loop: Loop) -> SampledLaw | None:
         """A loop for the compiled time loop; None where it stays outside."""
-        if loop.alone is None:
+        # What amplifiers do to torques is not known there.
+        if loop.alone is None or self._limited.any() or np.any(self._amplifiers.lags):
             return None
         controller, plant = loop.alone
         own = [motor.name for motor in self.mechanism.motors]
@@ -413,11 +422,16 @@ class Simulation:
     def _read(self, readings: Readings) -> Array:
         """Readings now."""
         now = self._integration.run.now()
-        given = self._torques.evaluate(np.array([now.t]))[0] if readings.of_torques else np.zeros(len(self._held))
-        return readings(now, self._held + given)
+        torques = self._log.now(now.t) + self._planned(now.t) if readings.of_torques else np.zeros(len(self._held))
+        return readings(now, torques)
+
+    def _planned(self, t: float) -> Array:
+        """Torques (motors,) of the plan at a time; zero without one."""
+        return self._torques.evaluate(np.array([t]))[0]
 
     def _apply(self, torques: Array) -> None:
-        """Let torques (motors,) of all motors act from now on."""
+        """Let torques (motors,) of all motors act from now on, as far as their amplifiers can."""
+        torques = self._within_limits(torques)
         changed = not np.array_equal(torques, self._held)
         if changed or not self._log.begun:
             self._log.note(self.time, torques)
@@ -430,12 +444,27 @@ class Simulation:
         else:
             self._integration.resume()
 
+    def _within_limits(self, torques: Array) -> Array:
+        """Torques (motors,) that with those of the plan are within the limits of amplifiers at the speed now."""
+        if not self._limited.any():
+            return torques
+        now = self._integration.run.now()
+        low, high = self._amplifiers.limits(self._amplifiers.rates(self.system, now.q, now.v))
+        planned = self._planned(now.t)
+        return np.where(self._limited, np.clip(torques, low - planned, high - planned), torques)
+
     def _hold(self) -> None:
         """Write the torques held into the signals."""
-        coefficients, start = self._signals.coefficients, self._signals.start
-        for k, torque in enumerate(self._held):
+        breaks, coefficients, start = self._signals.breaks, self._signals.coefficients, self._signals.start
+        since, begun, given = self._log.last
+        for k, lag in enumerate(self._amplifiers.lags):
             pieces = slice(start[k], start[k + 1] - 1)
-            coefficients[pieces, 0] = self._base[pieces] + torque
+            if not lag:
+                coefficients[pieces, 0] = self._base[pieces] + given[k]
+                continue
+            signal = relaxing(self._torques.signals[k], since, begun[k], given[k], lag)
+            whole = with_room(signal, pieces.stop - pieces.start)
+            breaks[pieces], coefficients[pieces] = whole.breaks[:-1], whole.coefficients
 
     def _march(
         self, until: float, slack: float | None = None, on_progress: Callable[[float], None] | None = None

@@ -121,7 +121,8 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
     beams that were cut: its parts are where the rigid links of the mechanism as described are, loops closed, so that
     the pose does not depend on how many parts there are.
     """
-    if system.mechanism.cut is not None and assembly.name in [one.name for one in system.described.assemblies]:
+    cut = system.mechanism.cut
+    if cut is not None and cut.carriers and assembly.name in [one.name for one in system.described.assemblies]:
         rigid = build_system(system.described.rigid())
         signals = moment_signals(rigid.mechanism, 0.0)
         start = reference_pose(rigid, rigid.mechanism.assembly(assembly.name))

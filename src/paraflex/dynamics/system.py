@@ -19,7 +19,7 @@ from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.limits import solvable
-from paraflex.mechanism import Mechanism, PointRef, in_frames
+from paraflex.mechanism import Mechanism, PointRef, in_frames, rotor_mass, with_actuators
 
 if TYPE_CHECKING:
     from paraflex.dynamics.sections import Sections
@@ -68,7 +68,7 @@ class System:
     @property
     def total_mass(self) -> float:
         """Mass of all bodies [kg]."""
-        return float(self.packed.total_mass)
+        return float(self.packed.total_mass - rotor_mass(self.described))
 
     @property
     def size(self) -> float:
@@ -197,7 +197,7 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     ProportionError
         One whose damping cannot be found, for numbers too far apart.
     """
-    mechanism = in_frames(mechanism)
+    mechanism = with_actuators(in_frames(mechanism))
     index = {body.name: i for i, body in enumerate(mechanism.bodies)}
     constraints = row_order(mechanism, index)
     modes = {} if like is None else {body.name: body.modes for body in like.bodies}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -10,7 +11,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError
-from paraflex.mechanism import FlexibleBeam, Mechanism, given_shapes, grouped
+from paraflex.mechanism import FlexibleBeam, Mechanism, given_shapes, grouped, with_actuators
 from paraflex.tracking import TrackingTask
 
 # Names of the engines as users and Python's packages know them, and in print.
@@ -30,6 +31,11 @@ def check_dwell(name: str, task: TrackingTask) -> None:
         refuse(_ENGINE_NAMES[name], 'brakes after the path (after = "hold")', "study.after")
 
 
+def with_rotors(task: TrackingTask) -> TrackingTask:
+    """The same task with lumps at joints in place of actuators, for programs that build bodies of their own."""
+    return replace(task, mechanism=with_actuators(task.mechanism))
+
+
 def check_engine(name: str, mechanism: Mechanism) -> None:
     """Check that an engine is installed and supports a mechanism.
 
@@ -44,9 +50,10 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
         "a joint that is not revolute": [
             f"joint.{joint.name}" for joint in mechanism.joints if joint.holds != ("points",)
         ],
+        "back-EMF": [f"actuator.{one.name}.amplifier" for one in mechanism.actuators if one.damping],
         "structural damping": [f"body.{beam.name}.damping" for beam in beams if beam.damping is not None],
     } | {
-        f"a {group.word}": [f"{group.table}.{one.name}" for one in members]
+        group.one: [f"{group.table}.{one.name}" for one in members]
         for group, members in grouped(mechanism)
         if not group.engines
     }

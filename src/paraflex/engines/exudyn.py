@@ -20,7 +20,7 @@ from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.engines.cables import Cable, Columns, Ground, Link, Linkage, RigidLink, RigidState, Trajectory
-from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
+from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between, with_rotors
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.interrupts import uninterrupted
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
@@ -106,6 +106,7 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     task = task.whole or task
     check_engine("exudyn", task.mechanism)
     check_dwell("exudyn", task)
+    task = with_rotors(task)
     torques = task.torques(mode)
     substeps = steps_between(task.motion.t, options.step)
     begin = time.perf_counter()

@@ -28,7 +28,7 @@ from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion, turning_of
 from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.limits import INSTANTS, solvable
-from paraflex.mechanism import Assembly, Body, Mechanism, PointRef
+from paraflex.mechanism import Assembly, Body, Mechanism, PointRef, with_actuators
 from paraflex.mechanism.members import TASK_COORDINATES
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
@@ -266,9 +266,9 @@ class PathClosure:
         assert effector is not None
         self.mechanism = mechanism
         # Springs, dampers and friction do not constrain.
-        acts = mechanism.springs or mechanism.dampers or mechanism.frictions
-        free = replace(mechanism, springs=(), dampers=(), frictions=()) if acts else mechanism
-        self.system: System = build_system(free)
+        moved = with_actuators(mechanism)
+        acts = moved.springs or moved.dampers or moved.frictions
+        self.system: System = build_system(replace(moved, springs=(), dampers=(), frictions=()) if acts else moved)
         self.orientation = orientation
         end = end if end > 0.0 else 1.0
         self.signals: Signals = still_signals(self.system.mechanism, end)[0]

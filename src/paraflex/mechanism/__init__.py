@@ -6,6 +6,7 @@ from paraflex.mechanism.actuation_modes import (
     mode_of_signs as mode_of_signs,
     parse_mode as parse_mode,
 )
+from paraflex.mechanism.actuators import Actuator as Actuator, Amplifier as Amplifier
 from paraflex.mechanism.bodies import (
     AssumedModesBeam as AssumedModesBeam,
     Body as Body,
@@ -72,6 +73,12 @@ from paraflex.mechanism.payload import Payload as Payload
 from paraflex.mechanism.poses import Pose as Pose, approximate_poses as approximate_poses, placed_poses as placed_poses
 from paraflex.mechanism.quantities import joints_named as joints_named
 from paraflex.mechanism.raparm import raparm_i as raparm_i
+from paraflex.mechanism.rotors import (
+    actuator_motors as actuator_motors,
+    actuators_by_motor as actuators_by_motor,
+    rotor_mass as rotor_mass,
+    with_actuators as with_actuators,
+)
 from paraflex.mechanism.rows import chain_of_segments as chain_of_segments, four_bars_in_a_row as four_bars_in_a_row
 from paraflex.mechanism.sections import (
     Rectangle as Rectangle,

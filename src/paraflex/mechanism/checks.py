@@ -14,6 +14,7 @@ from paraflex.mechanism.joints import GROUND, Joint, PointRef, points_named
 from paraflex.mechanism.members import Members
 from paraflex.mechanism.poses import approximate_poses
 from paraflex.mechanism.quantities import check_numbers, finite, joints_named, known
+from paraflex.mechanism.rotors import check_actuators
 from paraflex.mechanism.sensors import JointForceSensor, PointSensor, Sensor, StrainGauge
 
 
@@ -37,6 +38,7 @@ def check_mechanism(mechanism: Members) -> None:
     check_task(mechanism)
     check_loads(mechanism)
     check_sensors(mechanism)
+    check_actuators(mechanism)
 
 
 def check_names(mechanism: Members) -> None:

@@ -47,6 +47,11 @@ class Group:
         return bool(self.kinds) and all(issubclass(kind, Relation) for kind in self.kinds)
 
     @property
+    def one(self) -> str:
+        """The word for one member, with its article."""
+        return f"a{'n' if self.word[0] in 'aeiou' else ''} {self.word}"
+
+    @property
     def words(self) -> str:
         """The word for several members."""
         return self.plural or f"{self.word}s"

@@ -48,6 +48,8 @@ class Mechanism(Members, Shown):
         JointForceSensor, DeflectionSensor. They do not act on it.
     gears : tuple of Gear
         Each with its phase.
+    actuators : tuple of Actuator
+        What motors are: gears, rotors, windings and amplifiers. Motors without one give torques as they are asked.
     gravity : (x, y)
         Acceleration of free fall in the ground frame [m/s^2]; none by default.
     end_effector : EndEffector, optional

@@ -10,6 +10,7 @@ from typing import Self, TypeVar
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError
+from paraflex.mechanism.actuators import Actuator
 from paraflex.mechanism.bodies import Body
 from paraflex.mechanism.cut import Cut
 from paraflex.mechanism.gears import Gear, Relation
@@ -138,6 +139,7 @@ class Members(CheckedFields):
     )
     gears: tuple[Gear, ...] = group("gear", "gear", Gear, engines=True)
     loads: tuple[Load, ...] = group("load", "load", PointForce, AppliedTorque)
+    actuators: tuple[Actuator, ...] = group("actuator", "actuator", Actuator, engines=True)
     sensors: tuple[Sensor, ...] = group("sensor", "sensor", *SENSOR_KINDS.values(), engines=True, measures=True)
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER

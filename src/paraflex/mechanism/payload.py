@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields
+from paraflex.arguments import CheckedFields, with_fields
 from paraflex.errors import InputError
-from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam, LumpedMass, RigidBody
+from paraflex.mechanism.bodies import Body, LumpedMass, RigidBody
 from paraflex.mechanism.modal import ModalBody
 from paraflex.mechanism.quantities import finite, not_negative
 
@@ -59,44 +59,57 @@ def loaded(body: Body, point: str, payload: Payload) -> Body:
     InputError
         An offset from the centre line of a beam, or from a point of a body of given matrices.
     """
-    if isinstance(body, RigidBody):
-        return _merged(body, np.add(body.points[point], payload.offset), payload)
-    if any(payload.offset):
+    if any(payload.offset) and not isinstance(body, RigidBody):
         raise InputError(
             f'"{body.name}" bends, and has no lumps beside its points', field="payload.offset", value=payload.offset,
             remedy="leave it out, or weld a rigid body of that mass to the point",
         )  # fmt: skip
+    return replace(with_lump(body, point, payload.mass, payload.inertia, payload.offset))
+
+
+def with_lump(
+    body: Body, point: str, mass: float, inertia: float = 0.0, offset: tuple[float, float] = (0.0, 0.0)
+) -> Body:
+    """A body with a mass and a moment of inertia at one of its points, in addition to what it has; not checked.
+
+    Parameters
+    ----------
+    body : Body
+    point : str
+    mass, inertia : float
+        [kg], and about that mass's centre [kg m^2].
+    offset : (x, y)
+        From the point to that centre in the body frame, of a rigid body [m].
+    """
+    if isinstance(body, RigidBody):
+        return _merged(body, np.add(body.points[point], offset), mass, inertia)
     if isinstance(body, ModalBody):
-        return _with_point_mass(body, point, payload)
-    return _with_lump(body, point, payload)
-
-
-def _with_lump(body: FlexibleBeam | AssumedModesBeam, point: str, payload: Payload) -> Body:
+        return _with_point_mass(body, point, mass, inertia)
     there = [lump for lump in body.lumps if lump.point == point]
-    mass, inertia = (sum(getattr(each, name) for each in [*there, payload]) for name in ("mass", "inertia"))
     others = [lump for lump in body.lumps if lump.point != point]
-    return replace(body, lumps=(*others, LumpedMass(point, mass, inertia)))
+    mass, inertia = mass + sum(lump.mass for lump in there), inertia + sum(lump.inertia for lump in there)
+    return with_fields(body, lumps=(*others, with_fields(LumpedMass(point, 0.0), mass=mass, inertia=inertia)))
 
 
-def _merged(body: RigidBody, place: np.ndarray, payload: Payload) -> RigidBody:
+def _merged(body: RigidBody, place: np.ndarray, mass: float, inertia: float) -> RigidBody:
     """Both as one, about their common centre of mass: Steiner's theorem."""
-    masses = np.array([body.mass, payload.mass])
+    masses = np.array([body.mass, mass])
     places = np.array([body.centre_of_mass, place])
     centre = masses @ places / masses.sum()
-    inertia = body.inertia + payload.inertia + masses @ np.sum((places - centre) ** 2, axis=1)
-    return replace(
-        body, mass=float(masses.sum()), inertia=float(inertia), centre_of_mass=(float(centre[0]), float(centre[1]))
+    whole = body.inertia + inertia + masses @ np.sum((places - centre) ** 2, axis=1)
+    return with_fields(
+        body, mass=masses.sum().item(), inertia=np.array(whole).item(), centre_of_mass=tuple(centre.tolist())
     )
 
 
-def _with_point_mass(body: ModalBody, point: str, payload: Payload) -> ModalBody:
+def _with_point_mass(body: ModalBody, point: str, mass: float, inertia: float) -> ModalBody:
     """The constants of a body with what a mass element and a lumped moment of inertia at a point add to each."""
     (x, y), (along, across), slope = body.point(point)
-    mass, inertia, shape = payload.mass, payload.inertia, np.array([along, across])
+    shape = np.array([along, across])
     translation = mass * shape.T @ shape
     mass_matrix = np.array(body.mass_matrix)
     skew = np.outer(along, across)
-    return replace(
+    return with_fields(
         body,
         mass=body.mass + mass,
         first_moment=np.array(body.first_moment) + mass * np.array([x, y]),

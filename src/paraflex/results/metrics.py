@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from paraflex.mechanism import rotor_mass
 from paraflex.results.formulas import drift_speed, integral, largest_norm, overshoot, rms, settling_time, vibration
 from paraflex.results.traces import Trace
 from paraflex.units import WHERE_IT_SLIDES
 
 if TYPE_CHECKING:
+    from paraflex.actuation import Electrical
     from paraflex.control.loop import ControllerRecord
 
 # Kinds of runs.
@@ -152,6 +154,16 @@ def _largest_of_each(trace: Callable[[Any], Trace]) -> Formula:
     return value
 
 
+def _of_currents(formula: Callable[[Electrical], Any]) -> Formula:
+    """A number of each motor from currents and voltages; NaN where there is no sample."""
+
+    def value(run: Any, _: Any) -> Any:
+        found = run.electrical
+        return formula(found) if found.t.size else np.full(len(found.motors), np.nan)
+
+    return value
+
+
 def _motor_energy(run: Any, nominal: Any) -> Any:
     return integral(run.t, np.sum(np.sign(nominal.power) * run.power, axis=1))
 
@@ -268,6 +280,16 @@ _ALL = (
            runs=(PATH,), of_motors=True, kept_of=()),
     Metric("saturated_share", "share of the samples of controllers at which a limit of torques was met", "1",
            _as_it_is(lambda x: _saturated_share(x.controllers)), smooth=False, of_motors=True, kept_of=()),
+    Metric("current_max", "largest magnitude of each motor's current, by its actuator", "A",
+           _of_currents(lambda x: np.max(np.abs(x.current), axis=0)), "largest current", each=MOTOR, smooth=False,
+           kept_of=()),
+    Metric("rms_current", "root mean square of each motor's current in time", "A",
+           _of_currents(lambda x: x.rms_current), "RMS current", each=MOTOR, smooth=False, kept_of=()),
+    Metric("voltage_max", "largest magnitude of each motor's voltage, by its actuator", "V",
+           _of_currents(lambda x: np.max(np.abs(x.voltage), axis=0)), "largest voltage", each=MOTOR, smooth=False,
+           kept_of=()),
+    Metric("copper_energy", "heat of each motor's winding, from the samples", "J",
+           _of_currents(lambda x: x.copper_energy), "heat of the winding", each=MOTOR, smooth=False, kept_of=()),
     Metric("drive_torque_max", "largest magnitude of the torque or force of each prescribed motion", "N m",
            _largest_of_each(lambda x: x.drive_torque), "largest torque", each=DRIVE),
     Metric("drive_power_max", "largest magnitude of the power of each prescribed motion", "W",
@@ -287,7 +309,8 @@ _ALL = (
     Metric("section_moment_max", "largest magnitude of the bending moment in any beam", "N m",
            _section_moment, "largest bending moment", runs=_ANY),
     Metric("total_mass", "mass of all bodies", "kg",
-           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.system.bodies])), "mass", runs=_ANY),
+           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.system.bodies]) - rotor_mass(x.system.described)),
+           "mass", runs=_ANY),
     Metric("actuation_condition_max", "largest condition number of the actuation matrix", "1",
            _largest(lambda x: x.condition), "largest condition number", runs=(PATH,)),
     _of_the_solver("constraint_position_max", "largest constraint violation in position", "m"),

@@ -9,6 +9,7 @@ from typing import Generic, TypeVar, overload
 
 import numpy as np
 
+from paraflex.actuation import Electrical
 from paraflex.control.laws import internal_torques
 from paraflex.control.loop import ControllerRecord
 from paraflex.control.runs import ControlledMotion, ControlledTracking
@@ -122,6 +123,11 @@ class RunTraces(Traces, SolutionTraces[TrackingRun]):
         return self.run.task.system
 
     @property
+    def electrical(self) -> Electrical:
+        """Currents and voltages of the motors."""
+        return self.run.electrical
+
+    @property
     def condition(self) -> Trace:
         """Condition number of the actuation matrix (k,)."""
         return self.run.condition
@@ -158,6 +164,11 @@ class MotionTraces(SolutionTraces[MotionRun]):
     def system(self) -> System:
         """See `SolutionTraces`."""
         return self.run.system
+
+    @property
+    def electrical(self) -> Electrical:
+        """Currents and voltages of the motors."""
+        return self.run.electrical
 
 
 @dataclass(frozen=True)

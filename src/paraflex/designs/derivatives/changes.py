@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from paraflex.actuation import Effort, FeedForward, required_effort
 from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
+from paraflex.arguments import with_fields
 from paraflex.arrays import Numbers
 from paraflex.control.shaped import ShapedPath
 from paraflex.designs.derivatives.plans import Given
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
-from paraflex.designs.derivatives.steps import Stepped, complex_step, part, stepped, with_fields
+from paraflex.designs.derivatives.steps import Stepped, complex_step, part, stepped
 from paraflex.designs.run import Task
 from paraflex.designs.setting import Setting
 from paraflex.dynamics import (
@@ -39,7 +40,7 @@ from paraflex.kernel.packed import Signals, make_scratch
 from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
 from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
-from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody
+from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody, with_actuators
 from paraflex.tracking import TrackingTask, path_knots
 
 Array = NDArray[np.float64]
@@ -187,7 +188,7 @@ class Change:
             body if isinstance(body, RigidBody) else with_fields(body, flexible=False)
             for body in self.there.mechanism.bodies
         )
-        mechanism = with_fields(self.there.mechanism, bodies=bodies)
+        mechanism = with_actuators(with_fields(self.there.mechanism, bodies=bodies))
         return build_system(with_fields(mechanism, springs=(), dampers=(), frictions=()), self.closure.system)
 
     @cached_property

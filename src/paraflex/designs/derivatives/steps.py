@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arguments import with_fields
 from paraflex.arrays import Numbers
 from paraflex.designs.derivatives.stencil import Stencil
 from paraflex.errors import InputError
@@ -60,14 +61,6 @@ def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> Stepped[T]:
     walk = _Walk(stencil)
     value = walk.step(here, list(near))
     return Stepped(value, walk.error)
-
-
-def with_fields(record: T, **changes: Any) -> T:
-    """A dataclass with other fields, like `replace`, without its checks of real numbers."""
-    new = object.__new__(type(record))
-    for each in fields(record):  # pyright: ignore[reportArgumentType]
-        object.__setattr__(new, each.name, changes.get(each.name, getattr(record, each.name)))
-    return new
 
 
 class _Walk:

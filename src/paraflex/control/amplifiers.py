@@ -1,0 +1,144 @@
+"""Amplifiers and windings between a controller's torques and those of motors: limits and lags."""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from paraflex.actuation.feed_forward import about
+from paraflex.arrays import Array
+from paraflex.dynamics import InputSignals, System, joint_coordinate, piecewise_quintic
+from paraflex.mechanism import Actuator, Mechanism, actuators_by_motor
+
+# Largest error of the quintic pieces of an exponential, as a part of the change of the torque, and where they end: what
+# is then left is as small. Of an interval h, in time constants, the error is h^6/46080 of what is left at its start.
+_PIECE_ERROR = 1e-10
+_RELAXED = -np.log(_PIECE_ERROR)
+
+
+# Spacing of times that no run comes to [s].
+_NEVER = 1e12
+
+
+def _breaks() -> Array:
+    """Breaks of the pieces, in time constants: longer ones the less is left."""
+    breaks = [0.0]
+    while breaks[-1] < _RELAXED:
+        breaks.append(breaks[-1] + (46080.0 * _PIECE_ERROR) ** (1.0 / 6.0) * np.exp(breaks[-1] / 6.0))
+    return np.array(breaks)
+
+
+_BREAKS = _breaks()
+# Coefficients of exp(-x) in these pieces, and of nothing after them.
+_LEFT = np.vstack([
+    piecewise_quintic(_BREAKS, np.exp(-_BREAKS), -np.exp(-_BREAKS), np.exp(-_BREAKS)).coefficients, np.zeros((1, 6)),
+])  # fmt: skip
+
+
+class Amplifiers:
+    """What the amplifiers of a mechanism do to torques, motor by motor; nothing to those without an actuator.
+
+    Attributes
+    ----------
+    lags : (motors,) array
+        Time constants with which torques follow their commands [s].
+    limited : (motors,) array of bool
+        Whether there is a limit of voltage or current.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        found = actuators_by_motor(mechanism)
+        each = [found.get(motor.name) for motor in mechanism.motors]
+        self._joints = [motor.joint for motor in mechanism.motors]
+        self.lags: Array = np.array([0.0 if one is None else one.lag for one in each])
+        self._imposes_voltage = np.array([one is not None and one.imposes_voltage for one in each], dtype=bool)
+        numbers = np.array([_numbers(one) for one in each]).reshape(len(each), 5)
+        self._per_current, self._per_rate, self._resistance, self._voltage, self._current = numbers.T
+        self.limited: np.ndarray = np.isfinite(self._voltage) | np.isfinite(self._current)
+
+    def rates(self, system: System, q: Array, v: Array) -> Array:
+        """Rates of the joints of all motors (motors,) at coordinates and velocities (n,) [rad/s, m/s]."""
+        each = [joint_coordinate(system, name, q[None], v[None]).rate[0] for name in self._joints]
+        return np.array(each)
+
+    def limits(self, rates: Array) -> tuple[Array, Array]:
+        """Lowest and highest commands (motors,) at rates of the joints [N m, N].
+
+        Of u = R i + n k_e w the voltage within the amplifier's limit, and so the current. The command of a voltage is
+        the torque n k_t u/R that it would give at rest.
+        """
+        per_current, resistance = self._per_current, self._resistance
+        back = self._per_rate * rates
+        bounds = []
+        for sign in (-1.0, 1.0):
+            current, voltage = sign * self._current, sign * self._voltage
+            of_current = per_current * np.clip((voltage - back) / resistance, -self._current, self._current)
+            closer = np.maximum if sign < 0.0 else np.minimum
+            of_voltage = per_current / resistance * closer(voltage, resistance * current + back)
+            bounds.append(np.where(self._imposes_voltage, of_voltage, of_current))
+        return bounds[0], bounds[1]
+
+
+def _numbers(actuator: Actuator | None) -> tuple[float, float, float, float, float]:
+    """N k_t, n k_e, R and the limits of voltage and current; of what is not known such that it limits nothing."""
+    if actuator is None or actuator.torque_per_current is None or actuator.voltage_per_rate is None:
+        return 1.0, 0.0, 1.0, inf, inf
+    voltage, current = (inf if one is None else one for one in (actuator.voltage_limit, actuator.current_limit))
+    resistance = 1.0 if actuator.resistance is None else actuator.resistance
+    return actuator.torque_per_current, actuator.voltage_per_rate, resistance, voltage, current
+
+
+def largest_commands(mechanism: Mechanism, motors: tuple[str, ...]) -> Array:
+    """Largest torques (motors,) that amplifiers take as commands, whatever the speed; infinite without a limit.
+
+    n k_t I under a current loop, n k_t U/R of a voltage.
+    """
+    found = actuators_by_motor(mechanism)
+    return np.array([_largest_command(found.get(name)) for name in motors])
+
+
+def _largest_command(actuator: Actuator | None) -> float:
+    per_current, _, resistance, voltage, current = _numbers(actuator)
+    imposes_voltage = actuator is not None and actuator.imposes_voltage
+    return per_current * (voltage / resistance if imposes_voltage else current)
+
+
+def relaxing(base: InputSignals, t: float, begin: float, target: float, lag: float) -> InputSignals:
+    """A signal plus a torque that relaxes exponentially from one value to another, from a time on.
+
+    Parameters
+    ----------
+    base : InputSignals
+    t : float
+        From when on the sum is wanted, before the end of the signal [s].
+    begin, target : float
+        [N m, N]
+    lag : float
+        Time constant [s].
+
+    Returns
+    -------
+    InputSignals
+        Exact but for 1e-10 of the change.
+    """
+    own, end = t + lag * _BREAKS, base.breaks[-1]
+    first, last = np.searchsorted(base.breaks, (t, min(own[-1], end)), side="right")
+    between = base.breaks[first : min(last, base.breaks.size - 1)]
+    starts = np.sort(np.concatenate([own[own < end], between]))
+    starts = starts[np.diff(starts, append=np.inf) > 0.0]
+    piece = np.maximum(np.searchsorted(base.breaks, starts, side="right") - 1, 0)
+    part = np.minimum(np.searchsorted(own, starts, side="right") - 1, len(_LEFT) - 1)
+    both = np.concatenate([base.coefficients[piece], (begin - target) * _LEFT[part] / lag ** np.arange(6)])
+    planned, left = np.split(about(both, np.concatenate([starts - base.breaks[piece], starts - own[part]])), 2)
+    rest = slice(min(last, base.breaks.size - 1), None)
+    coefficients = np.vstack([planned + left, base.coefficients[rest]])
+    coefficients[:, 0] += target
+    return InputSignals(np.concatenate([starts, base.breaks[rest]]), coefficients)
+
+
+def with_room(signal: InputSignals, pieces: int | None = None) -> InputSignals:
+    """A signal with more pieces, which no time comes to: so many as `relaxing` needs for it, or a number in all."""
+    more = _BREAKS.size + 2 if pieces is None else pieces - len(signal.coefficients)
+    breaks = np.concatenate([signal.breaks[:-1], _NEVER * np.arange(1.0, more + 2.0)])
+    return InputSignals(breaks, np.vstack([signal.coefficients, np.zeros((more, signal.coefficients.shape[1]))]))

@@ -1,0 +1,126 @@
+"""What actuators add to a mechanism: rotors as lumps at joints, back-EMF as dampers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from paraflex.arguments import with_fields
+from paraflex.errors import InputError
+from paraflex.mechanism.actuators import Actuator
+from paraflex.mechanism.bodies import Body
+from paraflex.mechanism.cut import Cut
+from paraflex.mechanism.joints import Joint, Motor, PointRef
+from paraflex.mechanism.loads import PointForce, TorsionalDamper
+from paraflex.mechanism.members import Members
+from paraflex.mechanism.payload import with_lump
+from paraflex.mechanism.quantities import known
+
+
+def actuator_motors(actuator: Actuator, mechanism: Members) -> tuple[str, ...]:
+    """Names of the motors of a mechanism that an actuator is of."""
+    return actuator.motors or tuple(motor.name for motor in mechanism.motors)
+
+
+def actuators_by_motor(mechanism: Members) -> dict[str, Actuator]:
+    """The actuator of each motor that has one, in the order of the motors."""
+    found = {name: one for one in mechanism.actuators for name in actuator_motors(one, mechanism)}
+    return {motor.name: found[motor.name] for motor in mechanism.motors if motor.name in found}
+
+
+def check_actuators(mechanism: Members) -> None:
+    """Check that actuators name motors, each one once, and that their rotors' inertia can act where they are.
+
+    Raises
+    ------
+    InputError
+        The first that does not.
+    """
+    names, taken = [motor.name for motor in mechanism.motors], dict[str, str]()
+    for one in mechanism.actuators:
+        field = f"actuator.{one.name}.motors"
+        for name in actuator_motors(one, mechanism):
+            known(name, names, field, "motor")
+            if name in taken:
+                raise InputError(
+                    f"motor {name} has actuator {taken[name]} already", field=field, value=name,
+                    remedy="name the motors of each actuator, every one once",
+                )  # fmt: skip
+            taken[name] = one.name
+    for motor in mechanism.motors:
+        if motor.name in taken:
+            _check_rotor(mechanism, motor, next(one for one in mechanism.actuators if one.name == taken[motor.name]))
+
+
+def _check_rotor(mechanism: Members, motor: Motor, actuator: Actuator) -> None:
+    joint = mechanism.joint(motor.joint)
+    if actuator.rotor_inertia and _driven_point(joint) is None:
+        carrier = f"a joint that slides on {joint.a.body}" if joint.slides else "two bodies that both move"
+        raise InputError(
+            f"inertia n^2 J_m between {carrier} ({motor.name} at {joint.name}) belongs to no single body",
+            field=f"actuator.{actuator.name}.rotor_inertia", value=actuator.rotor_inertia,
+            remedy="make the rotor a rigid body on a pin with a [gear.NAME], or leave its inertia out",
+        )  # fmt: skip
+
+
+def _driven_point(joint: Joint) -> PointRef | None:
+    """The point of the one body whose motion the joint's coordinate is; None where it is that of two bodies.
+
+    Against the ground the rate of the coordinate is that of the body's angle, or the speed of a point on a fixed axis.
+    """
+    if joint.a.on_ground:
+        return joint.b
+    # An axis that the body carries turns with it, unless the joint keeps its angle.
+    on_fixed_axis = not joint.slides or ("angle" in joint.holds and not joint.follows_beam)
+    return joint.a if joint.b.on_ground and on_fixed_axis else None
+
+
+def with_actuators(mechanism: Any) -> Any:
+    """The mechanism with rotors as lumps and back-EMF as dampers at joints, for computing; itself without actuators.
+
+    A lump of mass n^2 J_m on a fixed axis stands for a rotor that has no weight: a force at its point balances that.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+
+    Returns
+    -------
+    Mechanism
+        Its `described` is the one given.
+    """
+    if not mechanism.actuators:
+        return mechanism
+    bodies: dict[str, Body] = {body.name: body for body in mechanism.bodies}
+    dampers, forces, actuators = [], [], actuators_by_motor(mechanism)
+    for motor in mechanism.motors:
+        one = actuators.get(motor.name)
+        if one is None:
+            continue
+        joint = mechanism.joint(motor.joint)
+        if one.damping != 0.0:
+            damper = TorsionalDamper(f"back-EMF of {motor.name}", motor.joint, 1.0)
+            dampers.append(with_fields(damper, coefficient=one.damping))
+        if one.rotor_inertia != 0.0:
+            point = _driven_point(joint)
+            assert point is not None
+            lump = (one.reflected_inertia, 0.0) if joint.slides else (0.0, one.reflected_inertia)
+            bodies[point.body] = with_lump(bodies[point.body], point.point, *lump)
+            if joint.slides and any(mechanism.gravity):
+                forces.append(_weightless(motor.name, point, lump[0], mechanism.gravity))
+    return with_fields(
+        mechanism, bodies=tuple(bodies.values()), dampers=(*mechanism.dampers, *dampers),
+        loads=(*mechanism.loads, *forces), actuators=(), cut=mechanism.cut or Cut(mechanism, {}, {}),
+    )  # fmt: skip
+
+
+def rotor_mass(mechanism: Members) -> float:
+    """What rotors add to the masses of bodies that slide, n^2 J_m each, which is no mass that anyone weighs [kg]."""
+    found = actuators_by_motor(mechanism)
+    sliding = (found[motor.name] for motor in mechanism.motors if motor.name in found and mechanism.slides(motor.joint))
+    return sum(one.reflected_inertia for one in sliding)
+
+
+def _weightless(motor: str, point: PointRef, mass: Any, gravity: Sequence[float]) -> PointForce:
+    balance = PointForce(f"rotor of {motor}", point, (0.0, 0.0))
+    return with_fields(balance, force=(-mass * gravity[0], -mass * gravity[1]))
