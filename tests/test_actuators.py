@@ -377,7 +377,11 @@ def test_raparm_with_servos_runs_under_a_controller(square):
     assert np.max(np.abs(record.voltage)) < 48.0
     assert np.max(np.abs(run.applied)) < 8.0
     assert not [one for one in run.doubts if one.code.startswith(("amplifier", "back-emf"))]
-    bare = driven(square.remodelled(replace(square.mechanism, actuators=())))
+    # Without them links bend beyond all theory in the end, where rounding lets them.
+    try:
+        bare = driven(square.remodelled(replace(square.mechanism, actuators=())))
+    except pf.errors.IntegrationError as error:
+        bare = error.partial
     assert np.max(np.abs(bare.applied)) > 100.0
 
 
