@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.discrete import check_discrete, matrices_of
 from paraflex.control.reach import frequency_of
@@ -154,6 +155,7 @@ class ClosedLoop:
         return float("inf")
 
 
+@checked_arguments()
 def closed_loop(
     model: Any, controller: Any, *, period: float | None = None, delay: float | None = None,
     inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
@@ -212,6 +214,7 @@ def law_of(controller: Any) -> StateSpace:
     return matrices_of(own)
 
 
+@checked_arguments()
 def spillover(full: Any, reduced: Any, controller: Any, **settings: Any) -> pd.DataFrame:
     """A controller that was designed on a reduced model, on that and on the full one: see `closed_loops`.
 
@@ -231,6 +234,7 @@ def spillover(full: Any, reduced: Any, controller: Any, **settings: Any) -> pd.D
     return closed_loops({"reduced": reduced, "full": full}, controller, **settings)
 
 
+@checked_arguments()
 def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) -> pd.DataFrame:
     """One controller on several models: poses along a path, payloads, one of few states and the full one.
 
@@ -281,14 +285,17 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
 
 def warn_if_unstable(loop: ClosedLoop, where: str = "") -> None:
     """Issue a `ResultWarning` that names the poles outside the unit circle."""
-    if loop.stable:
-        return
+    if not loop.stable:
+        warn_user(ResultWarning(f"the sampled loop is unstable{f' {where}' if where else ''}: {unstable_poles(loop)}"))
+
+
+def unstable_poles(loop: ClosedLoop) -> str:
+    """The poles outside the unit circle in words: magnitudes and frequencies of the first four."""
     outside = [z for z in loop.poles if abs(z) >= 1.0 - _ON_CIRCLE and z.imag >= 0.0]
     named = ", ".join(
         f"|z| = {abs(z):.6g} at {frequency_of(complex(z), loop.plant.period):.4g} Hz" for z in outside[:4]
     )
-    more = f" and {len(outside) - 4} more" if len(outside) > 4 else ""
-    warn_user(ResultWarning(f"the sampled loop is unstable{f' {where}' if where else ''}: {named}{more}"))
+    return named + (f" and {len(outside) - 4} more" if len(outside) > 4 else "")
 
 
 def damped_frequency(z: complex, period: float) -> tuple[float, float]:

@@ -29,6 +29,13 @@ def quantisation_noise(resolution: float) -> float:
     return resolution / float(np.sqrt(12.0))
 
 
+def rounded(readings: Array, resolution: Array) -> Array:
+    """Readings (k,) as multiples of their resolutions (k,); of those whose resolution is zero nothing is taken."""
+    coarse = resolution > 0.0
+    steps = np.where(coarse, resolution, 1.0)
+    return np.where(coarse, steps * np.round(readings / steps), readings)
+
+
 # Doublings reach 2^60 samples; the last one changes nothing.
 _DOUBLINGS, _CONVERGED = 60, 1e-15
 

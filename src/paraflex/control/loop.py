@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +12,9 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
-from paraflex.control.together import check_name, multiple_of, whole_and_part
+from paraflex.control.together import check_name, check_whole, multiple_of, whole_and_part
 from paraflex.errors import InputError
+from paraflex.findings import Finding
 from paraflex.mechanism.quantities import known
 
 
@@ -62,6 +63,8 @@ class ControllerRecord:
         Lowest and highest torque [N m, N]; infinite without.
     rates : (outputs,) array
         Largest change of torques in a second [N m/s, N/s]; infinite without.
+    findings : tuple of Finding
+        What its law found doubtful as it started.
     """
 
     name: str
@@ -78,6 +81,7 @@ class ControllerRecord:
     law: str
     limits: Array
     rates: Array
+    findings: tuple[Finding, ...] = ()
 
     @property
     def limited(self) -> Array:
@@ -106,7 +110,8 @@ class Loop:
     Raises
     ------
     InputError
-        A period that is no multiple of the shortest one, unknown sensors or motors, a name twice.
+        A period that is no multiple of the shortest one, unknown sensors or motors, a name twice, two laws each of
+        which gives the whole torque.
     """
 
     def __init__(
@@ -119,6 +124,7 @@ class Loop:
     ) -> None:
         self.controllers: list[Controller] = [_controller(each, sensors, motors) for each in controllers]
         self.names: list[str] = _names(self.controllers)
+        check_whole(self.whole)
         self._start = start
         self._plants: list[Plant] = []
         for name, each in zip(self.names, self.controllers, strict=True):
@@ -141,6 +147,12 @@ class Loop:
         self._due: list[Due] = []
         self._acting = np.zeros((len(self.controllers), len(motors)))
         self.kept: list[Done] = [Done() for _ in self.controllers]
+
+    @property
+    def whole(self) -> list[str]:
+        """Names of controllers that give the whole torque."""
+        pairs = zip(self.names, self.controllers, strict=True)
+        return [name for name, each in pairs if getattr(each, "whole_torque", False)]
 
     @property
     def _instant(self) -> tuple[int, float]:
@@ -232,6 +244,10 @@ class Loop:
             law=law,
             limits=limits,
             rates=rates,
+            findings=tuple(
+                replace(one, text=f'controller "{self.names[k]}": {one.text}')
+                for one in getattr(controller, "findings", ())
+            ),
         )
 
     def saved(self) -> Any:

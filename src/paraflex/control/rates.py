@@ -34,6 +34,8 @@ class RateFeedback:
         No gains, or such that are no finite numbers.
     """
 
+    title = "rate feedback"
+
     @checked_arguments()
     def __init__(self, gains: Mapping[str, Mapping[str, float]], *, cutoff: float | None = None) -> None:
         self.inputs: tuple[str, ...] = tuple(dict.fromkeys(name for row in gains.values() for name in row))
