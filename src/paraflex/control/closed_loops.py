@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.discrete import check_discrete, matrices_of
+from paraflex.control.discrete import DiscreteModel, check_discrete, matrices_of
 from paraflex.control.reach import frequency_of
 from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.errors import InputError, ResultWarning, warn_user
@@ -212,6 +212,24 @@ def law_of(controller: Any) -> StateSpace:
     if hasattr(own, "dt"):
         check_discrete(own.dt, controller, "controller", "controller")
     return matrices_of(own)
+
+
+def named_law(controller: Any) -> DiscreteModel:
+    """A linear controller with the names of its sensors and motors: see `law_of`.
+
+    Raises
+    ------
+    InputError
+        One without matrices, a continuous one, or one without names.
+    """
+    law = law_of(controller)
+    names = [_chosen(controller, attribute, None) or _chosen(controller, labels, None)
+             for attribute, labels in (("inputs", "input_labels"), ("outputs", "output_labels"))]  # fmt: skip
+    if not (names[0] and names[1]):
+        raise InputError("has no names of its sensors and motors", field="controller", value=controller,
+                         remedy="give a model with names, or a design of pf.lqg")  # fmt: skip
+    period = _own(controller, ("period", "dt"))
+    return DiscreteModel(*law, period, names[0], names[1])
 
 
 @checked_arguments()

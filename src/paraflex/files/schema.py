@@ -722,7 +722,9 @@ class LQGTable(ControllerTable):
     """LQG designed as a run starts, on the linear model of the mechanism in its mode."""
 
     type: Literal["lqg"]
-    deviations: dict[str, Number] = Field(description="by sensor the largest deviation allowed, in its unit")
+    deviations: dict[str, Number] = Field(
+        description="by sensor the largest deviation allowed, in the unit of the sensor"
+    )
     effort: NumbersOf = Field(
         description="the largest torque in N m or N, of all motors or by motor; those not named are not used"
     )
