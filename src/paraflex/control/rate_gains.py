@@ -48,7 +48,7 @@ class RateGains:
     spectral_radius : float
         Largest magnitude of the loop's poles but for free motions, which strains do not see.
     bound : str
-        What keeps them from being larger: "optimum", "largest" or "stability".
+        What keeps them from being larger: "optimum", "largest" or "margin".
     loop : ClosedLoop
         With them.
     cutoff : float or None
@@ -287,7 +287,7 @@ class _Search:
         more = (1.0 + 1e-6) * best.gains
         if np.max(np.abs(more)) > self._largest:
             return "largest"
-        return "optimum" if self._stable(more) else "stability"
+        return "optimum" if self._stable(more) else "margin"
 
 
 def _pairs(model: Any, plant: SampledPlant, given: Mapping[str, str | Sequence[str]] | None) -> list[tuple[str, str]]:
