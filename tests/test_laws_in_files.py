@@ -361,6 +361,22 @@ def test_a_time_is_of_a_plan():
         Simulation(rotor, duration=0.01, samples=11).run(rotor.controllers["lq"])
 
 
+def test_a_design_is_for_the_motors_that_it_drives(model, task):
+    """Two of the mode's four: those of another mode, and the same by their efforts."""
+    few = replace(model.controllers["lq"], outputs=("tau1", "tau5"))
+    named = replace(model.controllers["lq"], law=replace(few.law, effort={"tau1": 1.0, "tau5": 1.0}))
+    runs = [simulate_controlled(task, "++++", [one]).controllers[0] for one in (few, named)]
+    design = pf.lqg(
+        pf.linearise(task, mode="+-+-", at=0.0), 1e-3, measured=["A1", "A2"], deviations=few.law.deviations, effort=1.0,
+        noise=pf.quantisation_noise(1e-3), delay=1e-3,
+    )  # fmt: skip
+    law = SampledController(design.law(), quantise=1e-3, reference="plan")
+    by_hand = Simulation(task, mode="++++", feed_forward=True).run(law, warning=False).controllers[0]
+    for done in runs:
+        assert done.outputs == ("tau1", "tau5")
+        assert done.given == pytest.approx(by_hand.given, abs=1e-12)
+
+
 def test_a_design_in_python_starts_anew(task):
     """Started for one mode, then another."""
     law = DesignedLQG({"x": 1e-3, "y": 1e-3}, 1.0, noise=1e-4)

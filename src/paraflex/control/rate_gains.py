@@ -1,4 +1,4 @@
-"""Gains of rate feedback that damp a vibration most, by the sampled closed loop."""
+"""Gains of rate feedback that damp vibrations most, by the sampled closed loop."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from paraflex.mechanism.quantities import known, positive
 _FREE = 1e-5
 # Poles on the unit circle are found that near to it; vibrations whose decay differs by less part are as slow.
 _ON_CIRCLE, _AS_SLOW = 1e-9, 1e-3
-# Gains that are tried in one direction: parts of the one that would damp a vibration critically if damping were linear.
+# Gains that are tried in one direction: parts of those that would damp critically if damping were linear.
 _TRIED = np.geomspace(1e-4, 30.0, 70)
 # A pole is followed in steps so small that it is found this near to where its derivative says, as a part of the
 # distance of the next one; steps are halved so often.
@@ -35,20 +35,20 @@ _ROUNDS, _GROWS = 4, 1e-4
 
 @dataclass(frozen=True)
 class RateGains:
-    """Gains of rate feedback, and what they do to the vibration they were chosen for.
+    """Gains of rate feedback, and what they do to the vibrations they were chosen for.
 
     Attributes
     ----------
     gains : mapping of str to mapping of str to float
         By motor and sensor, for `RateFeedback` [N m s by the sensor's unit].
-    frequency, frequency_without : float
-        Natural frequency of the vibration, with them and without [Hz].
-    damping, damping_without : float
-        Damping ratio of it, with them and without.
+    frequencies, frequencies_without : (k,) arrays
+        Natural frequencies of the vibrations, with them and without [Hz].
+    damping, damping_without : (k,) arrays
+        Damping ratios of them, with gains and without.
     spectral_radius : float
         Largest magnitude of the loop's poles but for free motions, which strains do not see.
     bound : str
-        What keeps them from being larger: "optimum", "largest" or "margin".
+        What keeps gains from being larger: "optimum", "largest" or "margin".
     loop : ClosedLoop
         With them.
     cutoff : float or None
@@ -56,10 +56,10 @@ class RateGains:
     """
 
     gains: Mapping[str, Mapping[str, float]]
-    frequency: float
-    frequency_without: float
-    damping: float
-    damping_without: float
+    frequencies: Array
+    frequencies_without: Array
+    damping: Array
+    damping_without: Array
     spectral_radius: float
     bound: str
     loop: ClosedLoop
@@ -79,14 +79,15 @@ def rate_feedback_gains(
     delay: float = 0.0,
     cutoff: float | None = None,
     beside: Any = None,
-    frequency: float | None = None,
+    frequencies: Sequence[float] | None = None,
     largest: float | None = None,
     margin: float = 2.0,
 ) -> RateGains:
-    """Gains of `RateFeedback` with which a vibration has most damping, in the sampled loop with its delay.
+    """Gains of `RateFeedback` with which vibrations have most damping, in the sampled loop with its delay.
 
-    The pole of the vibration is followed from no gains on, in steps by its derivative dz = w^H dA v / (w^H v). A common
-    factor of all pairs is sought first, along the derivatives of the damping ratio, then each gain by itself, in turn.
+    What is largest is the least of their damping ratios, while no pole becomes slower than the slowest is without
+    gains. Poles are followed from no gains on, in steps by their derivatives dz = w^H dA v / (w^H v). A common factor
+    of all pairs is sought first, along the derivatives of the damping ratios, then each gain by itself, in turn.
 
     Parameters
     ----------
@@ -104,8 +105,8 @@ def rate_feedback_gains(
     beside : optional
         A linear controller that acts as well, with the same period and delay: a joint controller (`JointPID.sampled`),
         a design of `lqg`, or what else `closed_loop` takes, with names of its sensors and motors.
-    frequency : float, optional
-        About that of the vibration [Hz]. By default the one that decays slowest.
+    frequencies : sequence of float, optional
+        About those of the vibrations [Hz]. By default those that decay slowest, as many as there are pairs.
     largest : float, optional
         Of the gains' magnitudes [N m s by the sensor's unit].
     margin : float
@@ -120,9 +121,8 @@ def rate_feedback_gains(
     positive(period, "period", "s")
     if not (np.isfinite(margin) and margin >= 1.0):
         raise InputError("must be at least 1", field="margin", value=margin, remedy="say 2, or 1 for none")
-    for value, field, unit in ((frequency, "frequency", "Hz"), (largest, "largest", "N m s by the sensor's unit")):
-        if value is not None:
-            positive(value, field, unit)
+    if largest is not None:
+        positive(largest, "largest", "N m s by the sensor's unit")
     plant = as_sampled(model, period, delay)
     chosen = _pairs(model, plant, pairs)
     other = None if beside is None else named_law(beside)
@@ -132,33 +132,35 @@ def rate_feedback_gains(
         return closed_loop(of, law if other is None else side_by_side([other, law]), period=period, delay=delay)
 
     search = _Search(made, len(chosen), margin, np.inf if largest is None else largest)
-    start = _Tried(np.zeros(len(chosen)), search.vibration(frequency))
+    start = _Tried(np.zeros(len(chosen)), search.vibrations(frequencies))
     best = search.best(start)
-    (f, ratio), (f0, ratio0) = (damped_frequency(each.pole, period) for each in (best, start))
-    return RateGains(_table(chosen, best.gains), f, f0, ratio, ratio0, search.radius(best.gains), search.bound(best),
-                     made(best.gains, model), cutoff)  # fmt: skip
+    before, after = (np.array([damped_frequency(complex(z), period) for z in each.poles]).T for each in (start, best))
+    return RateGains(
+        _table(chosen, best.gains), after[0], before[0], after[1], before[1], search.radius(best.gains),
+        search.bound(best), made(best.gains, model), cutoff,
+    )  # fmt: skip
 
 
 class _Tried(NamedTuple):
-    """Gains (pairs,) and the pole z of the vibration with them."""
+    """Gains (pairs,) and the poles z (k,) of the vibrations with them."""
 
     gains: Array
-    pole: complex
+    poles: Complex
 
 
 class _Search:
     """The search for gains: A = A_0 + sum of g_i A_i, of the loop with unit gains one at a time."""
 
     def __init__(self, made: Callable[[Array], ClosedLoop], count: int, margin: float, largest: float) -> None:
-        self._none = made(np.zeros(count))
-        self._period: float = self._none.plant.period
-        self._A: Array = self._none.A
+        none = made(np.zeros(count))
+        self._period: float = none.plant.period
+        self._A: Array = none.A
         self._each: Array = np.array([made(row).A - self._A for row in np.eye(count)])
         self._margin, self._largest = margin, largest
-        self._grows: float = max(1.0, self.radius(np.zeros(count))) + _ON_CIRCLE
-        if self._grows > 1.0 + 2.0 * _ON_CIRCLE:
+        self._slowest: float = self.radius(np.zeros(count))
+        if self._slowest > 1.0 + _ON_CIRCLE:
             raise InputError(
-                f"is unstable without gains: |z| = {self._grows:.6g}", field="model",
+                f"is unstable without gains: |z| = {self._slowest:.6g}", field="model",
                 remedy="give a controller that makes it stable: beside=...",
             )  # fmt: skip
 
@@ -171,108 +173,115 @@ class _Search:
         return float(np.max(np.abs(z[np.abs(z - 1.0) > _FREE]), initial=0.0))
 
     def _stable(self, gains: Array) -> bool:
-        return all(self.radius(factor * gains) <= self._grows for factor in {1.0, self._margin})
+        """Whether no pole is slower than without gains, and none grows with gains so many times as large."""
+        slow = self.radius(gains) > self._slowest + _ON_CIRCLE
+        return not slow and self.radius(self._margin * gains) <= 1.0 + _ON_CIRCLE
 
     def _allowed(self, gains: Array) -> bool:
         return bool(np.max(np.abs(gains)) <= self._largest) and self._stable(gains)
 
-    def vibration(self, frequency: float | None) -> complex:
-        """The pole of a vibration without gains: nearest to a frequency [Hz], or that which decays slowest."""
+    def vibrations(self, frequencies: Sequence[float] | None) -> Complex:
+        """Poles without gains: nearest to frequencies [Hz], or of the vibrations that decay slowest, one a pair."""
         z = np.linalg.eigvals(self._A)
-        z = z[(z.imag > _FREE) & (np.abs(z) > _FREE)]
+        z = z[(z.imag > _FREE) & (np.abs(z) > _FREE)].astype(complex)
         if not z.size:
             raise InputError("has no vibration", field="model", remedy="give one with flexible links")
         each = np.array([damped_frequency(complex(one), self._period)[0] for one in z])
-        if frequency is not None:
-            return complex(z[np.argmin(np.abs(each - frequency))])
-        decay = np.abs(np.log(np.abs(z)))
-        slow = decay <= np.min(decay) * (1.0 + _AS_SLOW) + _ON_CIRCLE
-        return complex(z[slow][np.argmin(each[slow])])
+        if frequencies is not None:
+            return z[_nearest(each, frequencies)]
+        decay = -np.log(np.abs(z))
+        # Those as slow as one another by their frequencies: without damping rounding alone tells them apart.
+        steps = np.round(np.log(np.maximum(decay, _ON_CIRCLE)) / _AS_SLOW)
+        return z[np.lexsort([each, steps])[: len(self._each)]]
 
-    def damping(self, pole: complex) -> float:
-        """Damping ratio of a pole."""
-        return damped_frequency(pole, self._period)[1]
+    def least(self, tried: _Tried) -> float:
+        """The least damping ratio of the vibrations."""
+        return min(damped_frequency(complex(z), self._period)[1] for z in tried.poles)
 
-    def _derivatives(self, at: _Tried) -> tuple[Complex, float]:
-        """dz/dg (pairs,) of a simple pole, and how far the next pole is from it."""
+    def _derivatives(self, at: _Tried) -> tuple[Complex, Array]:
+        """dz/dg (k, pairs) of simple poles, and how far the next pole is from each."""
         z, left, right = scipy.linalg.eig(self._of(at.gains), left=True)
-        apart = np.abs(z - at.pole)
-        k = int(np.argmin(apart))
-        w, v = left[:, k].conj(), right[:, k]
-        return (w @ self._each @ v) / (w @ v), float(np.min(np.delete(np.abs(z - z[k]), k), initial=np.inf))
+        slopes, room = [], []
+        for pole in at.poles:
+            k = int(np.argmin(np.abs(z - pole)))
+            w, v = left[:, k].conj(), right[:, k]
+            slopes.append((w @ self._each @ v) / (w @ v))
+            room.append(np.min(np.delete(np.abs(z - z[k]), k), initial=np.inf))
+        return np.array(slopes), np.array(room)
 
     def _follow(self, start: _Tried, gains: Array, halved: int = 0) -> _Tried:
-        """The pole with other gains."""
-        slope, room = self._derivatives(start)
-        expected = start.pole + slope @ (gains - start.gains)
+        """The poles with other gains."""
+        slopes, room = self._derivatives(start)
+        expected = start.poles + slopes @ (gains - start.gains)
         z = np.linalg.eigvals(self._of(gains))
-        found = complex(z[np.argmin(np.abs(z - expected))])
-        if halved >= _HALVED or abs(found - expected) <= _NEAR * room:
-            return _Tried(gains, found)
+        apart = np.abs(z[None] - expected[:, None])
+        rows, columns = scipy.optimize.linear_sum_assignment(apart)
+        if halved >= _HALVED or np.all(apart[rows, columns] <= _NEAR * room):
+            return _Tried(gains, z[columns].astype(complex))
         middle = self._follow(start, 0.5 * (start.gains + gains), halved + 1)
         return self._follow(middle, gains, halved + 1)
 
-    def _directions(self, at: _Tried) -> Array:
-        """Derivatives (pairs,) of the damping ratio."""
-        slope, _ = self._derivatives(at)
-        s = np.log(at.pole) / self._period
-        ds = slope / (at.pole * self._period)
-        return -ds.real / abs(s) + s.real * (s.conjugate() * ds).real / abs(s) ** 3
+    def directions(self, at: _Tried) -> Array:
+        """Derivatives (k, pairs) of the damping ratios -Re s / |s|, with s = ln z / T."""
+        slopes, _ = self._derivatives(at)
+        s = (np.log(at.poles) / self._period)[:, None]
+        ds = slopes / (at.poles[:, None] * self._period)
+        return -ds.real / np.abs(s) + s.real * (s.conj() * ds).real / np.abs(s) ** 3
 
     def best(self, start: _Tried) -> _Tried:
         """Gains of most damping."""
-        slopes = self._directions(start)
-        if not np.max(np.abs(slopes)) > 0.0:
-            raise InputError("do not see the vibration, or their motors do not move it", field="pairs",
-                             remedy="name other sensors or motors, or another frequency")  # fmt: skip
-        best = self._along(start, slopes / np.sum(slopes**2))
-        if best is start:
+        slopes = self.directions(start)
+        if not np.all(np.max(np.abs(slopes), axis=1) > 0.0):
+            raise InputError("do not see a vibration, or their motors do not move it", field="pairs",
+                             remedy="name other sensors or motors, or other frequencies")  # fmt: skip
+        mean = np.mean(slopes, axis=0)
+        best = self._along(start, mean / np.sum(mean**2))
+        for _ in range(_ROUNDS if len(mean) > 1 else 0):
+            before = best
+            for k in range(len(mean)):
+                best = self._anew(best, k)
+            if self.least(best) <= self.least(before) * (1.0 + _GROWS):
+                break
+        if not np.any(best.gains):
             raise InputError(
-                "cannot damp the vibration: the loop becomes unstable first", field="pairs",
+                "cannot damp the vibrations: the loop becomes unstable, or a pole slower, first", field="pairs",
                 remedy="sample faster, delay less, raise the cut-off, or give links damping",
             )  # fmt: skip
-        for _ in range(_ROUNDS if len(slopes) > 1 else 0):
-            before = best
-            for k in range(len(slopes)):
-                best = self._anew(best, k)
-            if self.damping(best.pole) <= self.damping(before.pole) * (1.0 + _GROWS):
-                break
         return best
 
     def _anew(self, best: _Tried, k: int) -> _Tried:
-        """The gain of one pair sought anew, from zero on."""
+        """The gain of one pair sought anew, from zero on, in both directions."""
         without = best.gains.copy()
         without[k] = 0.0
-        start = self._follow(best, without)
-        slope = self._directions(start)[k]
-        if slope == 0.0 or not self._allowed(without):
+        if not self._allowed(without):
             return best
-        found = self._along(start, np.eye(len(without))[k] / slope)
-        return found if self.damping(found.pole) > self.damping(best.pole) else best
+        start = self._follow(best, without)
+        slope = float(np.max(np.abs(self.directions(start)[:, k])))
+        one = np.eye(len(without))[k] / slope if slope else np.zeros(len(without))
+        return max([best, *(self._along(start, sign * one) for sign in (1.0, -1.0) if slope)], key=self.least)
 
     def _along(self, start: _Tried, direction: Array) -> _Tried:
         """The most damping that is allowed with gains in one direction."""
-        tried, last = [start], np.inf
+        tried = [start]
         for part in _TRIED:
             gains = start.gains + part * direction
-            if not self._allowed(gains):
-                last = self._border(start.gains, direction, float(part))
-                gains = start.gains + last * direction
-                tried.append(self._follow(tried[-1], gains))
-                break
+            allowed = self._allowed(gains)
+            if not allowed:
+                gains = start.gains + self._border(start.gains, direction, float(part)) * direction
             tried.append(self._follow(tried[-1], gains))
-        ratios = [self.damping(one.pole) for one in tried]
-        k = int(np.argmax(ratios))
+            if not allowed:
+                break
+        k = int(np.argmax([self.least(one) for one in tried]))
         if k in (0, len(tried) - 1):
             return tried[k]
         low, high = tried[k - 1], tried[k + 1]
 
-        def less(part: float) -> float:
-            return -self.damping(self._follow(low, low.gains + part * (high.gains - low.gains)).pole)
+        def between(part: float) -> _Tried:
+            return self._follow(low, low.gains + part * (high.gains - low.gains))
 
-        part = scipy.optimize.minimize_scalar(less, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-6}).x
-        found = self._follow(low, low.gains + part * (high.gains - low.gains))
-        return found if self.damping(found.pole) > ratios[k] else tried[k]
+        part = scipy.optimize.minimize_scalar(lambda part: -self.least(between(part)), bounds=(0.0, 1.0),
+                                              method="bounded", options={"xatol": 1e-6}).x  # fmt: skip
+        return max([tried[k], between(part)], key=self.least)
 
     def _border(self, base: Array, direction: Array, beyond: float) -> float:
         """The largest part of a direction that is allowed, below one that is not."""
@@ -288,6 +297,18 @@ class _Search:
         if np.max(np.abs(more)) > self._largest:
             return "largest"
         return "optimum" if self._stable(more) else "margin"
+
+
+def _nearest(each: Array, frequencies: Sequence[float]) -> list[int]:
+    """Numbers of the vibrations nearest to frequencies [Hz]."""
+    found = []
+    for wanted in frequencies:
+        positive(wanted, "frequencies", "Hz")
+        found.append(int(np.argmin(np.abs(each - wanted))))
+    if not found or len(set(found)) < len(found):
+        raise InputError("no vibration, or one named twice", field="frequencies", value=list(frequencies),
+                         remedy=f"choose from {', '.join(f'{one:.4g}' for one in np.sort(each)[:8])} Hz")  # fmt: skip
+    return found
 
 
 def _pairs(model: Any, plant: SampledPlant, given: Mapping[str, str | Sequence[str]] | None) -> list[tuple[str, str]]:
