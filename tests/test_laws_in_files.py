@@ -285,6 +285,19 @@ def test_a_rotor_under_lqg_is_that_of_its_equations():
     assert done.law == "LQG of 2 states"
 
 
+def test_a_run_with_a_design_goes_on_from_what_was_saved():
+    """The same bits, estimate and integrals included."""
+    rotor = model_from(tomllib.loads(ROTOR + LQ), "rotor.toml")
+    sim, ends = Simulation(rotor, duration=0.1, samples=101), []
+    sim.run(rotor.controllers["lq"], until=0.05)
+    saved = sim.save()
+    for _ in range(2):
+        sim.restore(saved)
+        ends.append(sim.run().controllers[0].wanted)
+    assert np.array_equal(*ends)
+    assert np.array_equal(ends[0], sim.run(rotor.controllers["lq"]).controllers[0].wanted)
+
+
 @pytest.mark.parametrize("mode", ["++++", "+-+-"])
 def test_lqg_is_designed_for_the_mode(model, task, mode):
     """By hand: the mode's motors alone, encoders of them, noise of rounding, at the start of the path."""
