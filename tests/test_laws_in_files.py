@@ -154,6 +154,8 @@ def test_a_law_and_its_description_agree_on_the_whole_torque(model):
         ("effort = 1.0", "effort = 1.0\nintegrators = { A1 = 0.0 }", r"controller.lq.integrators.A1: must be positive"),
         ("effort = 1.0", "effort = 1.0\nnoise = { A1 = 0.0 }", r"controller.lq.noise.A1: must be positive"),
         ("effort = 1.0", "effort = 1.0\nstates = 0", r"controller.lq.states: no such number of states"),
+        ("effort = 1.0", "effort = 1.0\nintegrators = { x = 1.0 }", r"controller.lq.integrators: unknown sensor"),
+        ("effort = 1.0", "effort = 1.0\nnoise = { root1 = 1e-6 }", r"controller.lq.noise: unknown sensor"),
         ("effort = 1.0", 'effort = 1.0\nmeasured = ["A1"]', r"controller.lq.measured"),
         ('{ x = "0.5 mm"', '{ z = "0.5 mm"', r"controller.lq.deviations: unknown sensor \(got .z.\)"),
     ],
@@ -301,14 +303,19 @@ def test_a_run_with_a_design_goes_on_from_what_was_saved():
 @pytest.mark.parametrize("mode", ["++++", "+-+-"])
 def test_lqg_is_designed_for_the_mode(model, task, mode):
     """By hand: the mode's motors alone, encoders of them, noise of rounding, at the start of the path."""
-    run = simulate_controlled(task, mode, [model.controllers["lq"]])
+    one = model.controllers["lq"]
+    one = replace(one, law=replace(one.law, noise={"D1": 2e-3, "A2": 2e-3}, integrators={"A1": 0.5, "D1": 0.5}))
+    one.check(model.mechanism)
+    run = simulate_controlled(task, mode, [one])
     (done,) = run.controllers
     joints = ANGLES if mode == "++++" else ("A1", "A2")
     assert done.inputs == joints
     resolution = {name: one for name, one in model.controllers["lq"].quantise.items() if name in joints}
+    rounding = {name: pf.quantisation_noise(one) for name, one in resolution.items()}
     design = pf.lqg(
         pf.linearise(task, mode=mode, at=0.0), 1e-3, measured=joints, deviations=model.controllers["lq"].law.deviations,
-        effort=1.0, noise={name: pf.quantisation_noise(one) for name, one in resolution.items()}, delay=1e-3,
+        effort=1.0, noise={**rounding, "A2": 2e-3, **({"D1": 2e-3} if mode == "++++" else {})}, delay=1e-3,
+        integrators={name: 0.5 for name in ("A1", "D1") if name in joints},
     )  # fmt: skip
     assert design.outputs == done.outputs
     law = SampledController(design.law(), quantise=resolution, reference="plan")

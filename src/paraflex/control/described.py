@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.control.described_laws import Names, Numbers, of_names
+from paraflex.control.described_laws import LawNames, Numbers, of_names
 from paraflex.control.together import check_name, check_whole, multiple_of
 from paraflex.errors import InputError
 from paraflex.mechanism import AngleLaw, Mechanism
@@ -75,23 +75,24 @@ class ControllerDescription(CheckedFields):
         """
         motors = [motor.name for motor in mechanism.motors]
         sensors = [sensor.name for sensor in measured_sensors(mechanism)]
+        encoders = encoders_of(mechanism, self.outputs or motors)
         try:
-            self._check(sensors, motors)
+            self._check(LawNames(self.inputs, self.outputs, sensors, motors, encoders))
         except InputError as error:
             raise error.within(f"{TABLE}.{self.name}") from None
 
-    def _check(self, sensors: Sequence[str], motors: Sequence[str]) -> None:
-        for field_name, names, what in (("inputs", sensors, "sensor"), ("outputs", motors, "motor")):
+    def _check(self, names: LawNames) -> None:
+        for field_name, all_names, what in (("inputs", names.sensors, "sensor"), ("outputs", names.motors, "motor")):
             for name in getattr(self, field_name):
-                known(name, names, field_name, what)
-        self.law.check(Names(self.inputs, self.outputs, sensors, motors))
-        law = self.law.made(self.outputs or motors, self.period)
+                known(name, all_names, field_name, what)
+        self.law.check(names)
+        law = self.law.made(self.outputs or names.motors, self.period)
         sampled = self._sampled(law, {"reference": self.reference})
-        among = sampled.inputs or sensors
+        among = sampled.inputs or names.sensors
         if isinstance(self.reference, Mapping):
             for name in self.reference:
                 known(name, among, "reference", "sensor")
-        sampled.check(among, sampled.outputs or motors)
+        sampled.check(among, sampled.outputs or names.motors)
 
     def made(self, mechanism: Mechanism, motors: Sequence[str]) -> SampledController:
         """The controller for a mode with some motors of a mechanism.

@@ -23,13 +23,24 @@ Numbers = float | Mapping[str, float]
 Rows = Sequence[Sequence[float]]
 
 
-class Names(NamedTuple):
-    """Sensors and motors that a controller names itself, which may be none, and all that the mechanism has."""
+class LawNames(NamedTuple):
+    """Sensors and motors that a description names.
+
+    Attributes
+    ----------
+    inputs, outputs : sequence of str
+        Those that it names itself, which may be none.
+    sensors, motors : sequence of str
+        All that the mechanism has.
+    encoders : sequence of str
+        Of its motors, of all motors where it names none.
+    """
 
     inputs: Sequence[str]
     outputs: Sequence[str]
     sensors: Sequence[str]
     motors: Sequence[str]
+    encoders: Sequence[str]
 
 
 class DescribedLaw(Protocol):
@@ -46,7 +57,7 @@ class DescribedLaw(Protocol):
     kind: ClassVar[str]
     whole_torque: ClassVar[bool]
 
-    def check(self, names: Names) -> None:
+    def check(self, names: LawNames) -> None:
         """Check its numbers and names.
 
         Raises
@@ -84,7 +95,7 @@ class PIDDescription(CheckedFields):
     project: bool = True
     cutoff: float | None = None
 
-    def check(self, names: Names) -> None:
+    def check(self, names: LawNames) -> None:
         """See `DescribedLaw`."""
         from paraflex.control.laws import gains_of
 
@@ -147,7 +158,7 @@ class StateSpaceDescription(CheckedFields):
             rows = tuple(tuple(map(float, row)) for row in getattr(self, name))
             object.__setattr__(self, name, rows if any(rows) else ())
 
-    def check(self, names: Names) -> None:
+    def check(self, names: LawNames) -> None:
         """See `DescribedLaw`."""
         self._model(1.0).check(names.inputs, names.outputs, 1.0)
 
@@ -185,7 +196,7 @@ class ComputedTorqueDescription(CheckedFields):
     damping_ratio: float = 0.7
     cutoff: float | None = None
 
-    def check(self, names: Names) -> None:
+    def check(self, names: LawNames) -> None:
         """See `DescribedLaw`."""
         self.made(names.motors, 1.0)
 
@@ -214,7 +225,7 @@ class RateFeedbackDescription(CheckedFields):
     gains: Mapping[str, Mapping[str, float]]
     cutoff: float | None = None
 
-    def check(self, names: Names) -> None:
+    def check(self, names: LawNames) -> None:
         """See `DescribedLaw`."""
         for motor, row in self.gains.items():
             known(motor, names.motors, "gains", "motor")
@@ -266,10 +277,10 @@ class LQGDescription(CheckedFields):
     states: int | None = None
     at: float | None = None
 
-    def check(self, names: Names) -> None:
+    def check(self, names: LawNames) -> None:
         """See `DescribedLaw`."""
         among = {"effort": names.motors, "disturbance": names.motors, "deviations": names.sensors,
-                 "noise": names.inputs or names.sensors, "integrators": names.inputs or names.sensors}  # fmt: skip
+                 "noise": names.inputs or names.encoders, "integrators": names.inputs or names.encoders}  # fmt: skip
         for field_name, known_names in among.items():
             given = getattr(self, field_name)
             for name in given if isinstance(given, Mapping) else ():

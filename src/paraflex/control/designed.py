@@ -32,6 +32,7 @@ class DesignedLQG:
     ----------
     deviations, effort, disturbance, integrators
         See `lqr` and `lqg`.
+        Integrators are used of the sensors that it reads.
     noise : float or mapping of str to float, optional
         Standard deviations of readings in their units, of all or by sensor; of others `quantisation_noise` of what the
         controller rounds them to.
@@ -82,8 +83,8 @@ class DesignedLQG:
         if states is not None and states < 1:
             raise InputError("no such number of states", field="states", value=states, remedy="say 16, or leave it out")
         self.outputs: tuple[str, ...] = tuple(effort) if isinstance(effort, Mapping) else ()
-        self._weights = {"deviations": deviations, "effort": effort, "disturbance": disturbance,
-                         "integrators": integrators}  # fmt: skip
+        self._weights = {"deviations": deviations, "effort": effort, "disturbance": disturbance}
+        self._integrators: Mapping[str, float] = integrators or {}
         self._noise, self._states, self._at = noise, states, at
         self.design: LQGDesign | None = None
         self.findings: tuple[Finding, ...] = ()
@@ -98,8 +99,9 @@ class DesignedLQG:
         full = self._model(plant)
         flexible = any(body.nf for body in full.minimal.system.bodies)
         few = reduce(full, self._states) if flexible else full
+        integrators = {name: time for name, time in self._integrators.items() if name in plant.inputs}
         self.design = lqg(few, plant.period, delay=plant.delay, measured=plant.inputs, noise=self._noise_of(plant),
-                          **self._weights)  # fmt: skip
+                          integrators=integrators, **self._weights)  # fmt: skip
         loop = closed_loop(full, self.design)
         self.findings = () if loop.stable else (
             Finding(
@@ -139,7 +141,7 @@ class DesignedLQG:
         if missing:
             raise InputError("has no noise", field="noise", value=missing[0],
                              remedy="give its standard deviation, or quantise, the resolution of readings")  # fmt: skip
-        return {**rounding, **given}
+        return {name: given.get(name, rounding.get(name, 0.0)) for name in plant.inputs}
 
 
 def _check(given: Any, field: str, unit: str, check: Any) -> None:
