@@ -13,7 +13,7 @@ import pytest
 import paraflex as pf
 from paraflex.cli.repeated import repeated_runs
 from paraflex.control import ControllerDescription, PIDDescription, Simulation, simulate_controlled
-from paraflex.control.described import LAWS
+from paraflex.control.described_laws import LAWS
 from paraflex.designs.derivatives.plans import check_open_and_whole
 from paraflex.designs.measure import measure
 from paraflex.errors import InputError
@@ -146,7 +146,7 @@ def test_a_controller_changed_in_python_is_written(tmp_path):
         ("D = [[-40.0, -1.2]]", "D = [[-40.0]]", r"controller.pd.inputs: the model has 1"),
         ("D = [[-40.0, -1.2]]", "D = [[-40.0, -1.2], [1.0]]", r"controller.pd.D: is no matrix"),
         ("D = [[-40.0, -1.2]]", "D = [[-40.0, -1.2]]\nA = [[1.0]]", r"controller.pd.B: has 0, not 1 x 2"),
-        ('"state-space"', '"lqg"', r"controller.pd.type"),
+        ('"state-space"', '"lqr"', r"controller.pd.type"),
         ("[controller.pd]", "[controller.none]", r"controller.none: is the word for no controller"),
         ("[controller.pd]", '[controller."a.b"]', r"controller: is no name of a controller"),
     ],

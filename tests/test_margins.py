@@ -256,6 +256,8 @@ def test_poses_along_a_path_and_payloads():
         ((rotor(), gains(1.0, 1.0)), {"outputs": ["u9"]}, "outputs"),
         ((rotor(), gains(1.0, 1.0)), {"delay": -1.0}, "delay"), ((rotor(), gains(1.0, 1.0)), {"period": 0.0}, "period"),
         ((pf.discretise(rotor(), 0.5), gains(1.0, 1.0)), {}, "model"),
+        ((rotor(), gains(1.0, 1.0)), {"period": "1 ms"}, "period"),
+        ((rotor(), gains(1.0, 1.0)), {"inputs": 3}, "inputs"),
     ],
 )  # fmt: skip
 def test_loops_that_cannot_be_closed(arguments, settings, field):
@@ -263,6 +265,27 @@ def test_loops_that_cannot_be_closed(arguments, settings, field):
         pf.closed_loop(*arguments, **settings)
     assert error.value.field == field
     assert error.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: pf.closed_loops([rotor()], gains(1.0, 1.0)), "models"),
+        (lambda: pf.discretise(rotor(), "fast"), "period"),
+        (lambda: pf.discretise(rotor(), 1e-3, [1.0, 2.0]), "delay"),
+        (lambda: pf.margins(rotor(), gains(1.0, 1.0), period="fast"), "period"),
+        (lambda: pf.spillover(rotor(), rotor(), gains(1.0, 1.0), delay="late"), "models.reduced.delay"),
+    ],
+)
+def test_arguments_of_another_type_are_refused(call, field):
+    with pytest.raises(InputError) as error:
+        call()
+    assert error.value.field == field
+
+
+def test_one_sensor_is_a_list_of_one():
+    loop = pf.closed_loop(rotor(), gains(1.0), inputs="y2")
+    assert loop.plant.outputs == ("y2",)
 
 
 def test_controllers_of_all_kinds_are_one_loop():

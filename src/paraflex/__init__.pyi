@@ -104,6 +104,7 @@ from .control.laws import JointPID as JointPID, joint_gains as joint_gains, inte
 from .control.computed_torque import ComputedTorque as ComputedTorque
 from .control.inside import CompiledLaw as CompiledLaw
 from .control.rates import RateFeedback as RateFeedback
+from .control.rate_gains import rate_feedback_gains as rate_feedback_gains, RateGains as RateGains
 from .control.shaping import Shaper as Shaper, shaper as shaper
 from .control.shaped import ShapedPath as ShapedPath, shape_torques as shape_torques
 from .control.sampled import discretise as discretise, SampledPlant as SampledPlant

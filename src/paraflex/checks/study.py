@@ -81,7 +81,7 @@ def _of_path(model: Model, name: str, assembly: str | None, modes: Sequence[str]
     yield from path_findings(model, chosen, name, duration)
     try:
         # What comes after the path is rest.
-        end = min(duration, _REST * chosen.duration)
+        end = min(duration, _REST * model.driven_for(chosen))
         task = model.plan(chosen, mechanism=model.mechanism.rigid(), duration=end, samples=_SAMPLES, assembly=assembly)
     except UnreachablePathError as error:
         yield Finding(

@@ -56,7 +56,9 @@ def _effort(model: Model, path: str | None) -> Effort | None:
     rigid = model.mechanism.rigid()
     # The path says where it starts.
     placed = replace(model, start=None)
-    return placed.plan(followed, mechanism=rigid, duration=followed.duration, samples=_SAMPLES, warning=False).effort
+    return placed.plan(
+        followed, mechanism=rigid, duration=placed.driven_for(followed), samples=_SAMPLES, warning=False
+    ).effort
 
 
 def _named_modes(model: Model) -> list[ActuationMode]:

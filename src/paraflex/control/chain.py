@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,9 +18,11 @@ from paraflex.arrays import Array
 from paraflex.control.amplifiers import largest_commands
 from paraflex.control.controllers import Plant
 from paraflex.control.discrete import DiscreteModel, discrete_model
+from paraflex.control.estimators import rounded
 from paraflex.control.filters import transfer_function
 from paraflex.control.references import Reference, references
 from paraflex.errors import InputError
+from paraflex.findings import Finding
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import known, positive
 from paraflex.motion import MotionRun
@@ -79,7 +82,8 @@ class SampledController:
         A discrete model of python-control or SciPy, from readings to torques; a function of (k, t, y), with y (inputs,)
         the readings of sample k at time t, that returns torques (outputs,); or an object with such a method `step`. It
         may have `start(plant)`, which is called first, `limited(torques)`, which is told the torques within the limits,
-        and any of the attributes below.
+        any of the attributes below, `whole_torque` if no planned torque is to act besides, and `absolute` if it takes
+        readings without a reference.
     period : float, optional
         Of sampling [s].
     delay : float
@@ -141,6 +145,9 @@ class SampledController:
         self.reference: Mapping[str, Any] | TrackingRun | MotionRun | str | None = (
             own if reference is None else reference
         )
+        if self.reference and getattr(self.law, "absolute", False):
+            raise InputError(f"{self.title} takes readings as they are", field="reference", value=reference,
+                             remedy="leave it out")  # fmt: skip
         self.quantise: Any = quantise
         self.filters: Mapping[str, Any] = filters or {}
         self.limits: Any = limits
@@ -174,7 +181,7 @@ class SampledController:
         """
         self.found_references: list[Reference | None] = references(self.reference, plant)
         resolution, filters, limits, rates = self.check(plant.inputs, plant.outputs)
-        self.resolution: Array = np.array([0.0 if one is None else one for one in resolution])
+        self.resolution: Array = np.array([one or 0.0 for one in resolution])
         self._filters = [None if given is None else _SettledFilter(given, plant.period) for given in filters]
         most = largest_commands(plant.mechanism, plant.outputs)
         self._lowest = np.maximum([-np.inf if one is None else one[0] for one in limits], -most)
@@ -182,7 +189,18 @@ class SampledController:
         self._most = np.array([np.inf if one is None else one * plant.period for one in rates])
         self._given: Array = np.zeros(len(plant.outputs))
         if hasattr(self.law, "start"):
-            self.law.start(plant)
+            resolution = tuple(self.resolution.tolist())
+            self.law.start(replace(plant, resolution=resolution) if any(resolution) else plant)
+
+    @property
+    def whole_torque(self) -> bool:
+        """Whether its law gives the whole torque, so that no planned torque acts besides."""
+        return bool(getattr(self.law, "whole_torque", False))
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What its law found doubtful as it started."""
+        return tuple(getattr(self.law, "findings", ()))
 
     @property
     def title(self) -> str:
@@ -201,10 +219,8 @@ class SampledController:
 
     def step(self, k: int, t: float, y: Array) -> Any:
         """See `Controller`."""
-        y = np.array(y, dtype=float)
-        for i, (resolution, filtered) in enumerate(zip(self.resolution, self._filters, strict=True)):
-            if resolution > 0.0:
-                y[i] = resolution * np.round(y[i] / resolution)
+        y = rounded(np.array(y, dtype=float), self.resolution)
+        for i, filtered in enumerate(self._filters):
             if filtered is not None:
                 y[i] = filtered(y[i])
         errors = y.copy()

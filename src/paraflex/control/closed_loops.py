@@ -11,8 +11,9 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.discrete import check_discrete, matrices_of
+from paraflex.control.discrete import DiscreteModel, check_discrete, matrices_of
 from paraflex.control.reach import frequency_of
 from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.errors import InputError, ResultWarning, warn_user
@@ -154,6 +155,7 @@ class ClosedLoop:
         return float("inf")
 
 
+@checked_arguments()
 def closed_loop(
     model: Any, controller: Any, *, period: float | None = None, delay: float | None = None,
     inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
@@ -212,6 +214,25 @@ def law_of(controller: Any) -> StateSpace:
     return matrices_of(own)
 
 
+def named_law(controller: Any) -> DiscreteModel:
+    """A linear controller with the names of its sensors and motors: see `law_of`.
+
+    Raises
+    ------
+    InputError
+        One without matrices, a continuous one, or one without names.
+    """
+    law = law_of(controller)
+    names = [_chosen(controller, attribute, None) or _chosen(controller, labels, None)
+             for attribute, labels in (("inputs", "input_labels"), ("outputs", "output_labels"))]  # fmt: skip
+    if not (names[0] and names[1]):
+        raise InputError("has no names of its sensors and motors", field="controller", value=controller,
+                         remedy="give a model with names, or a design of pf.lqg")  # fmt: skip
+    period = _own(controller, ("period", "dt"))
+    return DiscreteModel(*law, period, names[0], names[1])
+
+
+@checked_arguments()
 def spillover(full: Any, reduced: Any, controller: Any, **settings: Any) -> pd.DataFrame:
     """A controller that was designed on a reduced model, on that and on the full one: see `closed_loops`.
 
@@ -231,6 +252,7 @@ def spillover(full: Any, reduced: Any, controller: Any, **settings: Any) -> pd.D
     return closed_loops({"reduced": reduced, "full": full}, controller, **settings)
 
 
+@checked_arguments()
 def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) -> pd.DataFrame:
     """One controller on several models: poses along a path, payloads, one of few states and the full one.
 
@@ -281,14 +303,17 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
 
 def warn_if_unstable(loop: ClosedLoop, where: str = "") -> None:
     """Issue a `ResultWarning` that names the poles outside the unit circle."""
-    if loop.stable:
-        return
+    if not loop.stable:
+        warn_user(ResultWarning(f"the sampled loop is unstable{f' {where}' if where else ''}: {unstable_poles(loop)}"))
+
+
+def unstable_poles(loop: ClosedLoop) -> str:
+    """The poles outside the unit circle in words: magnitudes and frequencies of the first four."""
     outside = [z for z in loop.poles if abs(z) >= 1.0 - _ON_CIRCLE and z.imag >= 0.0]
     named = ", ".join(
         f"|z| = {abs(z):.6g} at {frequency_of(complex(z), loop.plant.period):.4g} Hz" for z in outside[:4]
     )
-    more = f" and {len(outside) - 4} more" if len(outside) > 4 else ""
-    warn_user(ResultWarning(f"the sampled loop is unstable{f' {where}' if where else ''}: {named}{more}"))
+    return named + (f" and {len(outside) - 4} more" if len(outside) > 4 else "")
 
 
 def damped_frequency(z: complex, period: float) -> tuple[float, float]:

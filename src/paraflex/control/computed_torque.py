@@ -48,6 +48,10 @@ class ComputedTorque:
         than those of motors.
     """
 
+    title = "computed torque"
+    whole_torque = True
+    absolute = True
+
     @checked_arguments()
     def __init__(self, frequency: float, damping_ratio: float = 0.7, *, cutoff: float | None = None) -> None:
         positive(frequency, "frequency", "Hz")
@@ -58,6 +62,9 @@ class ComputedTorque:
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
+        if plant.task is None:
+            raise InputError("there is no planned motion to follow", field="law", value=self.title,
+                             remedy="give a path to plan along, or another law")  # fmt: skip
         self._plan = planned_motion(plant)
         self._start, self._period = plant.state.time, plant.period
         mechanism = self._plan.mechanism

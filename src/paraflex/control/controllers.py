@@ -31,6 +31,8 @@ class Plant:
         Motors, in the order of the torques that it returns.
     period, delay : float
         [s]
+    resolution : tuple of float
+        Of the readings, to whose multiples they are rounded, zero of those that are not; none if none is.
     """
 
     mechanism: Mechanism
@@ -42,6 +44,7 @@ class Plant:
     outputs: tuple[str, ...]
     period: float
     delay: float
+    resolution: tuple[float, ...] = ()
 
 
 @runtime_checkable

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
@@ -96,6 +97,30 @@ def discrete_model(given: Any) -> DiscreteModel:
     check_discrete(given.dt, given, "law", "model")
     labels = [_own_names(getattr(given, name, None)) for name in ("input_labels", "output_labels")]
     return DiscreteModel(*matrices_of(given), None if given.dt is True else float(given.dt), *labels)
+
+
+def side_by_side(laws: Sequence[DiscreteModel]) -> DiscreteModel:
+    """Laws with names and one period as one law: torques for one motor add up.
+
+    Raises
+    ------
+    InputError
+        Laws of different periods.
+    """
+    period = laws[0].period
+    for one in laws:
+        if one.period is not None and period is not None and abs(one.period - period) > 1e-9 * period:
+            raise InputError(f"is another than that of a law beside it, {period:g} s", field="period",
+                             value=one.period, remedy="design both for one period")  # fmt: skip
+    inputs, outputs = (tuple(dict.fromkeys(name for one in laws for name in getattr(one, what)))
+                       for what in ("inputs", "outputs"))  # fmt: skip
+    read = [np.array([[name == own for name in inputs] for own in one.inputs], dtype=float) for one in laws]
+    given = [np.array([[name == own for own in one.outputs] for name in outputs], dtype=float) for one in laws]
+    A = scipy.linalg.block_diag(*(one.A for one in laws))
+    B = np.vstack([one.B @ each for one, each in zip(laws, read, strict=True)])
+    C = np.hstack([each @ one.C for one, each in zip(laws, given, strict=True)])
+    D = sum(to @ one.D @ of for one, to, of in zip(laws, given, read, strict=True))
+    return DiscreteModel(A, B, C, np.asarray(D), period, inputs, outputs)
 
 
 def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
+from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import positive
 
 
@@ -28,6 +29,13 @@ def quantisation_noise(resolution: float) -> float:
     """
     positive(resolution, "resolution", "the unit of the reading")
     return resolution / float(np.sqrt(12.0))
+
+
+def rounded(readings: Array, resolution: Array) -> Array:
+    """Readings (k,) as multiples of their resolutions (k,); of those whose resolution is zero nothing is taken."""
+    coarse = resolution > 0.0
+    steps = np.where(coarse, resolution, 1.0)
+    return np.where(coarse, steps * np.round(readings / steps), readings)
 
 
 # Doublings reach 2^60 samples; the last one changes nothing.
@@ -226,6 +234,13 @@ class BackwardDifference:
         self.share: float = 1.0 if cutoff is None else 1.0 - float(np.exp(-2.0 * np.pi * cutoff * period))
         self._before: Array | None = None
         self._rate: Array = np.zeros(0)
+
+    @property
+    def state_space(self) -> StateSpace:
+        """From one reading to its rate; states are the reading and the rate of the sample before."""
+        a, T = self.share, self.period
+        return StateSpace(np.array([[0.0, 0.0], [-a / T, 1.0 - a]]), np.array([[1.0], [a / T]]),
+                          np.array([[-a / T, 1.0 - a]]), np.array([[a / T]]))  # fmt: skip
 
     def start(self) -> None:
         """Forget what was read: the next reading begins at rest."""

@@ -18,12 +18,14 @@ from paraflex.actuation import Effort, required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
+from paraflex.control.discrete import DiscreteModel, side_by_side
 from paraflex.control.estimators import BackwardDifference, checked_cutoff
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.references import PLAN, AtSamples, planned_motion
 from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError
-from paraflex.mechanism import ActuationMode
+from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.mechanism.measured import encoders_of
 from paraflex.mechanism.quantities import known, positive
 from paraflex.tracking import TrackingTask
 
@@ -96,6 +98,29 @@ class JointPID:
         self._wanted = np.zeros(len(plant.outputs))
         self._projector = projectors(plant) if self._project and plant.task is not None else None
 
+    @checked_arguments()
+    def sampled(self, period: float, mechanism: Mechanism, motors: Sequence[str] | None = None) -> DiscreteModel:
+        """The law without projection and limits as a model in state space, for `closed_loop` and `margins`.
+
+        Parameters
+        ----------
+        period : float
+            [s]
+        mechanism : Mechanism
+        motors : sequence of str, optional
+            Those it drives, all by default; its readings are the encoders of their joints.
+        """
+        names = tuple(motor.name for motor in mechanism.motors) if motors is None else tuple(motors)
+        joints = encoders_of(mechanism, names)
+        if len(joints) != len(names):
+            raise InputError(f"{len(joints)} joints for {len(names)} motors", field="motors", value=", ".join(names),
+                             remedy="name motors of the mechanism, one of each joint")  # fmt: skip
+        gains = np.array([gains_of(gain, names, field) for field, gain in self._gains.items()])
+        rates = BackwardDifference(period, self._cutoff)
+        return side_by_side(
+            [_sampled_pid(each, rates, *one) for each, *one in zip(gains.T, joints, names, strict=True)]
+        )
+
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`; y are errors of angles."""
         self._sum = self._sum + self._Ki * self._period * y
@@ -131,6 +156,17 @@ class JointPID:
             first=np.vstack([rates.first, none]),
             projector=None if self._projector is None else self._projector.values,
         )
+
+
+def _sampled_pid(gains: Array, rates: BackwardDifference, joint: str, motor: str) -> DiscreteModel:
+    """-(Kp y + Kd y' + sum of Ki T y) of one joint, with gains (3,)."""
+    (Kp, Kd, Ki), period = gains, rates.period
+    A, B, C, D = rates.state_space
+    law = DiscreteModel(A, B, -Kd * C, -(Kp + Kd * D), period, (joint,), (motor,))
+    if not Ki:
+        return law
+    one, step = np.eye(1), np.full((1, 1), Ki * period)
+    return side_by_side([law, DiscreteModel(one, step, -one, -step, period, (joint,), (motor,))])
 
 
 def projectors(plant: Plant) -> AtSamples:

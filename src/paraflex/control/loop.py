@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,8 +13,9 @@ from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.inside import wrong_torques
-from paraflex.control.together import check_name, multiple_of, whole_and_part
+from paraflex.control.together import check_name, check_whole, multiple_of, whole_and_part
 from paraflex.errors import InputError
+from paraflex.findings import Finding
 from paraflex.kernel.sampled import ACTED, SAMPLED, SampledLaw
 from paraflex.mechanism.quantities import known
 
@@ -64,6 +65,8 @@ class ControllerRecord:
         Lowest and highest torque [N m, N]; infinite without.
     rates : (outputs,) array
         Largest change of torques in a second [N m/s, N/s]; infinite without.
+    findings : tuple of Finding
+        What its law found doubtful as it started.
     """
 
     name: str
@@ -80,6 +83,7 @@ class ControllerRecord:
     law: str
     limits: Array
     rates: Array
+    findings: tuple[Finding, ...] = ()
 
     @property
     def limited(self) -> Array:
@@ -108,7 +112,8 @@ class Loop:
     Raises
     ------
     InputError
-        A period that is no multiple of the shortest one, unknown sensors or motors, a name twice.
+        A period that is no multiple of the shortest one, unknown sensors or motors, a name twice, two laws each of
+        which gives the whole torque.
     """
 
     def __init__(
@@ -121,6 +126,7 @@ class Loop:
     ) -> None:
         self.controllers: list[Controller] = [_controller(each, sensors, motors) for each in controllers]
         self.names: list[str] = _names(self.controllers)
+        check_whole(self.whole)
         self._start = start
         self._plants: list[Plant] = []
         for name, each in zip(self.names, self.controllers, strict=True):
@@ -156,6 +162,12 @@ class Loop:
         """What ended a run in the compiled time loop."""
         wrong = [] if self.inside is None else wrong_torques(self.inside)
         return _not_finite(self.names[0], [self._plants[0].outputs[k] for k in wrong]) if wrong else None
+
+    @property
+    def whole(self) -> list[str]:
+        """Names of controllers that give the whole torque."""
+        pairs = zip(self.names, self.controllers, strict=True)
+        return [name for name, each in pairs if getattr(each, "whole_torque", False)]
 
     @property
     def _instant(self) -> tuple[int, float]:
@@ -262,6 +274,10 @@ class Loop:
             law=law,
             limits=limits,
             rates=rates,
+            findings=tuple(
+                replace(one, text=f'controller "{self.names[k]}": {one.text}')
+                for one in getattr(controller, "findings", ())
+            ),
         )
 
     def saved(self) -> Any:

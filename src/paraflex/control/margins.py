@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
+from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.closed_loops import ClosedLoop, Complex, closed_loop, warn_if_unstable
 
@@ -89,6 +90,7 @@ class Margins:
         return pd.DataFrame.from_dict(rows, orient="index")
 
 
+@checked_arguments()
 def margins(model: Any, controller: Any = None, **settings: Any) -> Margins:
     """Gain, phase and delay margins and peak sensitivities of a sampled loop.
 

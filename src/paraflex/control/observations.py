@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from paraflex.arrays import Array
+from paraflex.control.estimators import rounded
 from paraflex.control.references import readings_of
 from paraflex.control.simulation import Simulation
 from paraflex.errors import InputError
@@ -86,8 +87,7 @@ class Observer:
         y = np.array([readings[name] for name in self._sensors])
         if np.any(self._deviations):
             y += self._deviations * random.standard_normal(y.size)
-        coarse = self._resolution > 0.0
-        y[coarse] = self._resolution[coarse] * np.round(y[coarse] / self._resolution[coarse])
+        y = rounded(y, self._resolution)
         seen = np.concatenate([y - self._planned[k], self._changes[k]]) / self._scale
         return np.clip(seen, -WIDEST, WIDEST)
 

@@ -10,6 +10,7 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
+from paraflex.control.discrete import DiscreteModel
 from paraflex.control.estimators import BackwardDifference, checked_cutoff
 from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
@@ -35,6 +36,8 @@ class RateFeedback:
         No gains, or such that are no finite numbers.
     """
 
+    title = "rate feedback"
+
     @checked_arguments()
     def __init__(self, gains: Mapping[str, Mapping[str, float]], *, cutoff: float | None = None) -> None:
         self.inputs: tuple[str, ...] = tuple(dict.fromkeys(name for row in gains.values() for name in row))
@@ -53,6 +56,13 @@ class RateFeedback:
         self._K = self._gains[np.ix_([self.outputs.index(name) for name in plant.outputs],
                                      [self.inputs.index(name) for name in plant.inputs])]  # fmt: skip
         self._rates = BackwardDifference(plant.period, self._cutoff)
+
+    @checked_arguments()
+    def sampled(self, period: float) -> DiscreteModel:
+        """The law at a period [s] as a model in state space, for `closed_loop` and `margins`."""
+        one, eye = BackwardDifference(period, self._cutoff).state_space, np.eye(len(self.inputs))
+        A, B, C, D = (np.asarray(np.kron(eye, matrix), dtype=float) for matrix in one)
+        return DiscreteModel(A, B, -self._gains @ C, -self._gains @ D, period, self.inputs, self.outputs)
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from paraflex.arguments import given_as
 from paraflex.arrays import Array
 from paraflex.control.loop import ControllerRecord
+from paraflex.findings import Finding
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
@@ -38,6 +40,10 @@ class Controlled:
         assert self.acting is not None
         return self.acting
 
+    def _of_controllers(self, place: str) -> tuple[Finding, ...]:
+        """What laws found doubtful as they started."""
+        return tuple(replace(finding, place=place) for one in self.controllers for finding in one.findings)
+
 
 @given_as("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
@@ -49,6 +55,11 @@ class ControlledTracking(Controlled, TrackingRun):
         """Whether torques drive it along the path."""
         return True
 
+    @cached_property
+    def doubts(self) -> tuple[Finding, ...]:
+        """Findings on controllers, on events in the run, and on results that are implausible for the mechanism."""
+        return (*self._of_controllers(f"mode {self.mode.name}"), *super().doubts)
+
 
 @given_as("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
@@ -59,6 +70,11 @@ class ControlledMotion(Controlled, MotionRun):
     def in_time(self) -> bool:
         """Whether torques change in time."""
         return True
+
+    @cached_property
+    def doubts(self) -> tuple[Finding, ...]:
+        """Findings on controllers, on events in the run, and on implausible results."""
+        return (*self._of_controllers(""), *super().doubts)
 
 
 class TorqueLog:

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.together import whole_and_part
 from paraflex.errors import InputError
@@ -113,6 +114,7 @@ class SampledPlant:
         )  # fmt: skip
 
 
+@checked_arguments()
 def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
     """A linear model as a digital controller sees it: sampled, with torques that are held and act after a delay.
 

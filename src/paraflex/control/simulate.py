@@ -28,6 +28,8 @@ def simulate_controlled(
 ) -> ControlledTracking:
     """Run a mode of a task under controllers, beside the torques planned for it; without warnings.
 
+    Where a law gives the whole torque the planned ones do not act.
+
     Raises
     ------
     InputError
@@ -38,7 +40,8 @@ def simulate_controlled(
     if task.holds:
         raise InputError("brakes are not for motors under control", field="after", value=task.after.value,
                          remedy='say "free": controllers act after the path as well')  # fmt: skip
-    sim = Simulation(task, mode=mode, feed_forward=True, balanced=balanced, options=options)
+    planned = not any(one.law.whole_torque for one in controllers)
+    sim = Simulation(task, mode=mode, feed_forward=planned, balanced=balanced, options=options)
     return _run(sim, controllers, on_progress)
 
 

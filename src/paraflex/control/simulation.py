@@ -130,6 +130,7 @@ class Simulation:
         self.motors: tuple[str, ...] = tuple(name for name in own if name in self.mode.motors)
         self._active = [own.index(name) for name in self.motors]
         self._torques = FeedForward(self.mode, (), np.zeros(0), np.zeros(0))
+        self._fed_forward = feed_forward
         if isinstance(source, TrackingTask):
             _refuse(source, duration=duration, start=start)
             # Brakes are not for motors under control.
@@ -281,7 +282,8 @@ class Simulation:
         Raises
         ------
         InputError
-            Controllers with unknown sensors or motors, or with periods that are no multiples of the shortest.
+            Controllers with unknown sensors or motors, or with periods that are no multiples of the shortest; a law
+            that gives the whole torque beside another or beside feed-forward.
         ControllerError
             One raised an error, or returned what cannot be torques; it carries the run so far.
         IntegrationError
@@ -293,7 +295,11 @@ class Simulation:
             several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
                        for each in given]  # fmt: skip
             start = self._initial.time
-            self._use(Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None)
+            loop = Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None
+            if loop is not None and loop.whole and self._fed_forward:
+                raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
+                                 remedy="leave feed_forward of the simulation out")  # fmt: skip
+            self._use(loop)
         end = self.end if until is None else min(until, self.end)
         try:
             while self.time < end and not self.ended:

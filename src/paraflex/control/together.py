@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from paraflex.errors import InputError
@@ -47,3 +48,18 @@ def check_name(name: Any) -> None:
     if not isinstance(name, str) or not name or set(name) & set("./"):
         raise InputError("is no name of a controller", field="name", value=name,
                          remedy="give a text without dots and slashes")  # fmt: skip
+
+
+def check_whole(names: Sequence[str]) -> None:
+    """Check that no more than one controller gives the whole torque, by the names of those that do.
+
+    Raises
+    ------
+    InputError
+        Two of them, which would drive the mechanism twice.
+    """
+    if len(names) > 1:
+        raise InputError(
+            f'gives the whole torque, as "{names[0]}" does', field=names[1],
+            remedy="let one of the two act, or put a feedback law beside it",
+        )  # fmt: skip

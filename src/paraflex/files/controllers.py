@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from paraflex.control.described import LAWS, TABLE, ControllerDescription, check_controllers
+from paraflex.control.described import TABLE, ControllerDescription, check_controllers
+from paraflex.control.described_laws import LAWS
 from paraflex.errors import InputError
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components

@@ -220,10 +220,17 @@ def read_path(table: PathTable, others: Mapping[str, Path] | None = None) -> Pat
     except InputError as error:
         at_table = isinstance(table, TabulatedPathTable) and error.field in ("points", "times")
         raise (error.at("table") if at_table else error) from None
-    return path if table.shaper is None else ShapedPath(path, _shaper(table.shaper))
+    return path if table.shaper is None else ShapedPath(path, read_shaper(table.shaper))
 
 
-def _shaper(table: ShaperTable) -> Shaper:
+def read_shaper(table: ShaperTable) -> Shaper:
+    """An input shaper from its table.
+
+    Raises
+    ------
+    InputError
+        Numbers that make no shaper.
+    """
     said = {name: value for name, value in table if name != "type" and value is not None}
     try:
         return Shaper(ShaperKind(table.type), **said)

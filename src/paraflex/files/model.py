@@ -8,13 +8,15 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
-from paraflex.control.described import NONE, ControllerDescription, check_periods
+from paraflex.control.described import NONE, ControllerDescription, check_together
+from paraflex.control.shaped import shape_torques
+from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults, conditions
 from paraflex.errors import InputError, suggestion
 from paraflex.files.controllers import read_controllers
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
-from paraflex.files.mechanism import read_mechanism, read_path, read_paths, read_torques
+from paraflex.files.mechanism import read_mechanism, read_path, read_paths, read_shaper, read_torques
 from paraflex.files.merge import merged, same
 from paraflex.files.overlay import plain, with_values
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
@@ -129,7 +131,8 @@ class Model(CheckedFields):
         Raises
         ------
         InputError
-            An unknown controller, or periods that are no multiples of the shortest.
+            An unknown controller, periods that are no multiples of the shortest, or two laws each of which gives the
+            whole torque.
         """
         wanted = list(dict.fromkeys(names or self.study.controllers))
         if wanted == [NONE]:
@@ -137,7 +140,7 @@ class Model(CheckedFields):
         for name in wanted:
             known(name, self.controllers, "controllers", "controller")
         found = tuple(self.controllers[name] for name in wanted)
-        check_periods(found)
+        check_together(found)
         return found
 
     @checked_arguments()
@@ -151,8 +154,14 @@ class Model(CheckedFields):
             return chosen
         followed, own = self.path(path) if isinstance(path, str) else path, self.paths.get(self.study.first_path or "")
         if self.study.duration is None or own is None:
-            return followed.duration
-        return self.study.duration if followed is own else followed.duration * self.study.duration / own.duration
+            return self.driven_for(followed)
+        if followed is own:
+            return self.study.duration
+        return self.driven_for(followed) * self.study.duration / self.driven_for(own)
+
+    def driven_for(self, path: Path) -> float:
+        """How long torques drive along a path [s]: the path's duration, and that of the study's shaper."""
+        return path.duration + (0.0 if self.study.shaper is None else self.study.shaper.duration)
 
     @checked_arguments()
     def plan(
@@ -168,6 +177,8 @@ class Model(CheckedFields):
         warning: bool = True,
     ) -> TrackingTask:
         """Plan a run along a path; what is not given is as the model's [study] has it.
+
+        Where the study has a shaper torques are shaped: see `shape_torques`.
 
         Parameters
         ----------
@@ -186,7 +197,7 @@ class Model(CheckedFields):
         self.check_start()
         followed = path if isinstance(path, Path) else self.path(path)
         study = self.study.filled(samples=samples, assembly=assembly, orientation=orientation, after=after)
-        return plan_tracking(
+        task = plan_tracking(
             self.mechanism if mechanism is None else mechanism,
             followed,
             duration=self.duration(followed, duration),
@@ -196,6 +207,7 @@ class Model(CheckedFields):
             after=study.after,
             warning=warning,
         )
+        return task if study.shaper is None else shape_torques(task, study.shaper)
 
     def check_start(self) -> None:
         """Check that a run along a path may start where the path says.
@@ -388,6 +400,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
         "orientation": table.study.orientation or 0.0,
         "torques": read_torques(table),
         "controllers": tuple(table.study.controllers),
+        "shaper": _study_shaper(table),
     }
     study = StudyDefaults(**said)
     check_study(mechanism, paths, study)
@@ -407,6 +420,13 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     except InputError as error:
         raise (error.at("study.controllers") if error.field == "controllers" else error) from None
     return model
+
+
+def _study_shaper(table: ModelTable) -> Shaper | None:
+    try:
+        return None if table.study.shaper is None else read_shaper(table.study.shaper)
+    except InputError as error:
+        raise error.within("study") from None
 
 
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:

@@ -523,7 +523,7 @@ class PayloadTable(_Table):
 
 
 class ShaperTable(_Table):
-    """An input shaper, by which a path leaves modes of vibration at rest."""
+    """An input shaper, by which a path or torques leave modes of vibration at rest."""
 
     type: Literal["zv", "zvd", "zvdd", "ei"] = Field(description='the kind: "zv", "zvd", "zvdd" or "ei"')
     frequencies: Number | list[Number] = Field(
@@ -653,7 +653,7 @@ class ControllerTable(_Table):
     reference: ReferenceEntry | None = Field(
         default=None,
         description='what is taken off the readings: "plan", or by sensor a number or an expression of the time t, in '
-        'the unit of the sensor; by default "plan" with "pid", nothing with "state-space"',
+        'the unit of the sensor; by default "plan" with "pid" and "lqg", nothing with others',
     )
     limits: Number | Pair | dict[str, Number | Pair] | None = Field(
         default=None,
@@ -698,7 +698,60 @@ class StateSpaceTable(ControllerTable):
     C: Matrix = Field(default=[], description="rows of the matrix from states to torques")
 
 
-AnyControllerTable = Annotated[PIDTable | StateSpaceTable, Field(discriminator="type")]
+class ComputedTorqueTable(ControllerTable):
+    """Computed torque of the rigid mechanism in task space, in place of planned torques."""
+
+    type: Literal["computed-torque"]
+    frequency: Number = Field(description="the frequency of the end-effector's error, as of an oscillator, in Hz")
+    damping_ratio: Number = Field(default=0.7, description="the damping ratio of the end-effector's error")
+    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+
+
+class RateFeedbackTable(ControllerTable):
+    """Feedback of rates of readings, such as strains."""
+
+    type: Literal["rate-feedback"]
+    gains: dict[str, dict[str, Number]] = Field(
+        description="by motor and sensor the torque or force over the rate of the reading, in N m s or N s by the unit "
+        "of the sensor"
+    )
+    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+
+
+class LQGTable(ControllerTable):
+    """LQG designed as a run starts, on the linear model of the mechanism in its mode."""
+
+    type: Literal["lqg"]
+    deviations: dict[str, Number] = Field(
+        description="by sensor the largest deviation allowed, in the unit of the sensor"
+    )
+    effort: NumbersOf = Field(
+        description="the largest torque in N m or N, of all motors or by motor; those not named are not used"
+    )
+    noise: NumbersOf | None = Field(
+        default=None,
+        description="the standard deviation of readings, in the unit of the sensor, of all or by sensor; by default of "
+        "rounding to quantise",
+    )
+    disturbance: NumbersOf | None = Field(
+        default=None,
+        description="the standard deviation of random torques in N m or N, of all motors or by motor; by default a "
+        "tenth of effort",
+    )
+    integrators: dict[str, Number] = Field(
+        default={}, description="by sensor the time in s within which its error under constant loads vanishes"
+    )
+    states: Count | None = Field(
+        default=None, description="the states of the reduced model, by default 16, or all of fewer"
+    )
+    at: Number | None = Field(
+        default=None, description="the time of the planned motion that it is designed about in s, by default its start"
+    )
+
+
+AnyControllerTable = Annotated[
+    PIDTable | StateSpaceTable | ComputedTorqueTable | RateFeedbackTable | LQGTable, Field(discriminator="type")
+]
 
 
 class StudyDefaultsTable(_Table):
@@ -719,6 +772,9 @@ class StudyDefaultsTable(_Table):
     )
     controllers: list[Text] = Field(
         default=[], description="names of [controller.NAME] tables that act, beside the torques planned along a path"
+    )
+    shaper: ShaperTable | None = Field(
+        default=None, description="the input shaper of torques planned along a path: none by default"
     )
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from paraflex.control.shaping import Shaper
 from paraflex.errors import InputError
 from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions, check_times, find_method
 from paraflex.kinematics import Path
@@ -48,6 +49,8 @@ class StudyDefaults:
         Which tracking error ranks modes: that of the "motion", or of the "whole" run.
     controllers : tuple of str
         Names of the model's controllers that act, beside the torques planned along a path.
+    shaper : Shaper or None
+        Of the torques planned along a path: see `shape_torques`.
     """
 
     path: str | None = None
@@ -65,6 +68,7 @@ class StudyDefaults:
     reduced: int | None = None
     error: str = "motion"
     controllers: tuple[str, ...] = ()
+    shaper: Shaper | None = None
 
     @property
     def first_path(self) -> str | None:
@@ -110,6 +114,11 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
             parse_mode(mechanism, mode)
         except InputError as error:
             raise error.at("study.modes") from error
+    if study.shaper is not None and not paths:
+        raise InputError(
+            "is for torques planned along a path, and the model has none", field="study.shaper",
+            value=study.shaper.kind.value, remedy="leave it out, or add a [path.NAME] table",
+        )  # fmt: skip
     motors = [motor.name for motor in mechanism.motors]
     for name in study.torques:
         known(name, motors, "study.torques", "motor")

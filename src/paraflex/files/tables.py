@@ -10,6 +10,7 @@ from typing import Any
 
 from paraflex.control.described import ControllerDescription
 from paraflex.control.shaped import ShapedPath
+from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import InputError
 from paraflex.files.controllers import controller_table
@@ -106,7 +107,9 @@ def model_tables(
         "path": {name: _path(path, name, paths) for name, path in paths.items()},
         "controller": {name: controller_table(one) for name, one in controllers.items()},
         "start": {} if start is None else _start(start),
-        "study": fields_said(study) | ({"torques": _torques(study)} if study.torques else {}),
+        "study": fields_said(study)
+        | ({"torques": _torques(study)} if study.torques else {})
+        | ({} if study.shaper is None else {"shaper": _shaper(study.shaper)}),
         "statics": fields_said(statics),
     }
     return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
@@ -302,7 +305,7 @@ def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
         said = _path(path.path, name, paths)
         if "shaper" in said:
             raise _unwritable(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
-        return said | {"shaper": {"type": path.shaper.kind.value} | fields_said(path.shaper, "kind")}
+        return said | {"shaper": _shaper(path.shaper)}
     if isinstance(path, SequencePath):
         names = [next((other for other, one in paths.items() if one == part), "") for part in path.paths]
         if not all(names):
@@ -319,6 +322,10 @@ def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
         type(path).__name__,
         "give a Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath",
     )
+
+
+def _shaper(shaper: Shaper) -> dict[str, Any]:
+    return {"type": shaper.kind.value} | fields_said(shaper, "kind")
 
 
 def _torques(study: StudyDefaults) -> dict[str, Any]:

@@ -106,11 +106,16 @@ def check_has_path(setting: Setting) -> None:
 
 
 def check_open_and_whole(model: Model) -> None:
-    """Check that runs of a design have no controllers and keep all flexible coordinates, which are chosen for each."""
+    """Check that runs of a design have planned torques alone, and all flexible coordinates, not few chosen for each."""
     if model.acting():
         raise InputError(
             "derivatives are of runs without controllers", field="study.controllers",
             value=", ".join(model.study.controllers), remedy="leave them out",
+        )  # fmt: skip
+    if model.study.shaper is not None:
+        raise InputError(
+            "derivatives are of runs whose torques are not shaped", field="study.shaper",
+            value=model.study.shaper.kind.value, remedy="leave it out, or shape the path",
         )  # fmt: skip
     if model.study.reduced:
         raise InputError(

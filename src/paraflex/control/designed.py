@@ -1,0 +1,157 @@
+"""LQG designed as a run starts, on the linear model of the mechanism that it is to act on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.control.closed_loops import closed_loop, unstable_poles
+from paraflex.control.controllers import Plant
+from paraflex.control.estimators import quantisation_noise
+from paraflex.control.linear_law import LinearLaw
+from paraflex.control.references import PLAN
+from paraflex.control.regulators import LQGDesign, lqg
+from paraflex.errors import InputError
+from paraflex.findings import Finding
+from paraflex.linear import LinearModel, linearise, reduce
+from paraflex.mechanism import mode_of_motors
+from paraflex.mechanism.quantities import not_negative, positive
+
+Numbers = float | Mapping[str, float]
+
+
+class DesignedLQG:
+    """`lqg` on the linear model of the mechanism that it is to act on: a law for `SampledController`.
+
+    It is designed as it starts, for its sensors, motors, period and delay: about the start of the planned motion, or
+    about the pose at the start of a run without a path, on a model of few states. Motors of other modes are no inputs.
+    Its loop with the model of all states is checked: `findings` has "loop-unstable" where that is unstable.
+
+    Parameters
+    ----------
+    deviations, effort, disturbance, integrators
+        See `lqr` and `lqg`.
+        Integrators are used of the sensors that it reads.
+    noise : float or mapping of str to float, optional
+        Standard deviations of readings in their units, of all or by sensor; of others `quantisation_noise` of what the
+        controller rounds them to.
+    states : int, optional
+        Of the reduced model, 16 by default, or all of fewer.
+    at : float, optional
+        Time of the planned motion that it is designed about [s], by default its start.
+
+    Attributes
+    ----------
+    design : LQGDesign or None
+        Once started.
+    findings : tuple of Finding
+
+    Raises
+    ------
+    InputError
+        Numbers that are not positive; as it starts, see `lqg` and `reduce`, readings without noise, a time without a
+        plan.
+    """
+
+    reference: str | None = PLAN
+
+    @checked_arguments()
+    def __init__(
+        self,
+        deviations: Mapping[str, float],
+        effort: Numbers,
+        *,
+        noise: Numbers | None = None,
+        disturbance: Numbers | None = None,
+        integrators: Mapping[str, float] | None = None,
+        states: int | None = None,
+        at: float | None = None,
+    ) -> None:
+        if not deviations:
+            raise InputError("are none", field="deviations", remedy="give the largest that are allowed, by sensor")
+        if isinstance(effort, Mapping) and not effort:
+            raise InputError("there is no motor", field="effort", remedy="name one with its largest torque")
+        for field, given, unit in (
+            ("deviations", deviations, "the unit of the sensor"),
+            ("effort", effort, "N m or N"),
+            ("noise", noise, "the unit of the sensor"),
+            ("integrators", integrators, "s"),
+        ):
+            _check(given, field, unit, positive)
+        _check(disturbance, "disturbance", "N m or N", not_negative)
+        if states is not None and states < 1:
+            raise InputError("no such number of states", field="states", value=states, remedy="say 16, or leave it out")
+        self.outputs: tuple[str, ...] = tuple(effort) if isinstance(effort, Mapping) else ()
+        self._weights = {"deviations": deviations, "effort": effort, "disturbance": disturbance}
+        self._integrators: Mapping[str, float] = integrators or {}
+        self._noise, self._states, self._at = noise, states, at
+        self.design: LQGDesign | None = None
+        self.findings: tuple[Finding, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """What it is, with the states of the model once it is designed."""
+        return "LQG" if self.design is None else f"LQG of {self.design.regulator.plant.own} states"
+
+    def start(self, plant: Plant) -> None:
+        """See `Controller`."""
+        full = self._model(plant)
+        flexible = any(body.nf for body in full.minimal.system.bodies)
+        few = reduce(full, self._states) if flexible else full
+        integrators = {name: time for name, time in self._integrators.items() if name in plant.inputs}
+        self.design = lqg(few, plant.period, delay=plant.delay, measured=plant.inputs, noise=self._noise_of(plant),
+                          integrators=integrators, **self._weights)  # fmt: skip
+        loop = closed_loop(full, self.design)
+        self.findings = () if loop.stable else (
+            Finding(
+                "loop-unstable", "",
+                f"the loop is unstable with the model of all {len(full.states)} states: {unstable_poles(loop)}",
+                "give links damping, or the design larger noise, smaller effort or more states",
+            ),
+        )  # fmt: skip
+        self._law = self.design.law()
+        self._law.start(plant)
+
+    def step(self, k: int, t: float, y: Array) -> Array:
+        """See `Controller`; y are errors of readings."""
+        return self._law.step(k, t, y)
+
+    def limited(self, torques: Array) -> None:
+        """See `LQGLaw`."""
+        self._law.limited(torques)
+
+    def linear_law(self) -> LinearLaw:
+        """See `LQGLaw`."""
+        return self._law.linear_law()
+
+    def _model(self, plant: Plant) -> LinearModel:
+        """Of all states, with the motors that it drives as inputs."""
+        mode = mode_of_motors(plant.mechanism, plant.outputs)
+        if plant.task is not None:
+            return linearise(plant.task, mode=mode, at=self._at)
+        if self._at is not None:
+            raise InputError("there is no planned motion", field="at", value=self._at, remedy="leave it out")
+        return linearise(plant.mechanism, mode=mode, start=plant.state)
+
+    def _noise_of(self, plant: Plant) -> dict[str, float]:
+        """Standard deviations of readings by sensor: those given, else those of rounding."""
+        given = self._noise if isinstance(self._noise, Mapping) else {}
+        if self._noise is not None and not isinstance(self._noise, Mapping):
+            return dict.fromkeys(plant.inputs, self._noise)
+        resolution = plant.resolution or (0.0,) * len(plant.inputs)
+        rounding = {name: quantisation_noise(one) for name, one in zip(plant.inputs, resolution, strict=True) if one}
+        missing = [name for name in plant.inputs if name not in rounding and name not in given]
+        if missing:
+            raise InputError("has no noise", field="noise", value=missing[0],
+                             remedy="give its standard deviation, or quantise, the resolution of readings")  # fmt: skip
+        return {name: given.get(name, rounding.get(name, 0.0)) for name in plant.inputs}
+
+
+def _check(given: Any, field: str, unit: str, check: Any) -> None:
+    """Check one number, or each by its name."""
+    if given is None:
+        return
+    for name, value in given.items() if isinstance(given, Mapping) else [("", given)]:
+        check(value, f"{field}.{name}" if name else field, unit)

@@ -1,0 +1,363 @@
+"""Gains of rate feedback that damp vibrations most, by the sampled closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+
+from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
+from paraflex.control.closed_loops import ClosedLoop, Complex, closed_loop, damped_frequency, named_law
+from paraflex.control.discrete import side_by_side
+from paraflex.control.rates import RateFeedback
+from paraflex.control.sampled import SampledPlant, as_sampled
+from paraflex.errors import InputError
+from paraflex.linear import LinearModel, ReducedModel
+from paraflex.mechanism import Mechanism, StrainGauge
+from paraflex.mechanism.quantities import known, positive
+
+# A pole this near to z = 1 is that of a free motion, which feedback of strains leaves as it is.
+_FREE = 1e-5
+# Poles on the unit circle are found that near to it; vibrations whose decay differs by less part are as slow.
+_ON_CIRCLE, _AS_SLOW = 1e-9, 1e-3
+# Gains that are tried in one direction: parts of those that would damp critically if damping were linear.
+_TRIED = np.geomspace(1e-4, 30.0, 70)
+# A pole is followed in steps so small that it is found this near to where its derivative says, as a part of the
+# distance of the next one; steps are halved so often.
+_NEAR, _HALVED = 0.25, 12
+# Rounds over all pairs, while the damping ratio grows by more than this part.
+_ROUNDS, _GROWS = 4, 1e-4
+
+
+@dataclass(frozen=True)
+class RateGains:
+    """Gains of rate feedback, and what they do to the vibrations they were chosen for.
+
+    Attributes
+    ----------
+    gains : mapping of str to mapping of str to float
+        By motor and sensor, for `RateFeedback` [N m s by the sensor's unit].
+    frequencies, frequencies_without : (k,) arrays
+        Natural frequencies of the vibrations, with them and without [Hz].
+    damping, damping_without : (k,) arrays
+        Damping ratios of them, with gains and without.
+    spectral_radius : float
+        Largest magnitude of the loop's poles but for free motions, which strains do not see.
+    bound : str
+        What keeps gains from being larger: "optimum", "largest" or "margin".
+    loop : ClosedLoop
+        With them.
+    cutoff : float or None
+        Of the low-pass filter of rates [Hz].
+    """
+
+    gains: Mapping[str, Mapping[str, float]]
+    frequencies: Array
+    frequencies_without: Array
+    damping: Array
+    damping_without: Array
+    spectral_radius: float
+    bound: str
+    loop: ClosedLoop
+    cutoff: float | None
+
+    def law(self) -> RateFeedback:
+        """The law, for `SampledController` with the period and delay of the design."""
+        return RateFeedback(self.gains, cutoff=self.cutoff)
+
+
+@checked_arguments()
+def rate_feedback_gains(
+    model: Any,
+    period: float,
+    *,
+    pairs: Mapping[str, str | Sequence[str]] | None = None,
+    delay: float = 0.0,
+    cutoff: float | None = None,
+    beside: Any = None,
+    frequencies: Sequence[float] | None = None,
+    largest: float | None = None,
+    margin: float = 2.0,
+) -> RateGains:
+    """Gains of `RateFeedback` with which vibrations have most damping, in the sampled loop with its delay.
+
+    What is largest is the least of their damping ratios, while no pole becomes slower than the slowest is without
+    gains. Poles are followed from no gains on, in steps by their derivatives dz = w^H dA v / (w^H v). A common factor
+    of all pairs is sought first, along the derivatives of the damping ratios, then each gain by itself, in turn.
+
+    Parameters
+    ----------
+    model : LinearModel, ReducedModel, state space, (A, B, C, D) or SampledPlant
+        Of all states, or the loop checked with them: feedback may make vibrations unstable that few states leave out.
+    period : float
+        Of sampling [s].
+    pairs : mapping of str to str or sequence of str, optional
+        Sensors whose rate each motor feeds back. By default, of a mechanism's model, the strain gauge on a link at the
+        motor's joint that is nearest to it.
+    delay : float
+        From a sample until torques act [s].
+    cutoff : float, optional
+        Of the low-pass filter of rates [Hz].
+    beside : optional
+        A linear controller that acts as well, with the same period and delay: a joint controller (`JointPID.sampled`),
+        a design of `lqg`, or what else `closed_loop` takes, with names of its sensors and motors.
+    frequencies : sequence of float, optional
+        About those of the vibrations [Hz]. By default those that decay slowest, as many as there are pairs.
+    largest : float, optional
+        Of the gains' magnitudes [N m s by the sensor's unit].
+    margin : float
+        So many times as large, all of them together, gains still leave the loop stable; 1 for the limit itself.
+
+    Raises
+    ------
+    InputError
+        Unknown names, numbers that make no sense, no such pair, no vibration, one that rates do not damp, or a loop
+        that is unstable without gains.
+    """
+    positive(period, "period", "s")
+    if not (np.isfinite(margin) and margin >= 1.0):
+        raise InputError("must be at least 1", field="margin", value=margin, remedy="say 2, or 1 for none")
+    if largest is not None:
+        positive(largest, "largest", "N m s by the sensor's unit")
+    plant = as_sampled(model, period, delay)
+    chosen = _pairs(model, plant, pairs)
+    other = None if beside is None else named_law(beside)
+
+    def made(gains: Array, of: Any = plant) -> ClosedLoop:
+        law = RateFeedback(_table(chosen, gains), cutoff=cutoff).sampled(period)
+        return closed_loop(of, law if other is None else side_by_side([other, law]), period=period, delay=delay)
+
+    search = _Search(made, len(chosen), margin, np.inf if largest is None else largest)
+    start = _Tried(np.zeros(len(chosen)), search.vibrations(frequencies))
+    best = search.best(start)
+    before, after = (np.array([damped_frequency(complex(z), period) for z in each.poles]).T for each in (start, best))
+    return RateGains(
+        _table(chosen, best.gains), after[0], before[0], after[1], before[1], search.radius(best.gains),
+        search.bound(best), made(best.gains, model), cutoff,
+    )  # fmt: skip
+
+
+class _Tried(NamedTuple):
+    """Gains (pairs,) and the poles z (k,) of the vibrations with them."""
+
+    gains: Array
+    poles: Complex
+
+
+class _Search:
+    """The search for gains: A = A_0 + sum of g_i A_i, of the loop with unit gains one at a time."""
+
+    def __init__(self, made: Callable[[Array], ClosedLoop], count: int, margin: float, largest: float) -> None:
+        none = made(np.zeros(count))
+        self._period: float = none.plant.period
+        self._A: Array = none.A
+        self._each: Array = np.array([made(row).A - self._A for row in np.eye(count)])
+        self._margin, self._largest = margin, largest
+        self._slowest: float = self.radius(np.zeros(count))
+        if self._slowest > 1.0 + _ON_CIRCLE:
+            raise InputError(
+                f"is unstable without gains: |z| = {self._slowest:.6g}", field="model",
+                remedy="give a controller that makes it stable: beside=...",
+            )  # fmt: skip
+
+    def _of(self, gains: Array) -> Array:
+        return self._A + np.tensordot(gains, self._each, 1)
+
+    def radius(self, gains: Array) -> float:
+        """Largest magnitude of poles that are not of free motions."""
+        z = np.linalg.eigvals(self._of(gains))
+        return float(np.max(np.abs(z[np.abs(z - 1.0) > _FREE]), initial=0.0))
+
+    def _stable(self, gains: Array) -> bool:
+        """Whether no pole is slower than without gains, and none grows with gains so many times as large."""
+        slow = self.radius(gains) > self._slowest + _ON_CIRCLE
+        return not slow and self.radius(self._margin * gains) <= 1.0 + _ON_CIRCLE
+
+    def _allowed(self, gains: Array) -> bool:
+        return bool(np.max(np.abs(gains)) <= self._largest) and self._stable(gains)
+
+    def vibrations(self, frequencies: Sequence[float] | None) -> Complex:
+        """Poles without gains: nearest to frequencies [Hz], or of the vibrations that decay slowest, one a pair."""
+        z = np.linalg.eigvals(self._A)
+        z = z[(z.imag > _FREE) & (np.abs(z) > _FREE)].astype(complex)
+        if not z.size:
+            raise InputError("has no vibration", field="model", remedy="give one with flexible links")
+        each = np.array([damped_frequency(complex(one), self._period)[0] for one in z])
+        if frequencies is not None:
+            return z[_nearest(each, frequencies)]
+        decay = -np.log(np.abs(z))
+        # Those as slow as one another by their frequencies: without damping rounding alone tells them apart.
+        steps = np.round(np.log(np.maximum(decay, _ON_CIRCLE)) / _AS_SLOW)
+        return z[np.lexsort([each, steps])[: len(self._each)]]
+
+    def least(self, tried: _Tried) -> float:
+        """The least damping ratio of the vibrations."""
+        return min(damped_frequency(complex(z), self._period)[1] for z in tried.poles)
+
+    def _derivatives(self, at: _Tried) -> tuple[Complex, Array]:
+        """dz/dg (k, pairs) of simple poles, and how far the next pole is from each."""
+        z, left, right = scipy.linalg.eig(self._of(at.gains), left=True)
+        slopes, room = [], []
+        for pole in at.poles:
+            k = int(np.argmin(np.abs(z - pole)))
+            w, v = left[:, k].conj(), right[:, k]
+            slopes.append((w @ self._each @ v) / (w @ v))
+            room.append(np.min(np.delete(np.abs(z - z[k]), k), initial=np.inf))
+        return np.array(slopes), np.array(room)
+
+    def _follow(self, start: _Tried, gains: Array, halved: int = 0) -> _Tried:
+        """The poles with other gains."""
+        slopes, room = self._derivatives(start)
+        expected = start.poles + slopes @ (gains - start.gains)
+        z = np.linalg.eigvals(self._of(gains))
+        apart = np.abs(z[None] - expected[:, None])
+        rows, columns = scipy.optimize.linear_sum_assignment(apart)
+        if halved >= _HALVED or np.all(apart[rows, columns] <= _NEAR * room):
+            return _Tried(gains, z[columns].astype(complex))
+        middle = self._follow(start, 0.5 * (start.gains + gains), halved + 1)
+        return self._follow(middle, gains, halved + 1)
+
+    def directions(self, at: _Tried) -> Array:
+        """Derivatives (k, pairs) of the damping ratios -Re s / |s|, with s = ln z / T."""
+        slopes, _ = self._derivatives(at)
+        s = (np.log(at.poles) / self._period)[:, None]
+        ds = slopes / (at.poles[:, None] * self._period)
+        return -ds.real / np.abs(s) + s.real * (s.conj() * ds).real / np.abs(s) ** 3
+
+    def best(self, start: _Tried) -> _Tried:
+        """Gains of most damping."""
+        slopes = self.directions(start)
+        if not np.all(np.max(np.abs(slopes), axis=1) > 0.0):
+            raise InputError("do not see a vibration, or their motors do not move it", field="pairs",
+                             remedy="name other sensors or motors, or other frequencies")  # fmt: skip
+        mean = np.mean(slopes, axis=0)
+        best = self._along(start, mean / np.sum(mean**2))
+        for _ in range(_ROUNDS if len(mean) > 1 else 0):
+            before = best
+            for k in range(len(mean)):
+                best = self._anew(best, k)
+            if self.least(best) <= self.least(before) * (1.0 + _GROWS):
+                break
+        if not np.any(best.gains):
+            raise InputError(
+                "cannot damp the vibrations: the loop becomes unstable, or a pole slower, first", field="pairs",
+                remedy="sample faster, delay less, raise the cut-off, or give links damping",
+            )  # fmt: skip
+        return best
+
+    def _anew(self, best: _Tried, k: int) -> _Tried:
+        """The gain of one pair sought anew, from zero on, in both directions."""
+        without = best.gains.copy()
+        without[k] = 0.0
+        if not self._allowed(without):
+            return best
+        start = self._follow(best, without)
+        slope = float(np.max(np.abs(self.directions(start)[:, k])))
+        one = np.eye(len(without))[k] / slope if slope else np.zeros(len(without))
+        return max([best, *(self._along(start, sign * one) for sign in (1.0, -1.0) if slope)], key=self.least)
+
+    def _along(self, start: _Tried, direction: Array) -> _Tried:
+        """The most damping that is allowed with gains in one direction."""
+        tried = [start]
+        for part in _TRIED:
+            gains = start.gains + part * direction
+            allowed = self._allowed(gains)
+            if not allowed:
+                gains = start.gains + self._border(start.gains, direction, float(part)) * direction
+            tried.append(self._follow(tried[-1], gains))
+            if not allowed:
+                break
+        k = int(np.argmax([self.least(one) for one in tried]))
+        if k in (0, len(tried) - 1):
+            return tried[k]
+        low, high = tried[k - 1], tried[k + 1]
+
+        def between(part: float) -> _Tried:
+            return self._follow(low, low.gains + part * (high.gains - low.gains))
+
+        part = scipy.optimize.minimize_scalar(lambda part: -self.least(between(part)), bounds=(0.0, 1.0),
+                                              method="bounded", options={"xatol": 1e-6}).x  # fmt: skip
+        return max([tried[k], between(part)], key=self.least)
+
+    def _border(self, base: Array, direction: Array, beyond: float) -> float:
+        """The largest part of a direction that is allowed, below one that is not."""
+        low, high = 0.0, beyond
+        while high - low > 1e-9 * high:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._allowed(base + middle * direction) else (low, middle)
+        return low
+
+    def bound(self, best: _Tried) -> str:
+        """What keeps gains from being larger."""
+        more = (1.0 + 1e-6) * best.gains
+        if np.max(np.abs(more)) > self._largest:
+            return "largest"
+        return "optimum" if self._stable(more) else "margin"
+
+
+def _nearest(each: Array, frequencies: Sequence[float]) -> list[int]:
+    """Numbers of the vibrations nearest to frequencies [Hz]."""
+    found = []
+    for wanted in frequencies:
+        positive(wanted, "frequencies", "Hz")
+        found.append(int(np.argmin(np.abs(each - wanted))))
+    if not found or len(set(found)) < len(found):
+        raise InputError("no vibration, or one named twice", field="frequencies", value=list(frequencies),
+                         remedy=f"choose from {', '.join(f'{one:.4g}' for one in np.sort(each)[:8])} Hz")  # fmt: skip
+    return found
+
+
+def _pairs(model: Any, plant: SampledPlant, given: Mapping[str, str | Sequence[str]] | None) -> list[tuple[str, str]]:
+    """Motors and sensors, each pair once."""
+    if given is None:
+        given = _collocated(model, plant)
+    found = []
+    for motor, sensors in given.items():
+        known(motor, plant.inputs, "pairs", "motor")
+        for sensor in [sensors] if isinstance(sensors, str) else sensors:
+            known(sensor, plant.outputs, f"pairs.{motor}", "sensor")
+            found.append((motor, sensor))
+    if not found:
+        raise InputError("there is none", field="pairs", remedy="name the sensor of each motor")
+    return list(dict.fromkeys(found))
+
+
+def _collocated(model: Any, plant: SampledPlant) -> dict[str, str]:
+    """Of each motor the strain gauge on a link at its joint that is nearest to it."""
+    linear = model.full if isinstance(model, ReducedModel) else model
+    found = {}
+    if isinstance(linear, LinearModel):
+        mechanism = linear.minimal.system.mechanism
+        for motor in plant.inputs:
+            near = _nearest_gauge(mechanism, motor, plant.outputs)
+            found |= {} if near is None else {motor: near}
+    if not found:
+        raise InputError("no motor has a strain gauge on a link at its joint", field="pairs",
+                         remedy='name the sensor of each motor: pairs={"motor": "sensor"}')  # fmt: skip
+    return found
+
+
+def _nearest_gauge(mechanism: Mechanism, motor: str, outputs: Sequence[str]) -> str | None:
+    motors = {one.name: one.joint for one in mechanism.motors}
+    if motor not in motors:
+        return None
+    joint, bodies = mechanism.joint(motors[motor]), {body.name: body for body in mechanism.bodies}
+    apart = {}
+    for sensor in mechanism.sensors:
+        if isinstance(sensor, StrainGauge) and sensor.name in outputs:
+            points: Any = getattr(bodies[sensor.body], "points", {})
+            at = [points[one.point] for one in (joint.a, joint.b) if one.body == sensor.body]
+            if at:
+                apart[sensor.name] = min(abs(sensor.place(points) - place) for place in at)
+    return min(apart, key=apart.__getitem__) if apart else None
+
+
+def _table(pairs: Sequence[tuple[str, str]], gains: Array) -> dict[str, dict[str, float]]:
+    table: dict[str, dict[str, float]] = {}
+    for (motor, sensor), gain in zip(pairs, gains, strict=True):
+        table.setdefault(motor, {})[sensor] = float(gain)
+    return table
