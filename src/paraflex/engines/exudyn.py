@@ -106,13 +106,12 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     task = task.whole or task
     check_engine("exudyn", task.mechanism)
     check_dwell("exudyn", task)
-    task = with_rotors(task)
     torques = task.torques(mode)
     substeps = steps_between(task.motion.t, options.step)
     begin = time.perf_counter()
     engine = _start_engine()
     with _silent(engine.exu):
-        model = _build(engine, task, options.refinement)
+        model = _build(engine, with_rotors(task), options.refinement)
         history, figures = _run(engine, model, task, torques, substeps, options)
     figures["wall_time"] = time.perf_counter() - begin
     record = _record(model, task, torques, history, substeps, options.method, figures)
