@@ -65,6 +65,11 @@ class ControllerDescription(CheckedFields):
     quantise: Numbers | None = None
     filters: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def whole_torque(self) -> bool:
+        """Whether no planned torque is to act besides."""
+        return bool(self.law.whole_torque)
+
     def check(self, mechanism: Mechanism) -> None:
         """Check its names and numbers.
 
@@ -159,7 +164,7 @@ def check_together(controllers: Iterable[ControllerDescription]) -> None:
     try:
         for one in several:
             multiple_of(one.name, one.period, min(each.period for each in several))
-        check_whole([one.name for one in several if one.law.whole_torque])
+        check_whole([one.name for one in several if one.whole_torque])
     except InputError as error:
         raise error.within(TABLE) from None
 
