@@ -27,7 +27,7 @@ from paraflex.control.described_laws import LAWS
 from paraflex.designs.derivatives.plans import check_open_and_whole
 from paraflex.errors import InputError, ResultWarning
 from paraflex.files import model_from
-from rotors import ROTOR, J, T
+from rotors import ROTOR, J, T, rotor
 from shell import paraflex
 
 LIBRARY = (Path(pf.__file__).parent / "mechanism" / "library" / "raparm_i.toml").read_text(encoding="utf-8")
@@ -318,7 +318,7 @@ def test_lqg_is_designed_for_the_mode(model, task, mode):
         integrators={name: 0.5 for name in ("A1", "D1") if name in joints},
     )  # fmt: skip
     assert design.outputs == done.outputs
-    law = SampledController(design.law(), quantise=resolution, reference="plan")
+    law = SampledController(design.law(), quantise=resolution, reference="open-loop")
     by_hand = Simulation(task, mode=mode, feed_forward=True).run(law, warning=False)
     assert done.given == pytest.approx(by_hand.controllers[0].given, abs=1e-12)
     assert np.max(np.abs(done.given)) > 1e-3
@@ -361,6 +361,43 @@ def test_a_loop_that_is_unstable_with_all_states_is_found(model):
     assert any(isinstance(one.message, ResultWarning) and "loop-unstable" in str(one.message) for one in said)
 
 
+def test_a_disturbance_that_lasts_is_part_of_the_design(model, task):
+    """At a motor and at a point, by its filter: what `pf.lqg` makes of the model with that force as an input."""
+    lasting = {"link4.C.x": (0.7, 15.0), "tau1": (0.2, ((1.0,), (0.02, 1.0))), "tau2": (0.2, 5.0)}
+    law = LQGDescription({"x": 1e-3, "y": 1e-3}, 1.0, noise=1e-4, coloured=lasting)
+    one = ControllerDescription("lq", law, 1e-3)
+    one.check(model.mechanism)
+    controller = one.made(task.mechanism, ("tau1", "tau5"))
+    Simulation(task, mode="+-+-", feed_forward=True).run(controller, until=0.002, warning=False)
+    design = pf.lqg(
+        pf.linearise(task, mode="+-+-", at=0.0, forces=["link4.C"]), 1e-3, measured=["A1", "A2"],
+        deviations={"x": 1e-3, "y": 1e-3}, effort={"tau1": 1.0, "tau5": 1.0}, noise=1e-4,
+        coloured={name: each for name, each in lasting.items() if name != "tau2"},
+    )  # fmt: skip
+    assert np.allclose(controller.law.design.K, design.K, rtol=0.0, atol=1e-9)
+    assert len(design.regulator.plant.states) == len(controller.law.design.regulator.plant.states)
+    bad = LQGDescription({"x": 1e-3}, 1.0, noise=1e-4, coloured={"link4.D.x": (1.0, 1.0)})
+    with pytest.raises(InputError, match=r"controller.lq.coloured: unknown motor or point .*link4.C.x"):
+        ControllerDescription("lq", bad, 1e-3).check(model.mechanism)
+
+
+def test_open_loop_is_what_the_flexible_mechanism_reads(model):
+    """Against it a law has no errors; against the rigid plan links that bend are one."""
+    task = model.plan(duration=0.05, samples=26)
+    errors = {}
+    for reference in ("open-loop", "plan"):
+        law = SampledController(lambda k, t, y: 0.0 * y, period=T, inputs=list(ANGLES), reference=reference)
+        options = pf.IntegrationOptions(tolerance=1e-8)
+        done = Simulation(task, mode="++++", feed_forward=True, options=options).run(law, warning=False).controllers[0]
+        held = np.array([[read(t) for read in law.found_references] for t in done.t])
+        errors[reference] = np.max(np.abs(done.readings - held))
+    assert errors["open-loop"] < 0.1 * errors["plan"]
+    still = Simulation(rotor(), duration=0.01, samples=11)
+    law = SampledController(lambda k, t, y: y, period=T, reference="open-loop")
+    with pytest.raises(InputError, match=r"reference: there is no planned motion"):
+        still.run(law)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -390,7 +427,7 @@ def test_a_design_is_for_the_motors_that_it_drives(model, task):
         pf.linearise(task, mode="+-+-", at=0.0), 1e-3, measured=["A1", "A2"], deviations=few.law.deviations, effort=1.0,
         noise=pf.quantisation_noise(1e-3), delay=1e-3,
     )  # fmt: skip
-    law = SampledController(design.law(), quantise=1e-3, reference="plan")
+    law = SampledController(design.law(), quantise=1e-3, reference="open-loop")
     by_hand = Simulation(task, mode="++++", feed_forward=True).run(law, warning=False).controllers[0]
     for done in runs:
         assert done.outputs == ("tau1", "tau5")

@@ -92,10 +92,11 @@ class SampledController:
         Sensors. By default the law's own, or the names of a model's inputs, else the encoders of the mode's motors.
     outputs : sequence of str, optional
         Motors. By default the law's own, or the names of a model's outputs, else all of the mode.
-    reference : mapping of str to float or callable, "plan", or a run, optional
+    reference : mapping of str to float or callable, "plan", "open-loop", or a run, optional
         What is taken off the readings of sensors: numbers, functions of time, the values on the planned motion of
-        all that it tells (angles and travels of joints, their rates, and the end-effector's coordinates), or what
-        sensors read in another run, of a flexible mechanism say. By default the law's own.
+        all that it tells (angles and travels of joints, their rates, and the end-effector's coordinates), what sensors
+        read where the planned torques alone drive the mechanism, as it is flexible, or in another run. By default the
+        law's own.
     quantise : float or mapping of str to float, optional
         Resolution of readings, of all or by sensor: they are rounded to its multiples.
     filters : mapping of str to Filter, optional

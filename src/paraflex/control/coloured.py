@@ -79,6 +79,17 @@ def _noise(name: str) -> str:
 def _pair(name: str, given: Any, named: NamedMatrices) -> tuple[float, StateSpace]:
     """Standard deviation and filter of an input's disturbance."""
     known(name, named.inputs, "coloured", "name")
+    return deviation_and_filter(name, given)
+
+
+def deviation_and_filter(name: str, given: Any) -> tuple[float, StateSpace]:
+    """Standard deviation of a disturbance by its name, and the filter that makes it of noise.
+
+    Raises
+    ------
+    InputError
+        No pair, a deviation that is not positive, what is no stable filter.
+    """
     field = f"coloured.{name}"
     try:
         deviation, through = given

@@ -40,7 +40,7 @@ class ControllerDescription(CheckedFields):
         [s]
     inputs, outputs : tuple of str
         Sensors and motors; none for those of the law, else the encoders of its motors and all motors of a mode.
-    reference : "plan" or mapping of str to float or AngleLaw, optional
+    reference : "plan", "open-loop" or mapping of str to float or AngleLaw, optional
         What is taken off the readings; by default the law's own.
     limits : float, pair or mapping of str to either, optional
         [N m, N]
@@ -82,7 +82,8 @@ class ControllerDescription(CheckedFields):
         sensors = [sensor.name for sensor in measured_sensors(mechanism)]
         encoders = encoders_of(mechanism, self.outputs or motors)
         try:
-            self._check(LawNames(self.inputs, self.outputs, sensors, motors, encoders))
+            points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+            self._check(LawNames(self.inputs, self.outputs, sensors, motors, encoders, points))
         except InputError as error:
             raise error.within(f"{TABLE}.{self.name}") from None
 

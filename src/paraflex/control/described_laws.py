@@ -34,6 +34,8 @@ class LawNames(NamedTuple):
         All that the mechanism has.
     encoders : sequence of str
         Of its motors, of all motors where it names none.
+    points : sequence of str
+        Of bodies, as "link.tip".
     """
 
     inputs: Sequence[str]
@@ -41,6 +43,7 @@ class LawNames(NamedTuple):
     sensors: Sequence[str]
     motors: Sequence[str]
     encoders: Sequence[str]
+    points: Sequence[str]
 
 
 class DescribedLaw(Protocol):
@@ -261,6 +264,9 @@ class LQGDescription(CheckedFields):
         Standard deviations of random efforts at motors [N m, N]; by default a tenth of `effort`.
     integrators : mapping of str to float
         Sensors whose errors are to vanish under constant loads, with the time that may take [s].
+    coloured : mapping of str to (float, float or numerator and denominator)
+        Disturbances that last, by motor or by point and axis, "link.tip.x": standard deviation [N m, N], and the
+        filter that makes them of noise.
     states : int or None
         Of the reduced model: 16 where None, all if the mechanism has fewer.
     at : float or None
@@ -274,6 +280,7 @@ class LQGDescription(CheckedFields):
     noise: Numbers | None = None
     disturbance: Numbers | None = None
     integrators: Mapping[str, float] = field(default_factory=dict)
+    coloured: Mapping[str, Any] = field(default_factory=dict)
     states: int | None = None
     at: float | None = None
 
@@ -285,6 +292,9 @@ class LQGDescription(CheckedFields):
             given = getattr(self, field_name)
             for name in given if isinstance(given, Mapping) else ():
                 known(name, known_names, field_name, "motor" if known_names is names.motors else "sensor")
+        places = [*names.motors, *(f"{point}.{axis}" for point in names.points for axis in "xy")]
+        for name in self.coloured:
+            known(name, places, "coloured", "motor or point")
         used = self.made(names.outputs or names.motors, 1.0).outputs
         if names.outputs and used and set(used) != set(names.outputs):
             raise InputError("are not those of effort", field="outputs", value=", ".join(names.outputs),
@@ -296,8 +306,8 @@ class LQGDescription(CheckedFields):
 
         return DesignedLQG(
             self.deviations, _some_of(self.effort, outputs, "effort"), noise=self.noise,
-            disturbance=of_names(self.disturbance, outputs), integrators=self.integrators, states=self.states,
-            at=self.at,
+            disturbance=of_names(self.disturbance, outputs), integrators=self.integrators,
+            coloured=self.coloured, states=self.states, at=self.at,
         )  # fmt: skip
 
 

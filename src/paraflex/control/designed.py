@@ -8,10 +8,11 @@ from typing import Any
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.closed_loops import closed_loop, unstable_poles
+from paraflex.control.coloured import deviation_and_filter
 from paraflex.control.controllers import Plant
 from paraflex.control.estimators import quantisation_noise
 from paraflex.control.linear_law import LinearLaw
-from paraflex.control.references import PLAN
+from paraflex.control.references import OPEN_LOOP
 from paraflex.control.regulators import LQGDesign, lqg
 from paraflex.errors import InputError
 from paraflex.findings import Finding
@@ -37,6 +38,8 @@ class DesignedLQG:
     noise : float or mapping of str to float, optional
         Standard deviations of readings in their units, of all or by sensor; of others `quantisation_noise` of what the
         controller rounds them to.
+    coloured : mapping of str to (float, Filter), optional
+        Disturbances that last, at motors and at points as "link.point.x": see `lqg`. Of motors those that it drives.
     states : int, optional
         Of the reduced model, 16 by default, or all of fewer.
     at : float, optional
@@ -55,7 +58,7 @@ class DesignedLQG:
         plan.
     """
 
-    reference: str | None = PLAN
+    reference: str | None = OPEN_LOOP
 
     @checked_arguments()
     def __init__(
@@ -66,6 +69,7 @@ class DesignedLQG:
         noise: Numbers | None = None,
         disturbance: Numbers | None = None,
         integrators: Mapping[str, float] | None = None,
+        coloured: Mapping[str, Any] | None = None,
         states: int | None = None,
         at: float | None = None,
     ) -> None:
@@ -81,11 +85,15 @@ class DesignedLQG:
         ):
             _check(given, field, unit, positive)
         _check(disturbance, "disturbance", "N m or N", not_negative)
+        for name, each in (coloured or {}).items():
+            deviation_and_filter(name, each)
         if states is not None and states < 1:
             raise InputError("no such number of states", field="states", value=states, remedy="say 16, or leave it out")
         self.outputs: tuple[str, ...] = tuple(effort) if isinstance(effort, Mapping) else ()
-        self._weights = {"deviations": deviations, "effort": effort, "disturbance": disturbance}
+        self._weights = {"deviations": deviations, "disturbance": disturbance}
+        self._effort = effort
         self._integrators: Mapping[str, float] = integrators or {}
+        self._coloured: Mapping[str, Any] = coloured or {}
         self._noise, self._states, self._at = noise, states, at
         self.design: LQGDesign | None = None
         self.findings: tuple[Finding, ...] = ()
@@ -97,12 +105,16 @@ class DesignedLQG:
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
-        full = self._model(plant)
+        own = [motor.name for motor in plant.mechanism.motors]
+        coloured = {name: each for name, each in self._coloured.items() if name in plant.outputs or name not in own}
+        points = tuple(dict.fromkeys(name.rpartition(".")[0] for name in coloured if name not in own))
+        full = self._model(plant, points)
         flexible = any(body.nf for body in full.minimal.system.bodies)
         few = reduce(full, self._states) if flexible else full
         integrators = {name: time for name, time in self._integrators.items() if name in plant.inputs}
+        effort = self._effort if isinstance(self._effort, Mapping) else dict.fromkeys(plant.outputs, self._effort)
         self.design = lqg(few, plant.period, delay=plant.delay, measured=plant.inputs, noise=self._noise_of(plant),
-                          integrators=integrators, **self._weights)  # fmt: skip
+                          integrators=integrators, coloured=coloured, effort=effort, **self._weights)  # fmt: skip
         loop = closed_loop(full, self.design)
         self.findings = () if loop.stable else (
             Finding(
@@ -126,14 +138,14 @@ class DesignedLQG:
         """See `LQGLaw`."""
         return self._law.linear_law()
 
-    def _model(self, plant: Plant) -> LinearModel:
-        """Of all states, with the motors that it drives as inputs."""
+    def _model(self, plant: Plant, points: tuple[str, ...]) -> LinearModel:
+        """Of all states, with the motors that it drives, and forces at points, as inputs."""
         mode = mode_of_motors(plant.mechanism, plant.outputs)
         if plant.task is not None:
-            return linearise(plant.task, mode=mode, at=self._at)
+            return linearise(plant.task, mode=mode, at=self._at, forces=points)
         if self._at is not None:
             raise InputError("there is no planned motion", field="at", value=self._at, remedy="leave it out")
-        return linearise(plant.mechanism, mode=mode, start=plant.state)
+        return linearise(plant.mechanism, mode=mode, start=plant.state, forces=points)
 
     def _noise_of(self, plant: Plant) -> dict[str, float]:
         """Standard deviations of readings by sensor: those given, else those of rounding."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from paraflex.actuation import required_effort
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
 from paraflex.dynamics.sensors import SensorReader
@@ -19,8 +21,8 @@ from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
 Reference = Callable[[float], float]
-# The word for the planned motion.
-PLAN = "plan"
+# Words for the planned motion, and for what sensors read where the plan's torques alone drive the flexible mechanism.
+PLAN, OPEN_LOOP = "plan", "open-loop"
 
 
 def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, plant: Plant) -> list[Reference | None]:
@@ -34,8 +36,10 @@ def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, 
     if given is None:
         return [None] * len(plant.inputs)
     if isinstance(given, str):
+        if given == OPEN_LOOP:
+            return list(readings_in(open_loop(plant), plant))
         if given != PLAN:
-            remedy = f'say "{PLAN}", or give a run, or numbers or functions of time by sensor'
+            remedy = f'say "{PLAN}" or "{OPEN_LOOP}", or give a run, or numbers or functions of time by sensor'
             raise InputError("is no reference", field="reference", value=given, remedy=remedy)
         return list(planned_readings(plant))
     if isinstance(given, TrackingRun | MotionRun):
@@ -93,6 +97,22 @@ def planned_readings(plant: Plant) -> list[AtSamples | None]:
         name: AtSamples(plant, values) for name, values in readings_of(motion, plant.mechanism, plant.inputs).items()
     }
     return [columns.get(name) for name in plant.inputs]
+
+
+def open_loop(plant: Plant) -> TrackingRun:
+    """The run of a plan's torques without controllers, at the samples of one, by the default method.
+
+    Raises
+    ------
+    InputError
+        There is no plan.
+    IntegrationError
+        The run cannot go on.
+    """
+    motion = planned_motion(plant)
+    assert plant.task is not None
+    task = replace(plant.task, motion=motion, effort=required_effort(motion))
+    return task.simulate(plant.mode, warning=False)
 
 
 def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:

@@ -634,8 +634,9 @@ Matrix = list[list[Number]]
 
 
 ReferenceEntry = Annotated[
-    Annotated[Literal["plan"], Tag("word[plan]")] | Annotated[dict[str, FunctionOfTime], Tag("ReferenceTable")],
-    Discriminator(lambda value: "ReferenceTable" if isinstance(value, dict) else "word[plan]"),
+    Annotated[Literal["plan", "open-loop"], Tag("word[reference]")]
+    | Annotated[dict[str, FunctionOfTime], Tag("ReferenceTable")],
+    Discriminator(lambda value: "ReferenceTable" if isinstance(value, dict) else "word[reference]"),
 ]
 
 
@@ -652,8 +653,9 @@ class ControllerTable(_Table):
     outputs: list[Text] = Field(default=[], description="motors; by default all of a mode")
     reference: ReferenceEntry | None = Field(
         default=None,
-        description='what is taken off the readings: "plan", or by sensor a number or an expression of the time t, in '
-        'the unit of the sensor; by default "plan" with "pid" and "lqg", nothing with others',
+        description='what is taken off the readings: "plan", the planned motion; "open-loop", what sensors read where '
+        "the planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the "
+        'unit of the sensor; by default "plan" with "pid", "open-loop" with "lqg", nothing with others',
     )
     limits: Number | Pair | dict[str, Number | Pair] | None = Field(
         default=None,
@@ -740,6 +742,12 @@ class LQGTable(ControllerTable):
     )
     integrators: dict[str, Number] = Field(
         default={}, description="by sensor the time in s within which its error under constant loads vanishes"
+    )
+    coloured: dict[str, tuple[Number, Number | list[list[Number]]]] = Field(
+        default={},
+        description='disturbances that last, by motor or as "link.tip.x" by point and axis: the standard deviation in '
+        "N m or N and the cut-off frequency in Hz, or lists of the coefficients of numerator and denominator of a "
+        "filter in descending powers of s",
     )
     states: Count | None = Field(
         default=None, description="the states of the reduced model, by default 16, or all of fewer"
