@@ -41,6 +41,7 @@ import documented  # noqa: E402
         ("statics.md", 3),
         ("flexures.md", 6),
         ("control.md", 4),
+        ("closed-loop.md", 9),
     ],
 )
 def test_blocks_of_a_page_run_and_print_what_it_shows(page, least, tmp_path, monkeypatch):
