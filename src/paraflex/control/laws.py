@@ -29,6 +29,9 @@ from paraflex.mechanism.measured import encoders_of
 from paraflex.mechanism.quantities import known, positive
 from paraflex.tracking import TrackingTask
 
+# Parts of torques below this are rounding.
+_ROUNDING = 1e-12
+
 Gain = float | Sequence[float] | Mapping[str, float] | Array
 
 
@@ -203,6 +206,8 @@ def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Arr
     P = torque_projectors(task.effort, active)[: len(torques)]
     out = np.zeros_like(torques)
     out[:, columns] = torques[:, columns] - np.einsum("kij,kj->ki", P, torques[:, columns])
+    # Of as many motors as degrees of freedom nothing is left but rounding.
+    out[np.abs(out) < _ROUNDING * np.max(np.abs(torques), initial=0.0)] = 0.0
     return out
 
 
