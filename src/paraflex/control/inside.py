@@ -123,7 +123,7 @@ def sampled_law(
     """
     law: Any = getattr(controller, "law", None)
     linear = _linear(law)
-    if type(controller) is not SampledController or not readings.simple:
+    if type(controller) is not SampledController or "step" in vars(controller) or not readings.simple:
         return None
     if linear is None and type(law) is not CompiledLaw:
         return None
