@@ -28,8 +28,8 @@ def execute():
     return module.execute
 
 
-def test_there_are_three():
-    assert names() == ["raparm_i", "redundancy", "thickness"]
+def test_there_are_four():
+    assert names() == ["closed_loop", "raparm_i", "redundancy", "thickness"]
 
 
 @pytest.mark.filterwarnings("default")  # of the libraries that run notebooks

@@ -66,6 +66,7 @@ def test_the_source_distribution_can_be_worked_with(built):
     folders = (
         "docs/theory.md",
         "docs/hooks/mathematics.py",
+        "docs/notebooks/closed_loop.ipynb",
         "docs/notebooks/raparm_i.ipynb",
         "examples/raparm_square.py",
     )

@@ -16,7 +16,9 @@ def execute(path: Path, folder: str | Path) -> Any:
     """A notebook with the outputs of a run in a folder; nothing is written to the notebook's file."""
     notebook = nbformat.read(path, as_version=4)
     resources = {"metadata": {"path": str(folder)}}
-    NotebookClient(notebook, timeout=600, kernel_name="python3", resources=resources).execute()
+    # What a cell prints arrives in as many parts as it takes time: one output all the same.
+    settings = {"timeout": 600, "kernel_name": "python3", "coalesce_streams": True}
+    NotebookClient(notebook, resources=resources, **settings).execute()
     for cell in notebook.cells:
         cell.metadata = {}
         cell.pop("id", None)
