@@ -289,19 +289,10 @@ class Simulation:
         IntegrationError
             It cannot go on; it carries the run so far.
         """
-        if controllers is not None:
-            self.restore(self._fresh)
-            given = controllers if isinstance(controllers, list | tuple) else [controllers]
-            several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
-                       for each in given]  # fmt: skip
-            start = self._initial.time
-            loop = Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None
-            if loop is not None and loop.whole and self._fed_forward:
-                raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
-                                 remedy="leave feed_forward of the simulation out")  # fmt: skip
-            self._use(loop)
         end = self.end if until is None else min(until, self.end)
         try:
+            if controllers is not None:
+                self._begin(controllers if isinstance(controllers, list | tuple) else [controllers])
             while self.time < end and not self.ended:
                 self._go_on(end, on_progress)
                 if on_progress is not None:
@@ -318,6 +309,18 @@ class Simulation:
             warn(made.validity, "" if self.task is None else f"mode {self.mode.name}")
             warn_of(made.doubts, ResultWarning)
         return made
+
+    def _begin(self, controllers: Sequence[Any]) -> None:
+        """Start anew under controllers; in open loop under none."""
+        self.restore(self._fresh)
+        several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
+                   for each in controllers]  # fmt: skip
+        start = self._initial.time
+        loop = Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None
+        if loop is not None and loop.whole and self._fed_forward:
+            raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
+                             remedy="leave feed_forward of the simulation out")  # fmt: skip
+        self._use(loop)
 
     def _go_on(self, end: float, on_progress: Callable[[float], None] | None) -> None:
         """To the next instant of the controllers, or to the end."""

@@ -3,13 +3,50 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
+import numpy as np
+
 from paraflex.errors import InputError
+from paraflex.mechanism.quantities import known, positive
 
 # Instants closer than this part of the shortest period are one.
 SAME = 1e-9
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a real number, not NaN."""
+    return isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool) and value == value
+
+
+def checked_number(value: Any, field: str, unit: str, check: Callable[..., None] = positive) -> float:
+    """A number in a unit that passes a check, such as `positive`.
+
+    Raises
+    ------
+    InputError
+        It is missing, is no number, or does not pass.
+    """
+    if value is None or not is_number(value):
+        raise InputError("is missing" if value is None else "is no number", field=field, value=value,
+                         remedy=f"give it in {unit}")  # fmt: skip
+    check(float(value), field, unit)
+    return float(value)
+
+
+def check_distinct(names: Sequence[str], among: Collection[str], field: str, what: str) -> None:
+    """Check that names are some of others, each named once.
+
+    Raises
+    ------
+    InputError
+        One that is not among them, or that is given twice.
+    """
+    for k, name in enumerate(names):
+        known(name, among, field, what)
+        if name in names[:k]:
+            raise InputError("is named twice", field=field, value=name, remedy="name it once")
 
 
 def whole_and_part(periods: float) -> tuple[int, float]:

@@ -774,7 +774,8 @@ class StudyDefaultsTable(_Table):
         default=[], description="names of [controller.NAME] tables that act, beside the torques planned along a path"
     )
     shaper: ShaperTable | None = Field(
-        default=None, description="the input shaper of torques planned along a path: none by default"
+        default=None,
+        description='the input shaper of torques planned along a path, { type = "zvd", frequencies = ["9 Hz"] } say: none by default',
     )
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
