@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,14 +11,14 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
-from paraflex.control.amplifiers import Amplifiers, relaxing, with_room
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.described import ControllerDescription
+from paraflex.control.held import HeldTorques, SavedTorques, Torques
 from paraflex.control.inside import sampled_law
 from paraflex.control.loop import LawFailure, Loop
 from paraflex.control.readings import Readings
-from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
-from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
+from paraflex.control.runs import ControlledMotion, ControlledTracking
+from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
 from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, Treatment, choose
@@ -27,12 +27,10 @@ from paraflex.kernel.sampled import SampledLaw
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
 from paraflex.mechanism.measured import encoders_of, measured_sensors
-from paraflex.mechanism.quantities import known
 from paraflex.motion import motion_start
-from paraflex.tracking import Ending, TrackingTask, path_stops
+from paraflex.tracking import Ending, TrackingTask
 from paraflex.validity import warn, with_blame
 
-Torques = Sequence[float] | Mapping[str, float] | Array
 # Instants closer than this part of the time between them are one.
 _SAME = 1e-9
 # Samples this much later than a change of torques, as a part of the run, are those just before it.
@@ -52,8 +50,7 @@ class Saved:
 
     time: float
     kept: Kept
-    held: Array
-    log: TorqueLog
+    torques: SavedTorques
     loop: Loop | None
     controllers: Any
 
@@ -126,10 +123,9 @@ class Simulation:
         self.task: TrackingTask | None = source if isinstance(source, TrackingTask) else None
         self.mechanism: Mechanism = source.mechanism if isinstance(source, TrackingTask) else Mechanism.made_of(source)
         self.mode: ActuationMode = _mode(self.mechanism, mode)
-        own = [motor.name for motor in self.mechanism.motors]
-        self.motors: tuple[str, ...] = tuple(name for name in own if name in self.mode.motors)
-        self._active = [own.index(name) for name in self.motors]
-        self._torques = FeedForward(self.mode, (), np.zeros(0), np.zeros(0))
+        names = [motor.name for motor in self.mechanism.motors]
+        self.motors: tuple[str, ...] = tuple(name for name in names if name in self.mode.motors)
+        planned = FeedForward(self.mode, (), np.zeros(0), np.zeros(0))
         self._fed_forward = feed_forward
         if isinstance(source, TrackingTask):
             _refuse(source, duration=duration, start=start)
@@ -141,7 +137,7 @@ class Simulation:
             self._times: Array = task.motion.t
             self._condition = actuation_condition(task.effort, self.mode)
             if feed_forward:
-                self._torques = task.torques(self.mode)
+                planned = task.torques(self.mode)
         else:
             if feed_forward:
                 raise InputError("there is no plan whose torques could act", field="feed_forward", value=True,
@@ -149,35 +145,18 @@ class Simulation:
             begun = motion_start(source, duration, samples, start, balanced=balanced)
             self.system, self._initial, self._times = begun
         self.end: float = float(self._times[-1])
-        self._amplifiers = Amplifiers(self.mechanism)
-        self._limited = self._amplifiers.limited & np.isin(np.arange(len(own)), self._active)
-        self._pack()
+        began = self._initial.time
+        self._torques = HeldTorques(self.system, self.mechanism, self.motors, planned, began, self.end)
         self._readings = Readings(self.system, measured_sensors(self.system.mechanism))
         self._watched = self._readings
         self.sensors_read: tuple[str, ...] = self._readings.names
         self._integration = Integration(
-            self.system, self._signals, self._initial, self._times, knots=self._knots, options=self._options,
-            samples=self._times.size,
+            self.system, self._torques.signals, self._initial, self._times, knots=self._torques.knots,
+            options=self._options, samples=self._times.size,
         )  # fmt: skip
         self._loop: Loop | None = None
-        self._held = np.zeros(len(own))
-        self._log = TorqueLog(self._amplifiers.lags, self._initial.time)
         self._integration.start()
         self._fresh = self.save()
-
-    def _pack(self) -> None:
-        """Signals of motors, of which the first coefficients are those of given torques as well."""
-        motors: Sequence[InputSignals] = self._torques.signals or constant_signals(
-            [0.0] * len(self.mechanism.motors), self.end
-        )
-        if not self._torques.signals:
-            self._torques = replace(self._torques, signals=tuple(motors))
-        lags = self._amplifiers.lags
-        motors = [with_room(each) if lag else each for each, lag in zip(motors, lags, strict=True)]
-        self._signals, knots = pack_signals(self.system.mechanism, motors, self.end)
-        smooth = path_stops(self._torques.knots, self.mechanism)
-        self._knots = np.sort(np.concatenate([smooth, knots]))
-        self._base = self._signals.coefficients[:, 0].copy()
 
     # --- Step by step ---
 
@@ -218,7 +197,7 @@ class Simulation:
         IntegrationError
             It cannot go on; it carries the run so far. An event of the options that ends it does as well.
         """
-        given = self._given(torques)
+        given = self._torques.given(torques)
         if not self.time < until <= self.end * (1.0 + _SAME):
             raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
                              value=until, remedy="give a later time in it, or reset the simulation")  # fmt: skip
@@ -239,13 +218,12 @@ class Simulation:
         """All that it goes on from, controllers included: continued from there it gives the same bits."""
         loop = self._loop
         controllers = None if loop is None else loop.saved()
-        return Saved(self.time, self._integration.saved(), self._held.copy(), self._log.copy(), loop, controllers)
+        return Saved(self.time, self._integration.saved(), self._torques.saved(), loop, controllers)
 
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` gave, of this simulation."""
         self._integration.restore(saved.kept)
-        self._held, self._log = saved.held.copy(), saved.log.copy()
-        self._hold()
+        self._torques.restore(saved.torques)
         self._use(saved.loop)
         if saved.loop is not None:
             saved.loop.restore(saved.controllers)
@@ -332,7 +310,7 @@ class Simulation:
         if loop.next <= self.time + slack:
             changed = loop.act(lambda: self._read(self._watched))
             if changed is not None:
-                self._apply(self._of_all(changed))
+                self._apply(self._torques.of_all(changed))
         until = min(end, loop.next)
         if until > self.time + slack:
             self._march(until, slack)
@@ -365,7 +343,8 @@ class Simulation:
         """The run with a solution."""
         k = solution.t.size - bool(solution.event)
         slack = _ROUNDING * (self.end - self._initial.time)
-        given, commanded = self._log.at(solution.t, slack), self._log.given(solution.t, slack)
+        log = self._torques.log
+        given, commanded = log.at(solution.t, slack), log.given(solution.t, slack)
         motors = {motor.name: unit for motor, unit in zip(self.mechanism.motors, self.mechanism.motor_units(),
                                                            strict=True)}  # fmt: skip
         records = () if self._loop is None else self._loop.records(motors.__getitem__)
@@ -373,9 +352,9 @@ class Simulation:
             times = solution.t if solution.event else self._times
             none = dict.fromkeys(motors, 0.0)
             return ControlledMotion(self.system, times, none, solution, given, commanded, records)
-        planned = self._torques.evaluate(solution.t[:k])
+        planned = self._torques.planned.evaluate(solution.t[:k])
         title = self._options.method.title
-        return ControlledTracking(self.task, self._torques, self._condition, solution, title,
+        return ControlledTracking(self.task, self._torques.planned, self._condition, solution, title,
                                   acting=given[:k] + planned, commanded=commanded[:k] + planned,
                                   controllers=records)  # fmt: skip
 
@@ -394,12 +373,12 @@ class Simulation:
     def _inside(self, loop: Loop) -> SampledLaw | None:
         """A loop for the compiled time loop; None where it stays outside."""
         # What amplifiers do to torques is not known there.
-        if loop.alone is None or self._limited.any() or np.any(self._amplifiers.lags):
+        if loop.alone is None or self._torques.limited.any() or np.any(self._torques.amplifiers.lags):
             return None
         controller, plant = loop.alone
         own = [motor.name for motor in self.mechanism.motors]
         outputs = [own.index(name) for name in plant.outputs]
-        return sampled_law(controller, plant, self._watched, outputs, self._base, len(own), self.end)
+        return sampled_law(controller, plant, self._watched, outputs, self._torques.base, len(own), self.end)
 
     def _plant(self, controller: Controller) -> Plant:
         outputs = tuple(controller.outputs) or self.motors
@@ -410,70 +389,20 @@ class Simulation:
             controller.period, controller.delay,
         )  # fmt: skip
 
-    def _given(self, torques: Torques) -> Array:
-        """Torques of all motors from those of some."""
-        if isinstance(torques, Mapping):
-            for name in torques:
-                known(name, self.motors, "torques", "motor")
-            torques = [torques.get(name, 0.0) for name in self.motors]
-        given = np.asarray(torques, dtype=float)
-        if given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
-            raise InputError(f"not {len(self.motors)} finite numbers", field="torques", value=torques,
-                             remedy=f"give one each of {', '.join(self.motors)}")  # fmt: skip
-        return self._of_all(given)
-
-    def _of_all(self, torques: Array) -> Array:
-        """Torques of all motors from those of the mode's."""
-        everything = np.zeros(len(self._held))
-        everything[self._active] = torques
-        return everything
-
     def _read(self, readings: Readings) -> Array:
         """Readings now."""
         now = self._integration.run.now()
-        torques = self._log.now(now.t) + self._planned(now.t) if readings.of_torques else np.zeros(len(self._held))
+        torques = self._torques.acting(now.t) if readings.of_torques else np.zeros(len(self._torques.held))
         return readings(now, torques)
 
-    def _planned(self, t: float) -> Array:
-        """Torques (motors,) of the plan at a time; zero without one."""
-        return self._torques.evaluate(np.array([t]))[0]
-
     def _apply(self, torques: Array) -> None:
-        """Let torques (motors,) of all motors act from now on, as far as their amplifiers can."""
-        torques = self._within_limits(torques)
-        changed = not np.array_equal(torques, self._held)
-        if changed or not self._log.begun:
-            self._log.note(self.time, torques)
-        if not changed:
+        """Let torques (motors,) of all motors act from now on."""
+        if not self._torques.hold(torques, self.time, lambda: self.state):
             return
-        self._held = torques
-        self._hold()
         if self._integration.run.attempts == 0:
             self._integration.start()
         else:
             self._integration.resume()
-
-    def _within_limits(self, torques: Array) -> Array:
-        """Torques (motors,) that with those of the plan are within the limits of amplifiers at the speed now."""
-        if not self._limited.any():
-            return torques
-        now = self._integration.run.now()
-        low, high = self._amplifiers.limits(self._amplifiers.rates(self.system, now.q, now.v))
-        planned = self._planned(now.t)
-        return np.where(self._limited, np.clip(torques, low - planned, high - planned), torques)
-
-    def _hold(self) -> None:
-        """Write the torques held into the signals."""
-        breaks, coefficients, start = self._signals.breaks, self._signals.coefficients, self._signals.start
-        since, begun, given = self._log.last
-        for k, lag in enumerate(self._amplifiers.lags):
-            pieces = slice(start[k], start[k + 1] - 1)
-            if not lag:
-                coefficients[pieces, 0] = self._base[pieces] + given[k]
-                continue
-            signal = relaxing(self._torques.signals[k], since, begun[k], given[k], lag)
-            whole = with_room(signal, pieces.stop - pieces.start)
-            breaks[pieces], coefficients[pieces] = whole.breaks[:-1], whole.coefficients
 
     def _march(
         self, until: float, slack: float | None = None, on_progress: Callable[[float], None] | None = None
@@ -496,9 +425,8 @@ class Simulation:
         """Note which torques acted in the compiled time loop."""
         if self._loop is None:
             return
-        for t, torques in self._loop.torques_acted(len(self._log)):
-            self._log.note(t, torques)
-            self._held = torques
+        for t, torques in self._loop.torques_acted(len(self._torques.log)):
+            self._torques.note(t, torques)
 
 
 def _projecting(options: IntegrationOptions) -> IntegrationOptions:

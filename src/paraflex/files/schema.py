@@ -775,7 +775,8 @@ class StudyDefaultsTable(_Table):
     )
     shaper: ShaperTable | None = Field(
         default=None,
-        description='the input shaper of torques planned along a path, { type = "zvd", frequencies = ["9 Hz"] } say: none by default',
+        description="the input shaper of torques planned along a path, as "
+        '{ type = "zvd", frequencies = ["9 Hz"] }: none by default',
     )
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
