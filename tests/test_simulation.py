@@ -404,6 +404,9 @@ def test_continuous_models_are_refused():
         (lambda task: simulated_rotor().step({"tai": 1.0}, 0.01), "torques: unknown motor"),
         (lambda task: simulated_rotor().step([1.0], 0.0), "until: is not within the rest of the run"),
         (lambda task: simulated_rotor().step([1.0], 0.5), "until: is not within the rest of the run"),
+        (lambda task: simulated_rotor().step([1.0], "1 ms"), "until: is not within the rest of the run"),
+        (lambda task: simulated_rotor().step(["one"], 0.01), "torques: not 1 finite numbers"),
+        (lambda task: simulated_rotor().restore(3), "saved: not a saved simulation"),
     ],
 )
 def test_bad_simulations(task, make, said):

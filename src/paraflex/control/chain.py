@@ -22,11 +22,11 @@ from paraflex.control.discrete import DiscreteModel, discrete_model
 from paraflex.control.estimators import rounded
 from paraflex.control.filters import transfer_function
 from paraflex.control.references import Reference, references
-from paraflex.control.together import checked_number, is_number
+from paraflex.control.together import by_name, checked_number, is_number
 from paraflex.errors import InputError
 from paraflex.findings import Finding
 from paraflex.linear.zeros import StateSpace
-from paraflex.mechanism.quantities import known, not_negative
+from paraflex.mechanism.quantities import not_negative
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
@@ -167,10 +167,10 @@ class SampledController:
             Other names, or numbers that make no sense.
         """
         return Chain(
-            _by_name(self.quantise, inputs, "quantise", "sensor", partial(checked_number, unit="the sensor's unit")),
-            _by_name(self.filters, inputs, "filters", "sensor", transfer_function),
-            _by_name(self.limits, outputs, "limits", "motor", _range),
-            _by_name(self.rates, outputs, "rates", "motor", partial(checked_number, unit="N m/s or N/s")),
+            _in_order(self.quantise, inputs, "quantise", "sensor", partial(checked_number, unit="the sensor's unit")),
+            _in_order(self.filters, inputs, "filters", "sensor", transfer_function),
+            _in_order(self.limits, outputs, "limits", "motor", _range),
+            _in_order(self.rates, outputs, "rates", "motor", partial(checked_number, unit="N m/s or N/s")),
         )
 
     def start(self, plant: Plant) -> None:
@@ -292,15 +292,10 @@ class _SettledFilter:
         return float((C @ x + D * value).item())
 
 
-def _by_name(given: Any, names: Sequence[str], field: str, what: str, take: Callable[[Any, str], Any]) -> list[Any]:
+def _in_order(given: Any, names: Sequence[str], field: str, what: str, take: Callable[[Any, str], Any]) -> list[Any]:
     """What is given for all, or by name, in the order of the names; None for the others."""
-    if given is None:
-        return [None] * len(names)
-    if not isinstance(given, Mapping):
-        return [take(given, field)] * len(names)
-    for name in given:
-        known(name, names, field, what)
-    return [take(given[name], f"{field}.{name}") if name in given else None for name in names]
+    found = {} if given is None else by_name(given, names, field, what, take)
+    return [found.get(name) for name in names]
 
 
 def _range(value: Any, field: str) -> tuple[float, float]:

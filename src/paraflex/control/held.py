@@ -120,7 +120,7 @@ class HeldTorques:
         return self.log.now(t) + self.planned_at(t)
 
     def hold(self, torques: Array, t: float, state: Callable[[], State]) -> bool:
-        """Let torques (all,) act from a time on [s], as far as amplifiers can in the state then; whether any changes."""
+        """Let torques (all,) act from a time on [s], as far as amplifiers can; whether any changes."""
         if self.limited.any():
             torques = self._within_limits(torques, state())
         changed = not np.array_equal(torques, self.held)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.together import check_distinct, whole_and_part
+from paraflex.control.together import check_distinct, same_period, whole_and_part
 from paraflex.errors import InputError
 from paraflex.linear.model import LinearModel
 from paraflex.linear.zeros import StateSpace
@@ -176,7 +176,7 @@ def as_sampled(model: Any, period: float, delay: float) -> SampledPlant:
     """
     if not isinstance(model, SampledPlant):
         return discretise(model, period, delay)
-    if abs(model.period - period) > 1e-9 * period:
+    if not same_period(model.period, period):
         raise InputError(f"is sampled every {model.period:g} s", field="model", value=model,
                          remedy=f"give the continuous model, or one sampled every {period:g} s")  # fmt: skip
     return model

@@ -18,6 +18,7 @@ from paraflex.control.inside import sampled_law
 from paraflex.control.loop import LawFailure, Loop
 from paraflex.control.readings import Readings
 from paraflex.control.runs import ControlledMotion, ControlledTracking
+from paraflex.control.together import SAME, is_number
 from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
 from paraflex.findings import warn_of
@@ -31,8 +32,6 @@ from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask
 from paraflex.validity import warn, with_blame
 
-# Instants closer than this part of the time between them are one.
-_SAME = 1e-9
 # Samples this much later than a change of torques, as a part of the run, are those just before it.
 _ROUNDING = 1e-12
 
@@ -198,7 +197,7 @@ class Simulation:
             It cannot go on; it carries the run so far. An event of the options that ends it does as well.
         """
         given = self._torques.given(torques)
-        if not self.time < until <= self.end * (1.0 + _SAME):
+        if not is_number(until) or not self.time < until <= self.end * (1.0 + SAME):
             raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
                              value=until, remedy="give a later time in it, or reset the simulation")  # fmt: skip
         self._use(None)
@@ -220,6 +219,7 @@ class Simulation:
         controllers = None if loop is None else loop.saved()
         return Saved(self.time, self._integration.saved(), self._torques.saved(), loop, controllers)
 
+    @checked_arguments()
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` gave, of this simulation."""
         self._integration.restore(saved.kept)
@@ -306,7 +306,7 @@ class Simulation:
         if loop is None or loop.inside is not None:
             self._march(end, on_progress=on_progress)
             return
-        slack = _SAME * loop.period
+        slack = SAME * loop.period
         if loop.next <= self.time + slack:
             changed = loop.act(lambda: self._read(self._watched))
             if changed is not None:
@@ -410,7 +410,7 @@ class Simulation:
         """March to a time, or to a stop of the run that is the same but for rounding."""
         stops = self._integration.run.problem.stops
         near = stops[int(np.argmin(np.abs(stops - until)))]
-        if abs(near - until) <= (_SAME * (until - self.time) if slack is None else slack):
+        if abs(near - until) <= (SAME * (until - self.time) if slack is None else slack):
             until = float(near)
         try:
             self._integration.march(until, on_progress=on_progress)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,32 @@ def checked_number(value: Any, field: str, unit: str, check: Callable[..., None]
     return float(value)
 
 
+def by_name(
+    given: Any, names: Sequence[str], field: str, what: str, take: Callable[[Any, str], Any]
+) -> dict[str, Any]:  # fmt: skip
+    """What is given by name, or of every name where one value is given for all.
+
+    Parameters
+    ----------
+    given : any or mapping of str to any
+    names : sequence of str
+    field, what : str
+        For errors: the field, and what is named.
+    take : callable
+        Of a value and its field gives what it stands for, or raises.
+
+    Raises
+    ------
+    InputError
+        A name that is none of them.
+    """
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(names, take(given, field))
+    for name in given:
+        known(name, names, field, what)
+    return {name: take(value, f"{field}.{name}") for name, value in given.items()}
+
+
 def check_distinct(names: Sequence[str], among: Collection[str], field: str, what: str) -> None:
     """Check that names are some of others, each named once.
 
@@ -55,6 +81,11 @@ def whole_and_part(periods: float) -> tuple[int, float]:
     if abs(periods - nearest) <= SAME * max(1.0, nearest):
         return nearest, 0.0
     return math.floor(periods), periods - math.floor(periods)
+
+
+def same_period(one: float, other: float) -> bool:
+    """Whether two periods are the same but for rounding."""
+    return abs(one - other) <= SAME * other
 
 
 def multiple_of(name: str, period: float, shortest: float) -> int:
