@@ -96,7 +96,7 @@ class LQGDesign:
 
     @property
     def delay(self) -> float:
-        """That the design accounts for [s]."""
+        """Delay that the design accounts for [s]."""
         return self.regulator.plant.delay
 
     @property
@@ -138,7 +138,7 @@ class LQGDesign:
 class LQGLaw:
     """A `LQGDesign` as a law: torques from errors of readings, with its estimate as its state.
 
-    Limits are told by `limited`: the estimate goes on with the torques that were given, and integrals stay while any
+    `limited` takes note of limits: the estimate goes on with the torques that were given, and integrals stay while any
     torque is limited.
 
     Attributes

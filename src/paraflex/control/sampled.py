@@ -49,7 +49,7 @@ class SampledPlant:
     period, delay : float
         [s]
     own : int
-        So many of the states are the model's.
+        Number of states of the model itself, which come first.
     """
 
     A: Array

@@ -39,7 +39,7 @@ _ROUNDING = 1e-12
 @given_as("a saved simulation", "what Simulation.save returned")
 @dataclass(frozen=True)
 class Saved:
-    """All that a simulation goes on from: see `Simulation.save`.
+    """The whole state of a simulation: see `Simulation.save`.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Simulation:
         return self._integration.status == "stopped" or self.time >= self.end
 
     def save(self) -> Saved:
-        """All that it goes on from, controllers included: continued from there it gives the same bits."""
+        """The whole state, controllers included: a run restored from it continues bit for bit."""
         loop = self._loop
         controllers = None if loop is None else loop.saved()
         return Saved(self.time, self._integration.saved(), self._torques.saved(), loop, controllers)
@@ -249,7 +249,7 @@ class Simulation:
         until : float, optional
             Up to when [s]; to the end by default.
         on_progress : callable, optional
-            Told the time reached [s]. A KeyboardInterrupt ends the run with what is there, marked "interrupted".
+            Called with the time reached [s]. A KeyboardInterrupt ends the run with what is there, marked "interrupted".
         warning : bool
             Whether a run that is doubtful issues warnings, as of `simulate`.
 
@@ -260,8 +260,8 @@ class Simulation:
         Raises
         ------
         InputError
-            Controllers with unknown sensors or motors, or with periods that are no multiples of the shortest; a law
-            that gives the whole torque beside another or beside feed-forward.
+            Controllers with unknown sensors or motors, or one named twice, or with periods that are no multiples of the
+            shortest; a law that gives the whole torque beside another or beside feed-forward.
         ControllerError
             One raised an error, or returned what cannot be torques; it carries the run so far.
         IntegrationError
