@@ -10,7 +10,7 @@ import pytest
 
 import paraflex as pf
 from paraflex.actuation.feed_forward import FeedForward
-from paraflex.control.amplifiers import relaxing
+from paraflex.control.amplifiers import Amplifiers, relaxing
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import InputSignals, build_system
@@ -164,14 +164,14 @@ def test_voltage_limits_speed_and_current():
 
 def test_braking_has_more_voltage_than_driving():
     """Against its motion back-EMF helps the amplifier: from -10 rad/s 24 V give 78 A, at 10 rad/s 18 A."""
-    found = pf.Simulation(rotor("voltage_limit = 24.0"), duration=0.1)._amplifiers
+    found = Amplifiers(rotor("voltage_limit = 24.0").mechanism)
     low, high = found.limits(np.array([10.0]))
     assert [low[0], high[0]] == pytest.approx([-1.5 * 78.0, 1.5 * 18.0])
     # A voltage has limits of its own, whatever the speed; a limit of the current then is one of the voltage.
-    found = pf.Simulation(rotor('voltage_limit = 24.0\ncurrent_limit = 4.0\namplifier = "voltage"'), duration=0.1)
-    low, high = found._amplifiers.limits(np.array([10.0]))
+    found = Amplifiers(rotor('voltage_limit = 24.0\ncurrent_limit = 4.0\namplifier = "voltage"').mechanism)
+    low, high = found.limits(np.array([10.0]))
     assert [low[0], high[0]] == pytest.approx([1.5 / 0.5 * (15.0 - 2.0), 1.5 / 0.5 * (15.0 + 2.0)])
-    low, high = found._amplifiers.limits(np.array([15.0]))
+    low, high = found.limits(np.array([15.0]))
     assert [low[0], high[0]] == pytest.approx([1.5 / 0.5 * (22.5 - 2.0), 1.5 / 0.5 * 24.0])
 
 

@@ -410,6 +410,22 @@ def test_modes_that_cannot_be_driven_are_marked_and_alone_are_exit_code_1(tmp_pa
     assert both.returncode == 0
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["animate", "film.svg"], "a comparison of control laws keeps no motions; paraflex plot draws law_comparison"),
+        (["report"], "a comparison of control laws has no report; laws.csv has its table"),
+    ],
+)
+def test_a_comparison_has_no_film_and_no_report(done, tmp_path, words, said):
+    command, *rest = words
+    answer = paraflex(command, done[1], *rest, cwd=tmp_path)
+    assert answer.returncode == 2
+    (line,) = answer.stderr.splitlines()
+    assert said in line
+    assert not any(tmp_path.iterdir())
+
+
 def test_ctrl_c_ends_it_in_one_line(tmp_path):
     long = ["--duration", "300", "--samples", "300001", "--controller", "pd"]
     said = interrupted("control", "compare", str(LAWS), *long, "--output", str(tmp_path / "out"))

@@ -553,6 +553,8 @@ def test_shapers_of_studies_are_written(tmp_path):
 def test_what_a_study_cannot_shape(tmp_path):
     with pytest.raises(InputError, match=r"robot.toml: study.shaper.frequencies: must be positive"):
         model_from(tomllib.loads(SHAPED.replace("51.4", "-51.4")), "robot.toml")
+    with pytest.raises(InputError, match=r'study.shaper: should be a table .*\{ type = "zvd", frequencies = '):
+        model_from(tomllib.loads(ROTOR + '[study]\nshaper = "zv"\n'), "rotor.toml")
     rotor = ROTOR + '[study]\nshaper = { type = "zv", frequencies = 5.0 }\n'
     with pytest.raises(InputError, match=r"study.shaper: is for torques planned along a path, and the model has none"):
         model_from(tomllib.loads(rotor), "rotor.toml")

@@ -513,3 +513,13 @@ def test_integrators_of_raparm(raparm):
                     noise=1e-3, integrators=times)  # fmt: skip
     assert design.spectral_radius < 1.0
     assert pf.closed_loop(few, design).stable
+
+
+def test_integrators_beside_vibrations_that_hardly_decay():
+    """Links without damping, some of which motors hardly reach: doubling finds nothing there, and SciPy does."""
+    mechanism = pf.load("five_bar").mechanism
+    servos = pf.Actuator("servo", gear=30.0, rotor_inertia=3e-5)
+    few = pf.reduce(pf.linearise(replace(mechanism, actuators=[servos]), mode="++"), 12)
+    design = pf.lqr(few, 1e-3, delay=1e-3, deviations={"x": 5e-4, "y": 5e-4, "A1": 0.02}, effort=1.0,
+                    integrators={"A1": 0.5})  # fmt: skip
+    assert 0.9999 < design.spectral_radius < 1.0 - 1e-8

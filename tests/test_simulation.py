@@ -1,5 +1,7 @@
 """Simulations one can step, under sampled controllers: closed forms, open-loop runs, saved states, failures."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -293,6 +295,8 @@ def failing(value):
     [
         ([float("nan")], 'controller "mine" returned torques that are not finite, for tau'),
         ([1.0, 2.0], 'controller "mine" returned 2 in place of 1 torques'),
+        (None, 'controller "mine" returned NoneType, no torques'),
+        (np.zeros((1, 2)), 'controller "mine" returned 1 x 2 in place of 1 torques'),
         ("much", 'controller "mine" returned str, no torques'),
         (ZeroDivisionError("division by zero"), 'controller "mine" raised ZeroDivisionError: division by zero'),
     ],
@@ -316,9 +320,13 @@ def test_a_controller_that_fails_ends_the_run(value, said):
         ({"outputs": ["tao"]}, r'outputs: unknown motor.*did you mean "tau"'),
         ({"period": 0.0}, "period: must be positive"),
         ({"period": None}, "period: is missing"),
-        ({"delay": -1e-3}, "delay: must be positive"),
-        ({"quantise": {"hab": 0.1}}, "quantise: unknown name"),
+        ({"delay": -1e-3}, "delay: must not be negative"),
+        ({"quantise": {"hab": 0.1}}, "quantise: unknown sensor"),
         ({"limits": (3.0, 1.0)}, "limits: the lowest must be below"),
+        ({"limits": (-1.0, "one")}, "limits: is no pair of numbers"),
+        ({"limits": "one"}, "limits: is no number"),
+        ({"period": True}, "period: is no number"),
+        ({"outputs": ["tau", "tau"]}, r"outputs: is named twice \(got 'tau'\)"),
         ({"filters": {"hub": ([1.0], [1.0, -3.0])}}, r"filters\.hub: is not stable"),
         ({"reference": {"hub": "far"}}, r"reference\.hub: is no reference"),
         ({"reference": "plan"}, "reference: there is no planned motion"),
@@ -327,6 +335,50 @@ def test_a_controller_that_fails_ends_the_run(value, said):
 def test_bad_controllers(more, said):
     with pytest.raises(pf.InputError, match=said):
         simulated_rotor().run(pd(**more))
+
+
+class Bare:
+    """A controller without a chain."""
+
+    period: Any = T
+    delay: Any = 0.0
+    inputs: Any = ("hub",)
+    outputs: Any = ("tau",)
+
+    def start(self, plant):
+        if self.period == 2 * T:
+            raise ZeroDivisionError("no gain")
+
+    def step(self, k, t, y):
+        return [0.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("period", -1e-3, "controller.period: must be positive"),
+        ("period", "1 ms", "controller.period: is no number"),
+        ("delay", -1e-3, "controller.delay: must not be negative"),
+        ("inputs", "hub", "controller.inputs: is no list of names"),
+        ("outputs", ("tau", "tau"), "controller.outputs: is named twice"),
+    ],
+)
+def test_controllers_without_a_chain_are_checked_too(name, value, said):
+    bare = Bare()
+    setattr(bare, name, value)
+    with pytest.raises(pf.InputError, match=said):
+        simulated_rotor().run(bare)
+    with pytest.raises(pf.InputError, match="law: is no control law"):
+        SampledController(Bare, period=T)
+
+
+def test_a_controller_that_raises_as_it_starts():
+    bare = Bare()
+    bare.period = 2 * T
+    with pytest.raises(ControllerError, match=r'controller "controller" raised ZeroDivisionError: no gain') as caught:
+        simulated_rotor().run(bare)
+    assert caught.value.partial.solution.status == "failed"
+    assert caught.value.partial.solution.t.tolist() == [0.0]
 
 
 def test_continuous_models_are_refused():
@@ -352,6 +404,9 @@ def test_continuous_models_are_refused():
         (lambda task: simulated_rotor().step({"tai": 1.0}, 0.01), "torques: unknown motor"),
         (lambda task: simulated_rotor().step([1.0], 0.0), "until: is not within the rest of the run"),
         (lambda task: simulated_rotor().step([1.0], 0.5), "until: is not within the rest of the run"),
+        (lambda task: simulated_rotor().step([1.0], "1 ms"), "until: is not within the rest of the run"),
+        (lambda task: simulated_rotor().step(["one"], 0.01), "torques: not 1 finite numbers"),
+        (lambda task: simulated_rotor().restore(3), "saved: not a saved simulation"),
     ],
 )
 def test_bad_simulations(task, make, said):

@@ -40,6 +40,7 @@ PACKAGES = (
     "control.loop",
     "control.sampled",
     "control.regulators",
+    "control.lqg_law",
     "control.designed",
     "control.estimators",
     "control.closed_loops",

@@ -108,7 +108,8 @@ from .control.rate_gains import rate_feedback_gains as rate_feedback_gains, Rate
 from .control.shaping import Shaper as Shaper, shaper as shaper
 from .control.shaped import ShapedPath as ShapedPath, shape_torques as shape_torques
 from .control.sampled import discretise as discretise, SampledPlant as SampledPlant
-from .control.regulators import lqr as lqr, lqg as lqg, Regulator as Regulator, LQGDesign as LQGDesign
+from .control.lqg_law import LQGDesign as LQGDesign, Regulator as Regulator
+from .control.regulators import lqr as lqr, lqg as lqg
 from .control.estimators import (
     quantisation_noise as quantisation_noise,
     Differentiator as Differentiator,

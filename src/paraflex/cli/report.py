@@ -72,6 +72,11 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
         return statics_page(data)
     if kind == "reduction":
         return reduction_page(data)
+    if kind == "laws":
+        raise InputError(
+            "a comparison of control laws has no report", field=str(folder),
+            remedy="laws.csv has its table, and paraflex plot draws law_comparison",
+        )  # fmt: skip
     summary = folder / "summary.json"
     modes = _beside(summary)["modes"] if summary.is_file() else {}
     # Modes that could not start are in the summary only.

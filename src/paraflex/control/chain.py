@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,10 +22,11 @@ from paraflex.control.discrete import DiscreteModel, discrete_model
 from paraflex.control.estimators import rounded
 from paraflex.control.filters import transfer_function
 from paraflex.control.references import Reference, references
+from paraflex.control.together import by_name, checked_number, is_number
 from paraflex.errors import InputError
 from paraflex.findings import Finding
 from paraflex.linear.zeros import StateSpace
-from paraflex.mechanism.quantities import known, positive
+from paraflex.mechanism.quantities import not_negative
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
@@ -137,9 +139,9 @@ class SampledController:
         self.name: str = name
         self.law: Any = as_law(law)
         period = getattr(self.law, "period", None) if period is None else period
-        self.period: float = _positive(period, "period")
+        self.period: float = checked_number(period, "period", "s")
         delay = getattr(self.law, "delay", 0.0) if delay is None else delay
-        self.delay: float = _not_negative(delay, "delay")
+        self.delay: float = checked_number(delay, "delay", "s", not_negative)
         self.inputs: tuple[str, ...] = tuple(getattr(self.law, "inputs", ()) if inputs is None else inputs)
         self.outputs: tuple[str, ...] = tuple(getattr(self.law, "outputs", ()) if outputs is None else outputs)
         own = getattr(self.law, "reference", None)
@@ -166,10 +168,10 @@ class SampledController:
             Other names, or numbers that make no sense.
         """
         return Chain(
-            _by_name(self.quantise, inputs, "quantise", _resolution),
-            _by_name(self.filters, inputs, "filters", transfer_function),
-            _by_name(self.limits, outputs, "limits", _range),
-            _by_name(self.rates, outputs, "rates", _pace),
+            _in_order(self.quantise, inputs, "quantise", "sensor", partial(checked_number, unit="the sensor's unit")),
+            _in_order(self.filters, inputs, "filters", "sensor", transfer_function),
+            _in_order(self.limits, outputs, "limits", "motor", _range),
+            _in_order(self.rates, outputs, "rates", "motor", partial(checked_number, unit="N m/s or N/s")),
         )
 
     def start(self, plant: Plant) -> None:
@@ -229,6 +231,8 @@ class SampledController:
             if reference is not None:
                 errors[i] -= reference(t)
         said = self.law.step(k, t, errors)
+        if said is None:
+            return None  # Which as a number would be NaN.
         try:
             wanted = np.array(said, dtype=float)
         except (TypeError, ValueError):
@@ -261,7 +265,7 @@ def as_law(given: Any) -> Any:
     InputError
         Anything else, or a continuous model.
     """
-    if callable(getattr(given, "step", None)):
+    if callable(getattr(given, "step", None)) and not inspect.isclass(given):
         return given
     if all(hasattr(given, name) for name in ("A", "B", "C", "D", "dt")):
         return discrete_model(given)
@@ -286,49 +290,23 @@ class _SettledFilter:
         A, B, C, D = self.model
         x = np.linalg.solve(np.eye(len(A)) - A, B * value) if self._x is None else self._x
         self._x = np.asarray(A @ x + B * value, dtype=float)
-        filtered = float((C @ x + D * value).item())
-        return filtered
+        return float((C @ x + D * value).item())
 
 
-def _by_name(given: Any, names: Sequence[str], field: str, take: Callable[[Any, str], Any]) -> list[Any]:
+def _in_order(given: Any, names: Sequence[str], field: str, what: str, take: Callable[[Any, str], Any]) -> list[Any]:
     """What is given for all, or by name, in the order of the names; None for the others."""
-    if given is None:
-        return [None] * len(names)
-    if not isinstance(given, Mapping):
-        return [take(given, field)] * len(names)
-    for name in given:
-        known(name, names, field, "name")
-    return [take(given[name], f"{field}.{name}") if name in given else None for name in names]
-
-
-def _positive(value: Any, field: str, unit: str = "s") -> float:
-    if value is None:
-        raise InputError("is missing", field=field, remedy="give it in seconds")
-    if not isinstance(value, int | float | np.floating | np.integer):
-        raise InputError("is no number", field=field, value=value, remedy="give one above zero")
-    positive(float(value), field, unit)
-    return float(value)
-
-
-def _not_negative(value: Any, field: str) -> float:
-    if value == 0.0:
-        return 0.0
-    return _positive(value, field)
-
-
-def _resolution(value: Any, field: str) -> float:
-    return _positive(value, field, "the unit of the reading")
-
-
-def _pace(value: Any, field: str) -> float:
-    return _positive(value, field, "N m/s or N/s")
+    found = {} if given is None else by_name(given, names, field, what, take)
+    return [found.get(name) for name in names]
 
 
 def _range(value: Any, field: str) -> tuple[float, float]:
-    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) and len(value) == 2:
-        low, high = float(value[0]), float(value[1])
-        if not low < high:
-            raise InputError("the lowest must be below the highest", field=field, value=value, remedy="exchange them")
-        return low, high
-    most = _positive(value, field, "N m or N")
-    return -most, most
+    """The lowest and the highest torque, from a pair or from their largest magnitude."""
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+        most = checked_number(value, field, "N m or N")
+        return -most, most
+    if len(value) != 2 or not all(is_number(one) for one in value):
+        raise InputError("is no pair of numbers", field=field, value=value, remedy="give the lowest and the highest")
+    low, high = float(value[0]), float(value[1])
+    if not low < high:
+        raise InputError("the lowest must be below the highest", field=field, value=value, remedy="exchange them")
+    return low, high

@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.control.described_laws import LawNames, Numbers, of_names
-from paraflex.control.together import check_name, check_whole, multiple_of
+from paraflex.control.together import check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError
 from paraflex.mechanism import AngleLaw, Mechanism
 from paraflex.mechanism.loads import InTime
@@ -89,8 +89,7 @@ class ControllerDescription(CheckedFields):
 
     def _check(self, names: LawNames) -> None:
         for field_name, all_names, what in (("inputs", names.sensors, "sensor"), ("outputs", names.motors, "motor")):
-            for name in getattr(self, field_name):
-                known(name, all_names, field_name, what)
+            check_distinct(getattr(self, field_name), all_names, field_name, what)
         self.law.check(names)
         law = self.law.made(self.outputs or names.motors, self.period)
         sampled = self._sampled(law, {"reference": self.reference})

@@ -11,6 +11,7 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
 from paraflex.control.linear_law import LinearLaw
+from paraflex.control.together import same_period
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 
@@ -60,7 +61,7 @@ class DiscreteModel:
             _check_count(inputs, self.B.shape[1], "inputs")
         if outputs:
             _check_count(outputs, self.C.shape[0], "outputs")
-        if self.period is not None and abs(period - self.period) > 1e-9 * period:
+        if self.period is not None and not same_period(self.period, period):
             raise InputError(f"the model is sampled every {self.period:g} s", field="period", value=period,
                              remedy="leave it out")  # fmt: skip
 
@@ -109,7 +110,7 @@ def side_by_side(laws: Sequence[DiscreteModel]) -> DiscreteModel:
     """
     period = laws[0].period
     for one in laws:
-        if one.period is not None and period is not None and abs(one.period - period) > 1e-9 * period:
+        if one.period is not None and period is not None and not same_period(one.period, period):
             raise InputError(f"is another than that of a law beside it, {period:g} s", field="period",
                              value=one.period, remedy="design both for one period")  # fmt: skip
     inputs, outputs = (tuple(dict.fromkeys(name for one in laws for name in getattr(one, what)))

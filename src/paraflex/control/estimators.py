@@ -38,6 +38,8 @@ def rounded(readings: Array, resolution: Array) -> Array:
     return np.where(coarse, steps * np.round(readings / steps), readings)
 
 
+# Poles that SciPy's solution moves by less than this from the unit circle may be there by rounding.
+_STABLE = 1.0 - 1e-8
 # Doublings reach 2^60 samples; the last one changes nothing.
 _DOUBLINGS, _CONVERGED = 60, 1e-15
 
@@ -111,7 +113,8 @@ def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
 
     By doubling (Chu, Fan, Lin and Wang, Int. J. Control 77 (2004) 767), in states of one size: the k-th step is the
     optimum over 2^k samples. Torques under way make A singular, with which the reordering of eigenvalues within
-    `scipy.linalg.solve_discrete_are` fails now and then.
+    `scipy.linalg.solve_discrete_are` fails now and then. Where doubling loses too much to rounding, of vibrations that
+    decay over 10^5 samples say, that is tried as well.
 
     Raises
     ------
@@ -130,10 +133,19 @@ def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
         step = step @ half[:, : len(A)]
         if np.linalg.norm(change) <= _CONVERGED * np.linalg.norm(H):
             break
-    gain = np.linalg.solve(np.eye(B.shape[1]) + columns.T @ H @ columns, columns.T @ H @ scaled)
-    if not np.all(np.isfinite(H)) or np.max(np.abs(np.linalg.eigvals(scaled - columns @ gain)), initial=0.0) >= 1.0:
-        raise np.linalg.LinAlgError("no stabilising solution")
+    if _radius(scaled, columns, H) >= 1.0:
+        H = scipy.linalg.solve_discrete_are(scaled, columns, Q * np.outer(size, size), np.eye(B.shape[1]))
+        if _radius(scaled, columns, H) >= _STABLE:
+            raise np.linalg.LinAlgError("no stabilising solution")
     return H / np.outer(size, size)
+
+
+def _radius(A: Array, B: Array, P: Array) -> float:
+    """Spectral radius of A with the feedback of a solution P, and R = 1; infinite if it is not finite."""
+    if not np.all(np.isfinite(P)):
+        return np.inf
+    gain = np.linalg.solve(np.eye(B.shape[1]) + B.T @ P @ B, B.T @ P @ A)
+    return float(np.max(np.abs(np.linalg.eigvals(A - B @ gain)), initial=0.0))
 
 
 def _symmetric(matrix: Array) -> Array:

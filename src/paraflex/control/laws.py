@@ -65,8 +65,8 @@ class JointPID:
     Raises
     ------
     InputError
-        Gains that are negative or no numbers; as it starts, gains of other motors or readings of other joints than the
-        mode's.
+        As it starts: gains that are negative or no numbers, gains of motors that it does not drive, or other numbers
+        of readings and motors.
     """
 
     title = "PID of joints"
@@ -265,7 +265,10 @@ def gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
         gains = np.broadcast_to(np.asarray(given, dtype=float), (len(motors),)).copy()
     except (TypeError, ValueError):
         gains = np.full(1, np.nan)
-    if not (np.all(np.isfinite(gains)) and np.all(gains >= 0.0)):
+    if not np.all(np.isfinite(gains)):
         raise InputError(f"no gains of {len(motors)} motors", field=field, value=given,
-                         remedy="give one number from zero on, one for each motor, or numbers by motor")  # fmt: skip
+                         remedy="give one number, one for each motor, or numbers by motor")  # fmt: skip
+    if np.any(gains < 0.0):
+        raise InputError("must not be negative", field=field, value=float(gains.min()),
+                         remedy="give a gain from zero on: the law acts against errors by itself")  # fmt: skip
     return gains

@@ -13,11 +13,18 @@ from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.inside import wrong_torques
-from paraflex.control.together import check_name, check_whole, multiple_of, whole_and_part
+from paraflex.control.together import (
+    check_distinct,
+    check_name,
+    check_whole,
+    checked_number,
+    multiple_of,
+    whole_and_part,
+)
 from paraflex.errors import InputError
 from paraflex.findings import Finding
 from paraflex.kernel.sampled import ACTED, SAMPLED, SampledLaw
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import not_negative
 
 
 class Due(NamedTuple):
@@ -114,6 +121,8 @@ class Loop:
     InputError
         A period that is no multiple of the shortest one, unknown sensors or motors, a name twice, two laws each of
         which gives the whole torque.
+    LawFailure
+        A controller that raises as it starts.
     """
 
     def __init__(
@@ -135,6 +144,8 @@ class Loop:
                 each.start(self._plants[-1])
             except InputError as error:
                 raise error.within(name) from None
+            except Exception as error:
+                raise _raised(name, error) from error
         # Names of the sensors that controllers read, in the order of the readings that `act` needs.
         self.read: tuple[str, ...] = tuple(dict.fromkeys(name for plant in self._plants for name in plant.inputs))
         self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self._plants]
@@ -217,14 +228,15 @@ class Loop:
         try:
             given = controller.step(number, t, y)
         except Exception as error:
-            said = " ".join(str(error).split())
-            raise LawFailure(f'controller "{name}" raised {type(error).__name__}: {said}') from error
+            raise _raised(name, error) from error
         try:
             torques = np.atleast_1d(np.asarray(given, dtype=float))
         except (TypeError, ValueError):
-            raise LawFailure(f'controller "{name}" returned {type(given).__name__}, no torques') from None
+            torques = None
+        if torques is None or given is None:
+            raise LawFailure(f'controller "{name}" returned {type(given).__name__}, no torques')
         if torques.shape != (len(outputs),):
-            count = "one" if torques.size == 1 else f"{torques.size}"
+            count = "one" if torques.size == 1 else " x ".join(map(str, torques.shape))
             raise LawFailure(f'controller "{name}" returned {count} in place of {len(outputs)} torques')
         wrong = [motor for motor, value in zip(outputs, torques, strict=True) if not np.isfinite(value)]
         if wrong:
@@ -303,6 +315,11 @@ class Loop:
                 mine[...] = array
 
 
+def _raised(name: str, error: Exception) -> LawFailure:
+    said = " ".join(str(error).split())
+    return LawFailure(f'controller "{name}" raised {type(error).__name__}: {said}')
+
+
 def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
     return LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(motors)}')
 
@@ -319,9 +336,14 @@ def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -
         controller: Controller = given
     else:
         controller = SampledController(as_law(given))
+    name = getattr(given, "name", "controller")
+    checked_number(controller.period, f"{name}.period", "s")
+    checked_number(controller.delay, f"{name}.delay", "s", not_negative)
     for field_name, among, what in (("inputs", sensors, "sensor"), ("outputs", motors, "motor")):
-        for name in getattr(controller, field_name):
-            known(name, among, f"{getattr(given, 'name', 'controller')}.{field_name}", what)
+        names = getattr(controller, field_name)
+        if not isinstance(names, tuple | list):
+            raise InputError("is no list of names", field=f"{name}.{field_name}", value=names, remedy="give a tuple")
+        check_distinct(names, among, f"{name}.{field_name}", what)
     return controller
 
 

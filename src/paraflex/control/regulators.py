@@ -3,231 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.coloured import DisturbedPlant, disturbed_plant
-from paraflex.control.controllers import Plant
-from paraflex.control.estimators import KalmanFilter, kalman_filter, riccati
-from paraflex.control.linear_law import LinearLaw
+from paraflex.control.estimators import kalman_filter, riccati
+from paraflex.control.lqg_law import LQGDesign, Regulator
 from paraflex.control.reach import check_reach
 from paraflex.control.sampled import SampledPlant, as_sampled, places
+from paraflex.control.together import by_name, checked_number
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
-from paraflex.mechanism.quantities import known, not_negative, positive
+from paraflex.mechanism.quantities import not_negative, positive
 
-Complex = NDArray[np.complex128]
 # Random torques by default, as a part of the largest ones.
 _OF_EFFORT = 0.1
-
-
-@dataclass(frozen=True)
-class Regulator:
-    """State feedback u = -`gain` [x; integrals] of a sampled plant.
-
-    Attributes
-    ----------
-    plant : SampledPlant
-        With torques under way among its states.
-    motors : tuple of str
-        Inputs that it acts on.
-    gain : (motors, n + integrated) array
-        K.
-    integrated : tuple of str
-        Outputs whose sums over time are fed back, too.
-    poles : (n + integrated,) array
-        Of the plant with this feedback, z.
-    """
-
-    plant: SampledPlant
-    motors: tuple[str, ...]
-    gain: Array
-    integrated: tuple[str, ...]
-    poles: Complex
-
-    @property
-    def spectral_radius(self) -> float:
-        """The largest magnitude of the poles."""
-        return float(np.max(np.abs(self.poles), initial=0.0))
-
-
-@dataclass(frozen=True)
-class LQGDesign:
-    """A regulator that acts on the estimate of a Kalman filter.
-
-    Attributes
-    ----------
-    regulator : Regulator
-    filter : KalmanFilter
-    measured : tuple of str
-        Outputs that the filter is given, in this order.
-    start : (n, measured) array
-        The first estimate from the first readings: at rest, displaced in what moves freely.
-    """
-
-    regulator: Regulator
-    filter: KalmanFilter
-    measured: tuple[str, ...]
-    start: Array
-
-    @property
-    def K(self) -> Array:
-        """Gain (motors, n + integrated) of the feedback, u = -K [x; integrals]."""
-        return self.regulator.gain
-
-    @property
-    def L(self) -> Array:
-        """Gain (n, measured) of the filter."""
-        return self.filter.gain
-
-    @property
-    def poles(self) -> Complex:
-        """Of the closed loop on the plant of the design: those of the regulator and of the filter, z."""
-        return np.concatenate([self.regulator.poles, self.filter.poles])
-
-    @property
-    def spectral_radius(self) -> float:
-        """The largest magnitude of the poles."""
-        return float(np.max(np.abs(self.poles), initial=0.0))
-
-    @property
-    def period(self) -> float:
-        """Of sampling [s]."""
-        return self.regulator.plant.period
-
-    @property
-    def delay(self) -> float:
-        """That the design accounts for [s]."""
-        return self.regulator.plant.delay
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Sensors: `measured`."""
-        return self.measured
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Motors, those of the regulator."""
-        return self.regulator.motors
-
-    @cached_property
-    def state_space(self) -> StateSpace:
-        """The law without limits, from readings to torques: x_k+1 = A x_k + B y_k, u_k = C x_k + D y_k.
-
-        States are the estimate before the reading, and integrals.
-        """
-        one, L, n = self.filter, self.L, len(self.filter.A)
-        rows, _ = self._integrals
-        K, K_i = np.split(self.K, [n], axis=1)
-        rest = np.eye(n) - L @ one.C
-        C, D = np.hstack([-K @ rest, -K_i]), -K @ L
-        A = np.vstack([np.hstack([one.A @ rest, np.zeros((n, len(rows)))]) + one.B @ C,
-                       np.eye(len(rows), n + len(rows), n)])  # fmt: skip
-        return StateSpace(A, np.vstack([one.A @ L + one.B @ D, rows]), C, D)
-
-    @property
-    def _integrals(self) -> tuple[Array, list[int]]:
-        """What a reading adds to integrals (integrated, measured), and which readings these are."""
-        columns = [self.measured.index(name) for name in self.regulator.integrated]
-        return self.period * np.eye(len(self.measured))[columns], columns
-
-    def law(self) -> LQGLaw:
-        """The law, at the beginning of a run, for `SampledController`."""
-        return LQGLaw(self)
-
-
-class LQGLaw:
-    """A `LQGDesign` as a law: torques from errors of readings, with its estimate as its state.
-
-    Limits are told by `limited`: the estimate goes on with the torques that were given, and integrals stay while any
-    torque is limited.
-
-    Attributes
-    ----------
-    design : LQGDesign
-    period, delay : float
-        [s]
-    inputs, outputs : tuple of str
-        Sensors and motors.
-    x : (n,) array
-        The estimate after the last reading.
-    integrals : (integrated,) array
-    """
-
-    def __init__(self, design: LQGDesign) -> None:
-        self.design = design
-        self.period: float = design.period
-        self.delay: float = design.delay
-        self.inputs: tuple[str, ...] = design.inputs
-        self.outputs: tuple[str, ...] = design.outputs
-        self._reset()
-
-    def _reset(self) -> None:
-        self.x: Array | None = None
-        self.integrals: Array = np.zeros(len(self.design.regulator.integrated))
-        self._wanted: Array = np.zeros(len(self.outputs))
-        self._given: Array = self._wanted
-        self._read: Array = np.zeros(len(self.inputs))
-
-    @property
-    def state_space(self) -> StateSpace:
-        """See `LQGDesign.state_space`."""
-        return self.design.state_space
-
-    def start(self, plant: Plant) -> None:
-        """Forget an earlier run.
-
-        Raises
-        ------
-        InputError
-            Sensors, motors or a period other than those of the design.
-        """
-        pairs = (("inputs", self.inputs, plant.inputs), ("outputs", self.outputs, plant.outputs))
-        for field, wanted, have in pairs:
-            if tuple(have) != wanted:
-                raise InputError("are not those of the design, in its order", field=field, value=", ".join(have),
-                                 remedy=f"leave them out, or say {', '.join(wanted)}")  # fmt: skip
-        if abs(plant.period - self.period) > 1e-9 * self.period:
-            raise InputError(f"the design is for {self.period:g} s", field="period", value=plant.period,
-                             remedy="leave it out, or design for that period")  # fmt: skip
-        self._reset()
-
-    def step(self, k: int, t: float, y: Array) -> Array:
-        """Torques (motors,) that follow from errors y (measured,) at sample k."""
-        design = self.design
-        if self.x is None:
-            before = design.start @ y
-        else:
-            before = design.filter.carried_on(self.x, self._given)
-            if np.array_equal(self._given, self._wanted):
-                self.integrals = self.integrals + design._integrals[0] @ self._read
-        self.x = design.filter.corrected(before, y)
-        self._read = np.array(y, dtype=float)
-        self._wanted = -design.K @ np.concatenate([self.x, self.integrals])
-        self._given = self._wanted
-        return self._wanted.copy()
-
-    def linear_law(self) -> LinearLaw:
-        """For the compiled time loop: states are the estimate before the reading, and integrals."""
-        design, states = self.design, self.state_space
-        n, more = len(design.filter.A), len(self.integrals)
-        return LinearLaw(
-            *states,
-            E=np.vstack([-design.filter.B, np.zeros((more, len(self.outputs)))]),
-            first=np.vstack([design.start, np.zeros((more, len(self.inputs)))]),
-            waiting=(np.arange(n + more) >= n).astype(float),
-        )
-
-    def limited(self, torques: Array) -> None:
-        """Take note of the torques (motors,) that are given in place of those that were wanted."""
-        self._given = np.array(torques, dtype=float)
 
 
 @checked_arguments()
@@ -412,10 +207,9 @@ def _disturbances(plant: SampledPlant, regulator: Regulator, given: Any, effort:
     if given is None:
         efforts = _by_name(effort, regulator.motors, "effort", "N m or N")
         given = {name: _OF_EFFORT * value for name, value in efforts.items()}
-    if isinstance(given, Mapping):
-        sizes = _by_name(given, plant.inputs, "disturbance", "N m or N", not_negative)
-    else:
-        sizes = _by_name(given, regulator.motors, "disturbance", "N m or N", not_negative)
+    # By name also of points of forces; one number is for the motors.
+    names = plant.inputs if isinstance(given, Mapping) else regulator.motors
+    sizes = _by_name(given, names, "disturbance", "N m or N", not_negative)
     G = plant.G[:, [plant.inputs.index(name) for name in sizes]] * np.array(list(sizes.values()))
     return G @ G.T
 
@@ -460,8 +254,4 @@ def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
 
 def _by_name(given: Any, names: Sequence[str], field: str, unit: str, check: Any = positive) -> dict[str, float]:
     """Numbers by name, of all names where one number is given."""
-    table: Mapping[str, float] = given if isinstance(given, Mapping) else dict.fromkeys(names, float(given))
-    for name, value in table.items():
-        known(name, names, field, "name")
-        check(value, f"{field}.{name}" if isinstance(given, Mapping) else field, unit)
-    return {name: float(value) for name, value in table.items()}
+    return by_name(given, names, field, "name", partial(checked_number, unit=unit, check=check))

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.together import whole_and_part
+from paraflex.control.together import check_distinct, same_period, whole_and_part
 from paraflex.errors import InputError
 from paraflex.linear.model import LinearModel
 from paraflex.linear.zeros import StateSpace
-from paraflex.mechanism.quantities import known, not_negative, positive
+from paraflex.mechanism.quantities import not_negative, positive
 
 
 class NamedMatrices(NamedTuple):
@@ -49,7 +49,7 @@ class SampledPlant:
     period, delay : float
         [s]
     own : int
-        So many of the states are the model's.
+        Number of states of the model itself, which come first.
     """
 
     A: Array
@@ -176,7 +176,7 @@ def as_sampled(model: Any, period: float, delay: float) -> SampledPlant:
     """
     if not isinstance(model, SampledPlant):
         return discretise(model, period, delay)
-    if abs(model.period - period) > 1e-9 * period:
+    if not same_period(model.period, period):
         raise InputError(f"is sampled every {model.period:g} s", field="model", value=model,
                          remedy=f"give the continuous model, or one sampled every {period:g} s")  # fmt: skip
     return model
@@ -230,10 +230,7 @@ def places(names: Sequence[str], among: Sequence[str], field: str, what: str) ->
     InputError
         One that is not among them, or that is given twice.
     """
-    for k, name in enumerate(names):
-        known(name, among, field, what)
-        if name in names[:k]:
-            raise InputError("is named twice", field=field, value=name, remedy="name it once")
+    check_distinct(names, among, field, what)
     return [list(among).index(name) for name in names]
 
 

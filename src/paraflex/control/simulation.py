@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,14 +11,15 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
-from paraflex.control.amplifiers import Amplifiers, relaxing, with_room
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.described import ControllerDescription
+from paraflex.control.held import HeldTorques, SavedTorques, Torques
 from paraflex.control.inside import sampled_law
 from paraflex.control.loop import LawFailure, Loop
 from paraflex.control.readings import Readings
-from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
-from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
+from paraflex.control.runs import ControlledMotion, ControlledTracking
+from paraflex.control.together import SAME, is_number
+from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
 from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, Treatment, choose
@@ -27,14 +28,10 @@ from paraflex.kernel.sampled import SampledLaw
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
 from paraflex.mechanism.measured import encoders_of, measured_sensors
-from paraflex.mechanism.quantities import known
 from paraflex.motion import motion_start
-from paraflex.tracking import Ending, TrackingTask, path_stops
+from paraflex.tracking import Ending, TrackingTask
 from paraflex.validity import warn, with_blame
 
-Torques = Sequence[float] | Mapping[str, float] | Array
-# Instants closer than this part of the time between them are one.
-_SAME = 1e-9
 # Samples this much later than a change of torques, as a part of the run, are those just before it.
 _ROUNDING = 1e-12
 
@@ -42,7 +39,7 @@ _ROUNDING = 1e-12
 @given_as("a saved simulation", "what Simulation.save returned")
 @dataclass(frozen=True)
 class Saved:
-    """All that a simulation goes on from: see `Simulation.save`.
+    """The whole state of a simulation: see `Simulation.save`.
 
     Attributes
     ----------
@@ -52,8 +49,7 @@ class Saved:
 
     time: float
     kept: Kept
-    held: Array
-    log: TorqueLog
+    torques: SavedTorques
     loop: Loop | None
     controllers: Any
 
@@ -126,10 +122,9 @@ class Simulation:
         self.task: TrackingTask | None = source if isinstance(source, TrackingTask) else None
         self.mechanism: Mechanism = source.mechanism if isinstance(source, TrackingTask) else Mechanism.made_of(source)
         self.mode: ActuationMode = _mode(self.mechanism, mode)
-        own = [motor.name for motor in self.mechanism.motors]
-        self.motors: tuple[str, ...] = tuple(name for name in own if name in self.mode.motors)
-        self._active = [own.index(name) for name in self.motors]
-        self._torques = FeedForward(self.mode, (), np.zeros(0), np.zeros(0))
+        names = [motor.name for motor in self.mechanism.motors]
+        self.motors: tuple[str, ...] = tuple(name for name in names if name in self.mode.motors)
+        planned = FeedForward(self.mode, (), np.zeros(0), np.zeros(0))
         self._fed_forward = feed_forward
         if isinstance(source, TrackingTask):
             _refuse(source, duration=duration, start=start)
@@ -141,7 +136,7 @@ class Simulation:
             self._times: Array = task.motion.t
             self._condition = actuation_condition(task.effort, self.mode)
             if feed_forward:
-                self._torques = task.torques(self.mode)
+                planned = task.torques(self.mode)
         else:
             if feed_forward:
                 raise InputError("there is no plan whose torques could act", field="feed_forward", value=True,
@@ -149,35 +144,18 @@ class Simulation:
             begun = motion_start(source, duration, samples, start, balanced=balanced)
             self.system, self._initial, self._times = begun
         self.end: float = float(self._times[-1])
-        self._amplifiers = Amplifiers(self.mechanism)
-        self._limited = self._amplifiers.limited & np.isin(np.arange(len(own)), self._active)
-        self._pack()
+        began = self._initial.time
+        self._torques = HeldTorques(self.system, self.mechanism, self.motors, planned, began, self.end)
         self._readings = Readings(self.system, measured_sensors(self.system.mechanism))
         self._watched = self._readings
         self.sensors_read: tuple[str, ...] = self._readings.names
         self._integration = Integration(
-            self.system, self._signals, self._initial, self._times, knots=self._knots, options=self._options,
-            samples=self._times.size,
+            self.system, self._torques.signals, self._initial, self._times, knots=self._torques.knots,
+            options=self._options, samples=self._times.size,
         )  # fmt: skip
         self._loop: Loop | None = None
-        self._held = np.zeros(len(own))
-        self._log = TorqueLog(self._amplifiers.lags, self._initial.time)
         self._integration.start()
         self._fresh = self.save()
-
-    def _pack(self) -> None:
-        """Signals of motors, of which the first coefficients are those of given torques as well."""
-        motors: Sequence[InputSignals] = self._torques.signals or constant_signals(
-            [0.0] * len(self.mechanism.motors), self.end
-        )
-        if not self._torques.signals:
-            self._torques = replace(self._torques, signals=tuple(motors))
-        lags = self._amplifiers.lags
-        motors = [with_room(each) if lag else each for each, lag in zip(motors, lags, strict=True)]
-        self._signals, knots = pack_signals(self.system.mechanism, motors, self.end)
-        smooth = path_stops(self._torques.knots, self.mechanism)
-        self._knots = np.sort(np.concatenate([smooth, knots]))
-        self._base = self._signals.coefficients[:, 0].copy()
 
     # --- Step by step ---
 
@@ -218,8 +196,8 @@ class Simulation:
         IntegrationError
             It cannot go on; it carries the run so far. An event of the options that ends it does as well.
         """
-        given = self._given(torques)
-        if not self.time < until <= self.end * (1.0 + _SAME):
+        given = self._torques.given(torques)
+        if not is_number(until) or not self.time < until <= self.end * (1.0 + SAME):
             raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
                              value=until, remedy="give a later time in it, or reset the simulation")  # fmt: skip
         self._use(None)
@@ -236,16 +214,16 @@ class Simulation:
         return self._integration.status == "stopped" or self.time >= self.end
 
     def save(self) -> Saved:
-        """All that it goes on from, controllers included: continued from there it gives the same bits."""
+        """The whole state, controllers included: a run restored from it continues bit for bit."""
         loop = self._loop
         controllers = None if loop is None else loop.saved()
-        return Saved(self.time, self._integration.saved(), self._held.copy(), self._log.copy(), loop, controllers)
+        return Saved(self.time, self._integration.saved(), self._torques.saved(), loop, controllers)
 
+    @checked_arguments()
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` gave, of this simulation."""
         self._integration.restore(saved.kept)
-        self._held, self._log = saved.held.copy(), saved.log.copy()
-        self._hold()
+        self._torques.restore(saved.torques)
         self._use(saved.loop)
         if saved.loop is not None:
             saved.loop.restore(saved.controllers)
@@ -271,7 +249,7 @@ class Simulation:
         until : float, optional
             Up to when [s]; to the end by default.
         on_progress : callable, optional
-            Told the time reached [s]. A KeyboardInterrupt ends the run with what is there, marked "interrupted".
+            Called with the time reached [s]. A KeyboardInterrupt ends the run with what is there, marked "interrupted".
         warning : bool
             Whether a run that is doubtful issues warnings, as of `simulate`.
 
@@ -282,26 +260,17 @@ class Simulation:
         Raises
         ------
         InputError
-            Controllers with unknown sensors or motors, or with periods that are no multiples of the shortest; a law
-            that gives the whole torque beside another or beside feed-forward.
+            Controllers with unknown sensors or motors, or one named twice, or with periods that are no multiples of the
+            shortest; a law that gives the whole torque beside another or beside feed-forward.
         ControllerError
             One raised an error, or returned what cannot be torques; it carries the run so far.
         IntegrationError
             It cannot go on; it carries the run so far.
         """
-        if controllers is not None:
-            self.restore(self._fresh)
-            given = controllers if isinstance(controllers, list | tuple) else [controllers]
-            several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
-                       for each in given]  # fmt: skip
-            start = self._initial.time
-            loop = Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None
-            if loop is not None and loop.whole and self._fed_forward:
-                raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
-                                 remedy="leave feed_forward of the simulation out")  # fmt: skip
-            self._use(loop)
         end = self.end if until is None else min(until, self.end)
         try:
+            if controllers is not None:
+                self._begin(controllers if isinstance(controllers, list | tuple) else [controllers])
             while self.time < end and not self.ended:
                 self._go_on(end, on_progress)
                 if on_progress is not None:
@@ -319,17 +288,29 @@ class Simulation:
             warn_of(made.doubts, ResultWarning)
         return made
 
+    def _begin(self, controllers: Sequence[Any]) -> None:
+        """Start anew under controllers; in open loop under none."""
+        self.restore(self._fresh)
+        several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
+                   for each in controllers]  # fmt: skip
+        start = self._initial.time
+        loop = Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None
+        if loop is not None and loop.whole and self._fed_forward:
+            raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
+                             remedy="leave feed_forward of the simulation out")  # fmt: skip
+        self._use(loop)
+
     def _go_on(self, end: float, on_progress: Callable[[float], None] | None) -> None:
         """To the next instant of the controllers, or to the end."""
         loop = self._loop
         if loop is None or loop.inside is not None:
             self._march(end, on_progress=on_progress)
             return
-        slack = _SAME * loop.period
+        slack = SAME * loop.period
         if loop.next <= self.time + slack:
             changed = loop.act(lambda: self._read(self._watched))
             if changed is not None:
-                self._apply(self._of_all(changed))
+                self._apply(self._torques.of_all(changed))
         until = min(end, loop.next)
         if until > self.time + slack:
             self._march(until, slack)
@@ -362,7 +343,8 @@ class Simulation:
         """The run with a solution."""
         k = solution.t.size - bool(solution.event)
         slack = _ROUNDING * (self.end - self._initial.time)
-        given, commanded = self._log.at(solution.t, slack), self._log.given(solution.t, slack)
+        log = self._torques.log
+        given, commanded = log.at(solution.t, slack), log.given(solution.t, slack)
         motors = {motor.name: unit for motor, unit in zip(self.mechanism.motors, self.mechanism.motor_units(),
                                                            strict=True)}  # fmt: skip
         records = () if self._loop is None else self._loop.records(motors.__getitem__)
@@ -370,9 +352,9 @@ class Simulation:
             times = solution.t if solution.event else self._times
             none = dict.fromkeys(motors, 0.0)
             return ControlledMotion(self.system, times, none, solution, given, commanded, records)
-        planned = self._torques.evaluate(solution.t[:k])
+        planned = self._torques.planned.evaluate(solution.t[:k])
         title = self._options.method.title
-        return ControlledTracking(self.task, self._torques, self._condition, solution, title,
+        return ControlledTracking(self.task, self._torques.planned, self._condition, solution, title,
                                   acting=given[:k] + planned, commanded=commanded[:k] + planned,
                                   controllers=records)  # fmt: skip
 
@@ -391,14 +373,14 @@ class Simulation:
     def _inside(self, loop: Loop) -> SampledLaw | None:
         """A loop for the compiled time loop; None where it stays outside."""
         # What amplifiers do to torques is not known there.
-        if loop.alone is None or self._limited.any() or np.any(self._amplifiers.lags):
+        if loop.alone is None or self._torques.limited.any() or np.any(self._torques.amplifiers.lags):
             return None
         controller, plant = loop.alone
         if plant.inputs != loop.read:
             return None
         own = [motor.name for motor in self.mechanism.motors]
         outputs = [own.index(name) for name in plant.outputs]
-        return sampled_law(controller, plant, self._watched, outputs, self._base, len(own), self.end)
+        return sampled_law(controller, plant, self._watched, outputs, self._torques.base, len(own), self.end)
 
     def _plant(self, controller: Controller) -> Plant:
         outputs = tuple(controller.outputs) or self.motors
@@ -409,70 +391,20 @@ class Simulation:
             controller.period, controller.delay,
         )  # fmt: skip
 
-    def _given(self, torques: Torques) -> Array:
-        """Torques of all motors from those of some."""
-        if isinstance(torques, Mapping):
-            for name in torques:
-                known(name, self.motors, "torques", "motor")
-            torques = [torques.get(name, 0.0) for name in self.motors]
-        given = np.asarray(torques, dtype=float)
-        if given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
-            raise InputError(f"not {len(self.motors)} finite numbers", field="torques", value=torques,
-                             remedy=f"give one each of {', '.join(self.motors)}")  # fmt: skip
-        return self._of_all(given)
-
-    def _of_all(self, torques: Array) -> Array:
-        """Torques of all motors from those of the mode's."""
-        everything = np.zeros(len(self._held))
-        everything[self._active] = torques
-        return everything
-
     def _read(self, readings: Readings) -> Array:
         """Readings now."""
         now = self._integration.run.now()
-        torques = self._log.now(now.t) + self._planned(now.t) if readings.of_torques else np.zeros(len(self._held))
+        torques = self._torques.acting(now.t) if readings.of_torques else np.zeros(len(self._torques.held))
         return readings(now, torques)
 
-    def _planned(self, t: float) -> Array:
-        """Torques (motors,) of the plan at a time; zero without one."""
-        return self._torques.evaluate(np.array([t]))[0]
-
     def _apply(self, torques: Array) -> None:
-        """Let torques (motors,) of all motors act from now on, as far as their amplifiers can."""
-        torques = self._within_limits(torques)
-        changed = not np.array_equal(torques, self._held)
-        if changed or not self._log.begun:
-            self._log.note(self.time, torques)
-        if not changed:
+        """Let torques (motors,) of all motors act from now on."""
+        if not self._torques.hold(torques, self.time, lambda: self.state):
             return
-        self._held = torques
-        self._hold()
         if self._integration.run.attempts == 0:
             self._integration.start()
         else:
             self._integration.resume()
-
-    def _within_limits(self, torques: Array) -> Array:
-        """Torques (motors,) that with those of the plan are within the limits of amplifiers at the speed now."""
-        if not self._limited.any():
-            return torques
-        now = self._integration.run.now()
-        low, high = self._amplifiers.limits(self._amplifiers.rates(self.system, now.q, now.v))
-        planned = self._planned(now.t)
-        return np.where(self._limited, np.clip(torques, low - planned, high - planned), torques)
-
-    def _hold(self) -> None:
-        """Write the torques held into the signals."""
-        breaks, coefficients, start = self._signals.breaks, self._signals.coefficients, self._signals.start
-        since, begun, given = self._log.last
-        for k, lag in enumerate(self._amplifiers.lags):
-            pieces = slice(start[k], start[k + 1] - 1)
-            if not lag:
-                coefficients[pieces, 0] = self._base[pieces] + given[k]
-                continue
-            signal = relaxing(self._torques.signals[k], since, begun[k], given[k], lag)
-            whole = with_room(signal, pieces.stop - pieces.start)
-            breaks[pieces], coefficients[pieces] = whole.breaks[:-1], whole.coefficients
 
     def _march(
         self, until: float, slack: float | None = None, on_progress: Callable[[float], None] | None = None
@@ -480,7 +412,7 @@ class Simulation:
         """March to a time, or to a stop of the run that is the same but for rounding."""
         stops = self._integration.run.problem.stops
         near = stops[int(np.argmin(np.abs(stops - until)))]
-        if abs(near - until) <= (_SAME * (until - self.time) if slack is None else slack):
+        if abs(near - until) <= (SAME * (until - self.time) if slack is None else slack):
             until = float(near)
         try:
             self._integration.march(until, on_progress=on_progress)
@@ -495,9 +427,8 @@ class Simulation:
         """Note which torques acted in the compiled time loop."""
         if self._loop is None:
             return
-        for t, torques in self._loop.torques_acted(len(self._log)):
-            self._log.note(t, torques)
-            self._held = torques
+        for t, torques in self._loop.torques_acted(len(self._torques.log)):
+            self._torques.note(t, torques)
 
 
 def _projecting(options: IntegrationOptions) -> IntegrationOptions:

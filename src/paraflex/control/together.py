@@ -3,13 +3,76 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from paraflex.errors import InputError
+from paraflex.mechanism.quantities import known, positive
 
 # Instants closer than this part of the shortest period are one.
 SAME = 1e-9
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a real number, not NaN."""
+    return isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool) and value == value
+
+
+def checked_number(value: Any, field: str, unit: str, check: Callable[..., None] = positive) -> float:
+    """A number in a unit that passes a check, such as `positive`.
+
+    Raises
+    ------
+    InputError
+        It is missing, is no number, or does not pass.
+    """
+    if value is None or not is_number(value):
+        raise InputError("is missing" if value is None else "is no number", field=field, value=value,
+                         remedy=f"give it in {unit}")  # fmt: skip
+    check(float(value), field, unit)
+    return float(value)
+
+
+def by_name(
+    given: Any, names: Sequence[str], field: str, what: str, take: Callable[[Any, str], Any]
+) -> dict[str, Any]:  # fmt: skip
+    """What is given by name, or of every name where one value is given for all.
+
+    Parameters
+    ----------
+    given : any or mapping of str to any
+    names : sequence of str
+    field, what : str
+        For errors: the field, and what is named.
+    take : callable
+        Of a value and its field gives what it stands for, or raises.
+
+    Raises
+    ------
+    InputError
+        A name that is none of them.
+    """
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(names, take(given, field))
+    for name in given:
+        known(name, names, field, what)
+    return {name: take(value, f"{field}.{name}") for name, value in given.items()}
+
+
+def check_distinct(names: Sequence[str], among: Collection[str], field: str, what: str) -> None:
+    """Check that names are some of others, each named once.
+
+    Raises
+    ------
+    InputError
+        One that is not among them, or that is given twice.
+    """
+    for k, name in enumerate(names):
+        known(name, among, field, what)
+        if name in names[:k]:
+            raise InputError("is named twice", field=field, value=name, remedy="name it once")
 
 
 def whole_and_part(periods: float) -> tuple[int, float]:
@@ -18,6 +81,11 @@ def whole_and_part(periods: float) -> tuple[int, float]:
     if abs(periods - nearest) <= SAME * max(1.0, nearest):
         return nearest, 0.0
     return math.floor(periods), periods - math.floor(periods)
+
+
+def same_period(one: float, other: float) -> bool:
+    """Whether two periods are the same but for rounding."""
+    return abs(one - other) <= SAME * other
 
 
 def multiple_of(name: str, period: float, shortest: float) -> int:

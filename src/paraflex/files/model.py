@@ -137,6 +137,10 @@ class Model(CheckedFields):
         wanted = list(dict.fromkeys(names or self.study.controllers))
         if wanted == [NONE]:
             return ()
+        if NONE in wanted:
+            raise InputError(
+                "goes with no other", field="controllers", value=NONE, remedy="say it alone, or leave it out"
+            )
         for name in wanted:
             known(name, self.controllers, "controllers", "controller")
         found = tuple(self.controllers[name] for name in wanted)

@@ -782,7 +782,9 @@ class StudyDefaultsTable(_Table):
         default=[], description="names of [controller.NAME] tables that act, beside the torques planned along a path"
     )
     shaper: ShaperTable | None = Field(
-        default=None, description="the input shaper of torques planned along a path: none by default"
+        default=None,
+        description="the input shaper of torques planned along a path, as "
+        '{ type = "zvd", frequencies = ["9 Hz"] }: none by default',
     )
     orientation: Number | None = Field(
         default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"

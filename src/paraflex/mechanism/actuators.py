@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from enum import Enum
 from math import inf, pi, sqrt
@@ -120,10 +121,11 @@ class Actuator(CheckedFields):
         for other in others:
             if asked and getattr(self, other) is None:
                 word = other.replace("_", " ")
-                value = f"{given} = {getattr(getattr(self, given), 'value', getattr(self, given))}"
+                value = getattr(self, given)
+                said_so = f"{given} = {json.dumps(getattr(value, 'value', value))}"
                 raise InputError(
                     "is missing", field=f"actuator.{self.name}.{other}",
-                    remedy=f"give the {word}, which {value} needs, or leave that out",
+                    remedy=f"give the {word}, which {said_so} needs, or leave that out",
                 )  # fmt: skip
 
     def _refused(self, name: str, problem: str, remedy: str) -> InputError:

@@ -175,6 +175,11 @@ def check_shapes(data: xr.Dataset) -> None:
             "these are no run, and nothing moves in them", field="results",
             remedy="paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
         )  # fmt: skip
+    if kind_of(data) == "laws":
+        raise InputError(
+            "a comparison of control laws keeps no motions", field="results",
+            remedy="paraflex plot draws law_comparison; paraflex run --controller NAME keeps the motion of one law",
+        )  # fmt: skip
     if "shape" not in data:
         raise InputError(
             "these results hold no shapes of links: they are of an earlier version", field="results",

@@ -1,0 +1,164 @@
+"""Torques that are held from one instant to the next: as they are given, limited, written into signals and noted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from paraflex.actuation import FeedForward
+from paraflex.arrays import Array
+from paraflex.control.amplifiers import Amplifiers, relaxing, with_room
+from paraflex.control.runs import TorqueLog
+from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
+from paraflex.errors import InputError
+from paraflex.mechanism import Mechanism
+from paraflex.mechanism.quantities import known
+from paraflex.tracking import path_stops
+
+Torques = Sequence[float] | Mapping[str, float] | Array
+
+
+class SavedTorques(NamedTuple):
+    """Torques held (motors,), and which acted before."""
+
+    held: Array
+    log: TorqueLog
+
+
+class HeldTorques:
+    """Torques of a mechanism's motors that are held, besides those of a plan, behind amplifiers.
+
+    Parameters
+    ----------
+    system : System
+    mechanism : Mechanism
+        As described.
+    motors : tuple of str
+        Those that torques are given for, in the order of the mechanism.
+    planned : FeedForward
+        Of all motors; without signals none act.
+    start, end : float
+        Of the run [s].
+
+    Attributes
+    ----------
+    planned : FeedForward
+        With signals, of zero torques where there are none.
+    signals : kernel signals
+        Which the integration reads.
+    knots : (k,) array
+        Times at which signals are not smooth [s].
+    amplifiers : Amplifiers
+    limited : (motors,) array of bool
+        Whether an amplifier limits the torques that are given.
+    base : (pieces,) array
+        Planned torques at the starts of the signals' pieces [N m, N].
+    held : (motors,) array
+        Of all motors [N m, N].
+    log : TorqueLog
+    """
+
+    def __init__(
+        self, system: System, mechanism: Mechanism, motors: tuple[str, ...], planned: FeedForward, start: float,
+        end: float,
+    ) -> None:  # fmt: skip
+        own = [motor.name for motor in mechanism.motors]
+        self.motors: tuple[str, ...] = motors
+        self._system = system
+        self._active = [own.index(name) for name in motors]
+        self.amplifiers: Amplifiers = Amplifiers(mechanism)
+        self.limited: np.ndarray = self.amplifiers.limited & np.isin(np.arange(len(own)), self._active)
+        signals = planned.signals or tuple(constant_signals([0.0] * len(own), end))
+        self.planned: FeedForward = replace(planned, signals=signals)
+        lags = self.amplifiers.lags
+        several: list[InputSignals] = [
+            with_room(each) if lag else each for each, lag in zip(signals, lags, strict=True)
+        ]
+        self.signals, knots = pack_signals(system.mechanism, several, end)
+        self.knots: Array = np.sort(np.concatenate([path_stops(planned.knots, mechanism), knots]))
+        # The first coefficients of signals are those of held torques as well.
+        self.base: Array = self.signals.coefficients[:, 0].copy()
+        self.held: Array = np.zeros(len(own))
+        self.log: TorqueLog = TorqueLog(lags, start)
+
+    def given(self, torques: Torques) -> Array:
+        """Torques of all motors (all,) from those of `motors`, or of some of them by name.
+
+        Raises
+        ------
+        InputError
+            Unknown motors, other numbers of torques, none that are finite.
+        """
+        if isinstance(torques, Mapping):
+            for name in torques:
+                known(name, self.motors, "torques", "motor")
+            torques = [torques.get(name, 0.0) for name in self.motors]
+        try:
+            given = np.asarray(torques, dtype=float)
+        except (TypeError, ValueError):
+            given = np.full(1, np.nan)
+        if given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
+            raise InputError(f"not {len(self.motors)} finite numbers", field="torques", value=torques,
+                             remedy=f"give one each of {', '.join(self.motors)}")  # fmt: skip
+        return self.of_all(given)
+
+    def of_all(self, torques: Array) -> Array:
+        """Torques of all motors (all,) from those of `motors`; zero for others."""
+        everything = np.zeros(len(self.held))
+        everything[self._active] = torques
+        return everything
+
+    def planned_at(self, t: float) -> Array:
+        """Torques (all,) of the plan at a time [s]; zero without one."""
+        return self.planned.evaluate(np.array([t]))[0]
+
+    def acting(self, t: float) -> Array:
+        """Torques (all,) that act at the time reached [s], those of the plan included."""
+        return self.log.now(t) + self.planned_at(t)
+
+    def hold(self, torques: Array, t: float, state: Callable[[], State]) -> bool:
+        """Let torques (all,) act from a time on [s], as far as amplifiers can; whether any changes."""
+        if self.limited.any():
+            torques = self._within_limits(torques, state())
+        changed = not np.array_equal(torques, self.held)
+        if changed or not self.log.begun:
+            self.note(t, torques)
+        if changed:
+            self._write()
+        return changed
+
+    def note(self, t: float, torques: Array) -> None:
+        """Note torques (all,) that act from a time on [s]."""
+        self.log.note(t, torques)
+        self.held = torques
+
+    def saved(self) -> SavedTorques:
+        """What `restore` goes back to."""
+        return SavedTorques(self.held.copy(), self.log.copy())
+
+    def restore(self, saved: SavedTorques) -> None:
+        """Go back to what `saved` gave."""
+        self.held, self.log = saved.held.copy(), saved.log.copy()
+        self._write()
+
+    def _within_limits(self, torques: Array, now: State) -> Array:
+        """Torques (all,) that with those of the plan are within the limits of amplifiers at the speed now."""
+        low, high = self.amplifiers.limits(self.amplifiers.rates(self._system, now.q, now.v))
+        planned = self.planned_at(now.time)
+        return np.where(self.limited, np.clip(torques, low - planned, high - planned), torques)
+
+    def _write(self) -> None:
+        """Write the torques held into the signals."""
+        breaks, coefficients, start = self.signals.breaks, self.signals.coefficients, self.signals.start
+        since, begun, given = self.log.last
+        for k, lag in enumerate(self.amplifiers.lags):
+            pieces = slice(start[k], start[k + 1] - 1)
+            if not lag:
+                coefficients[pieces, 0] = self.base[pieces] + given[k]
+                continue
+            signal = relaxing(self.planned.signals[k], since, begun[k], given[k], lag)
+            whole = with_room(signal, pieces.stop - pieces.start)
+            breaks[pieces], coefficients[pieces] = whole.breaks[:-1], whole.coefficients

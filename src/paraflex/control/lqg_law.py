@@ -1,0 +1,222 @@
+"""What a linear-quadratic design comes to: state feedback, and the law that acts on a filter's estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paraflex.arrays import Array
+from paraflex.control.controllers import Plant
+from paraflex.control.estimators import KalmanFilter
+from paraflex.control.linear_law import LinearLaw
+from paraflex.control.sampled import SampledPlant
+from paraflex.control.together import same_period
+from paraflex.errors import InputError
+from paraflex.linear.zeros import StateSpace
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Regulator:
+    """State feedback u = -`gain` [x; integrals] of a sampled plant.
+
+    Attributes
+    ----------
+    plant : SampledPlant
+        With torques under way among its states.
+    motors : tuple of str
+        Inputs that it acts on.
+    gain : (motors, n + integrated) array
+        K.
+    integrated : tuple of str
+        Outputs whose sums over time are fed back, too.
+    poles : (n + integrated,) array
+        Of the plant with this feedback, z.
+    """
+
+    plant: SampledPlant
+    motors: tuple[str, ...]
+    gain: Array
+    integrated: tuple[str, ...]
+    poles: Complex
+
+    @property
+    def spectral_radius(self) -> float:
+        """The largest magnitude of the poles."""
+        return float(np.max(np.abs(self.poles), initial=0.0))
+
+
+@dataclass(frozen=True)
+class LQGDesign:
+    """A regulator that acts on the estimate of a Kalman filter.
+
+    Attributes
+    ----------
+    regulator : Regulator
+    filter : KalmanFilter
+    measured : tuple of str
+        Outputs that the filter is given, in this order.
+    start : (n, measured) array
+        The first estimate from the first readings: at rest, displaced in what moves freely.
+    """
+
+    regulator: Regulator
+    filter: KalmanFilter
+    measured: tuple[str, ...]
+    start: Array
+
+    @property
+    def K(self) -> Array:
+        """Gain (motors, n + integrated) of the feedback, u = -K [x; integrals]."""
+        return self.regulator.gain
+
+    @property
+    def L(self) -> Array:
+        """Gain (n, measured) of the filter."""
+        return self.filter.gain
+
+    @property
+    def poles(self) -> Complex:
+        """Of the closed loop on the plant of the design: those of the regulator and of the filter, z."""
+        return np.concatenate([self.regulator.poles, self.filter.poles])
+
+    @property
+    def spectral_radius(self) -> float:
+        """The largest magnitude of the poles."""
+        return float(np.max(np.abs(self.poles), initial=0.0))
+
+    @property
+    def period(self) -> float:
+        """Of sampling [s]."""
+        return self.regulator.plant.period
+
+    @property
+    def delay(self) -> float:
+        """Delay that the design accounts for [s]."""
+        return self.regulator.plant.delay
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Sensors: `measured`."""
+        return self.measured
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Motors, those of the regulator."""
+        return self.regulator.motors
+
+    @cached_property
+    def state_space(self) -> StateSpace:
+        """The law without limits, from readings to torques: x_k+1 = A x_k + B y_k, u_k = C x_k + D y_k.
+
+        States are the estimate before the reading, and integrals.
+        """
+        one, L, n = self.filter, self.L, len(self.filter.A)
+        rows, _ = self._integrals
+        K, K_i = np.split(self.K, [n], axis=1)
+        rest = np.eye(n) - L @ one.C
+        C, D = np.hstack([-K @ rest, -K_i]), -K @ L
+        A = np.vstack([np.hstack([one.A @ rest, np.zeros((n, len(rows)))]) + one.B @ C,
+                       np.eye(len(rows), n + len(rows), n)])  # fmt: skip
+        return StateSpace(A, np.vstack([one.A @ L + one.B @ D, rows]), C, D)
+
+    @property
+    def _integrals(self) -> tuple[Array, list[int]]:
+        """What a reading adds to integrals (integrated, measured), and which readings these are."""
+        columns = [self.measured.index(name) for name in self.regulator.integrated]
+        return self.period * np.eye(len(self.measured))[columns], columns
+
+    def law(self) -> LQGLaw:
+        """The law, at the beginning of a run, for `SampledController`."""
+        return LQGLaw(self)
+
+
+class LQGLaw:
+    """A `LQGDesign` as a law: torques from errors of readings, with its estimate as its state.
+
+    `limited` takes note of limits: the estimate goes on with the torques that were given, and integrals stay while any
+    torque is limited.
+
+    Attributes
+    ----------
+    design : LQGDesign
+    period, delay : float
+        [s]
+    inputs, outputs : tuple of str
+        Sensors and motors.
+    x : (n,) array
+        The estimate after the last reading.
+    integrals : (integrated,) array
+    """
+
+    def __init__(self, design: LQGDesign) -> None:
+        self.design = design
+        self.period: float = design.period
+        self.delay: float = design.delay
+        self.inputs: tuple[str, ...] = design.inputs
+        self.outputs: tuple[str, ...] = design.outputs
+        self._reset()
+
+    def _reset(self) -> None:
+        self.x: Array | None = None
+        self.integrals: Array = np.zeros(len(self.design.regulator.integrated))
+        self._wanted: Array = np.zeros(len(self.outputs))
+        self._given: Array = self._wanted
+        self._read: Array = np.zeros(len(self.inputs))
+
+    @property
+    def state_space(self) -> StateSpace:
+        """See `LQGDesign.state_space`."""
+        return self.design.state_space
+
+    def start(self, plant: Plant) -> None:
+        """Forget an earlier run.
+
+        Raises
+        ------
+        InputError
+            Sensors, motors or a period other than those of the design.
+        """
+        pairs = (("inputs", self.inputs, plant.inputs), ("outputs", self.outputs, plant.outputs))
+        for field, wanted, have in pairs:
+            if tuple(have) != wanted:
+                raise InputError("are not those of the design, in its order", field=field, value=", ".join(have),
+                                 remedy=f"leave them out, or say {', '.join(wanted)}")  # fmt: skip
+        if not same_period(plant.period, self.period):
+            raise InputError(f"the design is for {self.period:g} s", field="period", value=plant.period,
+                             remedy="leave it out, or design for that period")  # fmt: skip
+        self._reset()
+
+    def step(self, k: int, t: float, y: Array) -> Array:
+        """Torques (motors,) that follow from errors y (measured,) at sample k."""
+        design = self.design
+        if self.x is None:
+            before = design.start @ y
+        else:
+            before = design.filter.carried_on(self.x, self._given)
+            if np.array_equal(self._given, self._wanted):
+                self.integrals = self.integrals + design._integrals[0] @ self._read
+        self.x = design.filter.corrected(before, y)
+        self._read = np.array(y, dtype=float)
+        self._wanted = -design.K @ np.concatenate([self.x, self.integrals])
+        self._given = self._wanted
+        return self._wanted.copy()
+
+    def linear_law(self) -> LinearLaw:
+        """For the compiled time loop: states are the estimate before the reading, and integrals."""
+        design, states = self.design, self.state_space
+        n, more = len(design.filter.A), len(self.integrals)
+        return LinearLaw(
+            *states,
+            E=np.vstack([-design.filter.B, np.zeros((more, len(self.outputs)))]),
+            first=np.vstack([design.start, np.zeros((more, len(self.inputs)))]),
+            waiting=(np.arange(n + more) >= n).astype(float),
+        )
+
+    def limited(self, torques: Array) -> None:
+        """Take note of the torques (motors,) that are given in place of those that were wanted."""
+        self._given = np.array(torques, dtype=float)
