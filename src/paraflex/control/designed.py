@@ -90,8 +90,7 @@ class DesignedLQG:
         if states is not None and states < 1:
             raise InputError("no such number of states", field="states", value=states, remedy="say 16, or leave it out")
         self.outputs: tuple[str, ...] = tuple(effort) if isinstance(effort, Mapping) else ()
-        self._weights = {"deviations": deviations, "disturbance": disturbance}
-        self._effort = effort
+        self._weights = {"deviations": deviations, "effort": effort, "disturbance": disturbance}
         self._integrators: Mapping[str, float] = integrators or {}
         self._coloured: Mapping[str, Any] = coloured or {}
         self._noise, self._states, self._at = noise, states, at
@@ -112,9 +111,8 @@ class DesignedLQG:
         flexible = any(body.nf for body in full.minimal.system.bodies)
         few = reduce(full, self._states) if flexible else full
         integrators = {name: time for name, time in self._integrators.items() if name in plant.inputs}
-        effort = self._effort if isinstance(self._effort, Mapping) else dict.fromkeys(plant.outputs, self._effort)
         self.design = lqg(few, plant.period, delay=plant.delay, measured=plant.inputs, noise=self._noise_of(plant),
-                          integrators=integrators, coloured=coloured, effort=effort, **self._weights)  # fmt: skip
+                          integrators=integrators, coloured=coloured, **self._weights)  # fmt: skip
         loop = closed_loop(full, self.design)
         self.findings = () if loop.stable else (
             Finding(

@@ -49,7 +49,8 @@ def lqr(
     deviations : mapping of str to float
         Largest that are allowed of outputs, in their units: an output's weight is one over its square (Bryson's rule).
     effort : float or mapping of str to float
-        Largest torques or forces, of all inputs or by motor [N m, N]. Inputs that are not named are not used.
+        Largest torques or forces, of all motors or by input [N m, N]. Inputs that are not named are not used, nor are
+        forces at points, "link.tip.x", where one number is given.
     delay : float
         From a sample until its torques act [s].
     integrators : mapping of str to float, optional
@@ -147,10 +148,16 @@ class _Cost(NamedTuple):
     R: Array
 
 
+def _is_force(name: str) -> bool:
+    """Whether an input is a force at a point of a linear model, and no motor."""
+    return name.count(".") > 1 and name.endswith((".x", ".y"))
+
+
 def _regulator(
     plant: SampledPlant, deviations: Mapping[str, float], effort: Any, integrators: Mapping[str, float], extra: Any
 ) -> Regulator:
-    efforts = _by_name(effort, plant.inputs, "effort", "N m or N")
+    usable = plant.inputs if isinstance(effort, Mapping) else [name for name in plant.inputs if not _is_force(name)]
+    efforts = _by_name(effort, usable, "effort", "N m or N")
     largest = _by_name(deviations, plant.outputs, "deviations", "the unit of the output")
     times = _by_name(integrators, plant.outputs, "integrators", "s")
     for name in times:
