@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import positive
 
 
@@ -246,13 +245,6 @@ class BackwardDifference:
         self.share: float = 1.0 if cutoff is None else 1.0 - float(np.exp(-2.0 * np.pi * cutoff * period))
         self._before: Array | None = None
         self._rate: Array = np.zeros(0)
-
-    @property
-    def state_space(self) -> StateSpace:
-        """From one reading to its rate; states are the reading and the rate of the sample before."""
-        a, T = self.share, self.period
-        return StateSpace(np.array([[0.0, 0.0], [-a / T, 1.0 - a]]), np.array([[1.0], [a / T]]),
-                          np.array([[-a / T, 1.0 - a]]), np.array([[a / T]]))  # fmt: skip
 
     def start(self) -> None:
         """Forget what was read: the next reading begins at rest."""

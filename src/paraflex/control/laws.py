@@ -9,6 +9,7 @@ matrix on the planned motion.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from paraflex.actuation import Effort, required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
-from paraflex.control.discrete import DiscreteModel, side_by_side
+from paraflex.control.discrete import DiscreteModel
 from paraflex.control.estimators import BackwardDifference, checked_cutoff
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.references import PLAN, AtSamples, planned_motion
@@ -118,11 +119,9 @@ class JointPID:
         if len(joints) != len(names):
             raise InputError(f"{len(joints)} joints for {len(names)} motors", field="motors", value=", ".join(names),
                              remedy="name motors of the mechanism, one of each joint")  # fmt: skip
-        gains = np.array([gains_of(gain, names, field) for field, gain in self._gains.items()])
-        rates = BackwardDifference(period, self._cutoff)
-        return side_by_side(
-            [_sampled_pid(each, rates, *one) for each, *one in zip(gains.T, joints, names, strict=True)]
-        )
+        Kp, Kd, Ki = (gains_of(gain, names, field) for field, gain in self._gains.items())
+        law = _pid(Kp, Kd, Ki, BackwardDifference(period, self._cutoff))
+        return DiscreteModel(law.A, law.B, law.C, law.D, period, joints, names)
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`; y are errors of angles."""
@@ -147,29 +146,23 @@ class JointPID:
 
     def linear_law(self) -> LinearLaw:
         """For the compiled time loop: states are the errors before, their rates and the integrals."""
-        none, one = np.zeros((len(self._Kp),) * 2), np.eye(len(self._Kp))
-        rates = self._rates.linear_law(len(one))
-        gain = np.diag(self._Ki * self._period)
-        return LinearLaw(
-            A=scipy.linalg.block_diag(rates.A, one),
-            B=np.vstack([rates.B, gain]),
-            C=-np.hstack([self._Kd[:, None] * rates.C, one]),
-            D=-(np.diag(self._Kp) + self._Kd[:, None] * rates.D + gain),
-            E=np.vstack([none, none, np.diag(self._pace)]),
-            first=np.vstack([rates.first, none]),
-            projector=None if self._projector is None else self._projector.values,
-        )
+        law = _pid(self._Kp, self._Kd, self._Ki, self._rates)
+        back = np.diag(self._pace)[self._Ki > 0.0]
+        E = np.vstack([np.zeros((len(law.A) - len(back), len(self._Kp))), back])
+        return replace(law, E=E, projector=None if self._projector is None else self._projector.values)
 
 
-def _sampled_pid(gains: Array, rates: BackwardDifference, joint: str, motor: str) -> DiscreteModel:
-    """-(Kp y + Kd y' + sum of Ki T y) of one joint, with gains (3,)."""
-    (Kp, Kd, Ki), period = gains, rates.period
-    A, B, C, D = rates.state_space
-    law = DiscreteModel(A, B, -Kd * C, -(Kp + Kd * D), period, (joint,), (motor,))
-    if not Ki:
-        return law
-    one, step = np.eye(1), np.full((1, 1), Ki * period)
-    return side_by_side([law, DiscreteModel(one, step, -one, -step, period, (joint,), (motor,))])
+def _pid(Kp: Array, Kd: Array, Ki: Array, rates: BackwardDifference) -> LinearLaw:
+    """-(Kp y + Kd y' + sum of Ki T y), with gains (motors,): states are those of the rates, and sums where Ki is."""
+    one, summed = rates.linear_law(len(Kp)), np.eye(len(Kp))[Ki > 0.0]
+    gain = np.diag(Ki * rates.period)
+    return LinearLaw(
+        A=scipy.linalg.block_diag(one.A, np.eye(len(summed))),
+        B=np.vstack([one.B, summed @ gain]),
+        C=-np.hstack([Kd[:, None] * one.C, summed.T]),
+        D=-(np.diag(Kp) + Kd[:, None] * one.D + gain),
+        first=np.vstack([one.first, np.zeros_like(summed)]),
+    )
 
 
 def projectors(plant: Plant) -> AtSamples:

@@ -60,9 +60,9 @@ class RateFeedback:
     @checked_arguments()
     def sampled(self, period: float) -> DiscreteModel:
         """The law at a period [s] as a model in state space, for `closed_loop` and `margins`."""
-        one, eye = BackwardDifference(period, self._cutoff).state_space, np.eye(len(self.inputs))
-        A, B, C, D = (np.asarray(np.kron(eye, matrix), dtype=float) for matrix in one)
-        return DiscreteModel(A, B, -self._gains @ C, -self._gains @ D, period, self.inputs, self.outputs)
+        one = BackwardDifference(period, self._cutoff).linear_law(len(self.inputs))
+        K = self._gains
+        return DiscreteModel(one.A, one.B, -K @ one.C, -K @ one.D, period, self.inputs, self.outputs)
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`."""
