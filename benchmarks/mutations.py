@@ -70,16 +70,14 @@ class Case:
 
 def originals(kind: str) -> dict[str, str]:
     """Texts of the files that are made wrong, by name: "models" or "studies"."""
+    examples = {file.stem: file.read_text() for file in (HERE.parent / "examples").glob("*.toml")}
+    models = {name: examples.pop(name) for name in ("laws",)}
     if kind == STUDIES:
-        files = [
-            *(HERE.parent / "examples").glob("*.toml"),
-            *(HERE / "fuzzed" / f"{name}.toml" for name in ("sweep", "search")),
-        ]
-        return {file.stem: file.read_text() for file in files}
+        return examples | {name: (HERE / "fuzzed" / f"{name}.toml").read_text() for name in ("sweep", "search")}
     from paraflex.files import library_names, library_text
     from paraflex.files.generators import generated_text
 
-    texts = {name: library_text(name) for name in library_names()}
+    texts = models | {name: library_text(name) for name in library_names()}
     texts |= {name: generated_text(name) for name in ("four_bars:1", "chain:3")}
     return texts | {"everything": (HERE / "fuzzed" / "everything.toml").read_text()}
 

@@ -226,3 +226,37 @@ def test_bad_laws(make, said):
 def test_encoders_and_motors_must_be_as_many():
     with pytest.raises(pf.InputError, match="2 readings for 1 motors"):
         loaded_rotor().run(SampledController(JointPID(1.0), period=T, inputs=["hub", "rate"], reference={}))
+
+
+# --- Loops ------------------------------------------------------------------------------------------------------------
+
+
+def unstable(*controllers, duration=0.1):
+    """What is said of the loop of a rotor at rest, its parts to the right of the colon."""
+    sim = Simulation(model_from(tomllib.loads(STILL), "rotor.toml"), duration=duration, samples=11)
+    doubts = sim.run(list(controllers), warning=False).doubts
+    return [one.text for one in doubts if one.code == "loop-unstable"]
+
+
+def test_an_unstable_loop_is_found():
+    """Kd of a rotor is at most 2 J/T = 20 N m s, with a sample's delay J/T; less where rates are differences."""
+    chain = {"period": T, "reference": {"hub": 0.1}}
+    for Kd, delay, found in ((19.5, 0.0, False), (25.0, 0.0, True), (5.0, T, False), (12.5, T, True)):
+        said = unstable(SampledController(JointPID(40.0, Kd), delay=delay, name="pd", **chain))
+        assert len(said) == found, (Kd, delay)
+        if found:
+            assert said[0].startswith('controller "pd": the sampled loop is unstable about the start: |z| = 1.')
+    # Halves act together; what has other instants, or is no linear law, is not looked at.
+    half = JointPID(20.0, 12.5)
+    halves = [SampledController(half, name=name, **chain) for name in ("one", "two")]
+    assert unstable(*halves)[0].startswith('controller "one", "two": ')
+    assert not unstable(halves[0])
+    late = SampledController(half, name="two", delay=T, **chain)
+    assert not unstable(halves[0], late)
+    assert not unstable(SampledController(lambda k, t, y: 50.0 * y, **chain))
+
+
+def test_what_only_drifts_is_not_unstable():
+    """Feedback of rates holds no place: a pole stays at one."""
+    law = RateFeedback({"tau": {"hub": 0.5}})
+    assert not unstable(SampledController(law, period=T), duration=1.0)

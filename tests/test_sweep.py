@@ -490,6 +490,10 @@ def test_the_error_of_the_mechanism_s_study_comes_first(error, first):
         "overshoot",
         "internal_torque_max",
         "saturated_share",
+        "current_max",
+        "rms_current",
+        "voltage_max",
+        "copper_energy",
     }
     assert set(metrics_of([], setting.error)) == along_path - others
 

@@ -23,7 +23,7 @@ FILES = {
 }
 # What stands for a name that the user chooses.
 NAME = "some"
-# What stands beside tables within tables.
+# What stands beside tables within tables of paths.
 BESIDE = {"shaper": {"type": "line", "start": [0.0, 0.3], "end": [0.1, 0.3], "max_acceleration": 1.0}}
 
 
@@ -79,7 +79,7 @@ def problem(kind, place, content):
     data = copy.deepcopy(base)
     inner = data
     for part in place[:-1]:
-        inner.update(BESIDE.get(part, {}))
+        inner.update(BESIDE.get(part, {}) if place[0] != "study" else {})
         inner = inner.setdefault(part, {})
     for name, value in content.items():
         inner[name] = value
@@ -91,7 +91,8 @@ def problem(kind, place, content):
 def test_all_tagged_tables_are_found():
     places = {".".join(case.values[1]) for case in TAGS}
     members = {f"{table}.some.type" for table in ("body", "controller", "joint", "load", "path", "sensor")}
-    assert places == members | {"path.type", "sensor.some.axis", "path.some.shaper.type", "path.shaper.type"}
+    shapers = {f"{place}.shaper.type" for place in ("path", "path.some", "study")}
+    assert places == members | shapers | {"path.type", "sensor.some.axis"}
     others = {".".join(case.values[1]) for case in CASES if not case.values[3]}
     assert {"sampling.kind", "search.method", "objective.over", "study.after", "vary.some.scale"} < others
 

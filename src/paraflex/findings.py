@@ -92,7 +92,7 @@ _DOUBTFUL = {
     "duration-missing": "The model has no path, its study no duration, and it proposes no statics.",
     "duration-long": "The run goes on for very long after the path.",
     "samples-few": "Samples are too few to show the turns of a prescribed motion.",
-    "loop-unstable": "A controller designed on few states is unstable with the model of all states.",
+    "loop-unstable": "Sampled controllers are unstable with the linear model of all states.",
     "samples-coarse": "Stresses, joint forces or torques of drives are larger between the samples that a run keeps.",
     "path-idle": "A path moves only along a coordinate that is no task of the end-effector.",
     "path-cut-short": "The run ends before the path does.",

@@ -12,6 +12,7 @@ from paraflex.control.coloured import deviation_and_filter
 from paraflex.control.controllers import Plant
 from paraflex.control.estimators import quantisation_noise
 from paraflex.control.linear_law import LinearLaw
+from paraflex.control.loop_check import CODE
 from paraflex.control.references import OPEN_LOOP
 from paraflex.control.regulators import LQGDesign, lqg
 from paraflex.errors import InputError
@@ -116,7 +117,7 @@ class DesignedLQG:
         loop = closed_loop(full, self.design)
         self.findings = () if loop.stable else (
             Finding(
-                "loop-unstable", "",
+                CODE, "",
                 f"the loop is unstable with the model of all {len(full.states)} states: {unstable_poles(loop)}",
                 "give links damping, or the design larger noise, smaller effort or more states",
             ),

@@ -17,6 +17,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.chain import SampledController
 from paraflex.control.controllers import Plant
+from paraflex.control.discrete import DiscreteModel
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.readings import Readings
 from paraflex.control.references import AtSamples
@@ -151,6 +152,17 @@ def sampled_law(
         **_read(readings), **filters, **given,
     }  # fmt: skip
     return SampledLaw(**{name: _apart(array) for name, array in arrays.items()})
+
+
+def linear_model(controller: Any, plant: Plant) -> DiscreteModel | None:
+    """The law of a controller that has started, as it is at the first sample; None if not linear, or behind filters."""
+    if type(controller) is not SampledController or any(controller.filter_models):
+        return None
+    law = _linear(controller.law)
+    if law is None:
+        return None
+    P = np.eye(len(plant.outputs)) if law.projector is None else law.projector[0]
+    return DiscreteModel(law.A, law.B, P @ law.C, P @ law.D, plant.period, plant.inputs, plant.outputs)
 
 
 def wrong_torques(law: SampledLaw) -> list[int]:

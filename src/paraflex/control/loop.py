@@ -12,7 +12,8 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
-from paraflex.control.inside import wrong_torques
+from paraflex.control.discrete import DiscreteModel
+from paraflex.control.inside import linear_model, wrong_torques
 from paraflex.control.together import (
     check_distinct,
     check_name,
@@ -74,6 +75,8 @@ class ControllerRecord:
         Largest change of torques in a second [N m/s, N/s]; infinite without.
     findings : tuple of Finding
         What its law found doubtful as it started.
+    linear : DiscreteModel or None
+        Its law from readings to torques, as at the first sample, if that is linear and readings are not filtered.
     """
 
     name: str
@@ -91,6 +94,7 @@ class ControllerRecord:
     limits: Array
     rates: Array
     findings: tuple[Finding, ...] = ()
+    linear: DiscreteModel | None = None
 
     @property
     def limited(self) -> Array:
@@ -290,6 +294,7 @@ class Loop:
                 replace(one, text=f'controller "{self.names[k]}": {one.text}')
                 for one in getattr(controller, "findings", ())
             ),
+            linear=linear_model(controller, plant),
         )
 
     def saved(self) -> Any:

@@ -161,6 +161,10 @@ def sections_of(system: System) -> Sections | None:
 
     Rigid and modal bodies have no section forces: nothing is known of the inside of these.
     """
+    return system.once("sections", lambda: _sections(system))
+
+
+def _sections(system: System) -> Sections | None:
     found = [
         _stations(described, system)
         for described in system.mechanism.bodies

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy
@@ -21,8 +22,7 @@ from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace,
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, PointRef, in_frames, rotor_mass, with_actuators
 
-if TYPE_CHECKING:
-    from paraflex.dynamics.sections import Sections
+T = TypeVar("T")
 
 
 @given_as("a system", "the system that dynamics.build_system makes")
@@ -113,12 +113,12 @@ class System:
         """Index of each body by name."""
         return {body.name: i for i, body in enumerate(self.bodies)}
 
-    @cached_property
-    def sections(self) -> Sections | None:
-        """Stations of its flexible beams, at which loads and stresses are told; None without such beams."""
-        from paraflex.dynamics.sections import sections_of
-
-        return sections_of(self)
+    def once(self, name: str, make: Callable[[], T]) -> T:
+        """What follows from it alone, made where it is asked for first."""
+        kept: dict[str, Any] = vars(self).setdefault("_kept", {})
+        if name not in kept:
+            kept[name] = make()
+        return kept[name]
 
     @cached_property
     def row_terms(self) -> dict[str, list[RowTerm]]:

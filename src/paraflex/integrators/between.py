@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.joint_loads import drive_torques, joint_loads
+from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
 from paraflex.integrators.solution import Solution
 
@@ -119,7 +120,7 @@ def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, st
     """The largest of each kind of load at all samples (k,), with its name and unit."""
     multipliers = np.nan_to_num(solution.multipliers)
     motion = solution.q, solution.v, solution.a, multipliers
-    sections = system.sections
+    sections = sections_of(system)
     if sections is not None and np.isfinite(sections.modulus).any():
 
         def stress(q: Array, v: Array, a: Array, multipliers: Array) -> Array:

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.dynamics import System
-from paraflex.dynamics.sections import SectionLoads, Sections
+from paraflex.dynamics.sections import SectionLoads, Sections, sections_of
 from paraflex.results.numbers import largest
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class SectionResult:
 
 def section_result(system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionResult | None:
     """Section forces for coordinates (k, n), their derivatives and multipliers; None where no beam is flexible."""
-    sections = system.sections
+    sections = sections_of(system)
     if sections is None:
         return None
     loads = sections.loads(system, q, v, a, multipliers)

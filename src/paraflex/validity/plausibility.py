@@ -12,6 +12,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import System, missed_turns
 from paraflex.dynamics.rank import joint_of_row
+from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import CONSTRAINT
@@ -168,7 +169,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
 
 def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
     """Beams that their loads stress beyond the strength of their material."""
-    sections = system.sections
+    sections = sections_of(system)
     if sections is None or not np.isfinite(sections.strength).any():
         return
     loads = sections.loads(system, solution.q, solution.v, solution.a, solution.multipliers)
