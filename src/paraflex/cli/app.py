@@ -28,7 +28,7 @@ app: typer.Typer = typer.Typer(
 
 _groups = {name: typer.Typer(help=about, no_args_is_help=True, rich_markup_mode=None) for name, about in GROUPS.items()}
 for _one in COMMANDS:
-    _group, _, _name = _one.name.rpartition(" ")
+    _group, _name = _one.name.rpartition(" ")[::2]
     _to = _groups[_group] if _group else app
     _to.command(_name, cls=Command, help=_one.help)(with_options(_one.request, _one.answer))
     if _one.name == "optimise":

@@ -14,6 +14,7 @@ from paraflex.control.amplifiers import Amplifiers, relaxing, with_room
 from paraflex.control.runs import TorqueLog
 from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
 from paraflex.errors import InputError
+from paraflex.kernel.packed import Signals
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import known
 from paraflex.tracking import path_stops
@@ -71,13 +72,14 @@ class HeldTorques:
         self._active = [own.index(name) for name in motors]
         self.amplifiers: Amplifiers = Amplifiers(mechanism)
         self.limited: np.ndarray = self.amplifiers.limited & np.isin(np.arange(len(own)), self._active)
-        signals = planned.signals or tuple(constant_signals([0.0] * len(own), end))
-        self.planned: FeedForward = replace(planned, signals=signals)
+        known_signals = planned.signals or tuple(constant_signals([0.0] * len(own), end))
+        self.planned: FeedForward = replace(planned, signals=known_signals)
         lags = self.amplifiers.lags
         several: list[InputSignals] = [
-            with_room(each) if lag else each for each, lag in zip(signals, lags, strict=True)
+            with_room(each) if lag else each for each, lag in zip(known_signals, lags, strict=True)
         ]
-        self.signals, knots = pack_signals(system.mechanism, several, end)
+        signals, knots = pack_signals(system.mechanism, several, end)
+        self.signals: Signals = signals
         self.knots: Array = np.sort(np.concatenate([path_stops(planned.knots, mechanism), knots]))
         # The first coefficients of signals are those of held torques as well.
         self.base: Array = self.signals.coefficients[:, 0].copy()
