@@ -363,7 +363,9 @@ class Simulation:
 
     def _use(self, loop: Loop | None) -> None:
         """Let these controllers act."""
-        if loop is not self._loop and loop is not None:
+        if loop is self._loop:
+            return
+        if loop is not None:
             self._watched = self._readings.only(loop.read)
             if loop.inside is None:
                 loop.inside = self._inside(loop)
