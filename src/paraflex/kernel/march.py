@@ -210,20 +210,13 @@ def begin(system, signals, controls, march, work):
 def resume(system, signals, controls, march, work, aside):
     """First stage after a jump, its matrix in a workspace aside: the factor in use stays."""
     factor = march.clock[FACTOR_B]
-    for r in range(work.redundant.size):
-        aside.redundant[r] = work.redundant[r]
+    copy(work.redundant, aside.redundant)
     begin(system, signals, controls, march, aside)
     march.clock[FACTOR_B] = factor
 
 
 @kernel
 def start(system, signals, controls, march, work, out):
-    """First stage and first sample of a run."""
-    start_run(system, signals, controls, march, work, out)
-
-
-@routine
-def start_run(system, signals, controls, march, work, out):
     """First stage and first sample of a run."""
     begin(system, signals, controls, march, work)
     t, a, lam = march.clock[TIME], march.stage_a[1, 0], march.stage_lam[0]
@@ -309,7 +302,7 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
             return LAW_FAILED
         taken = march.counts[STEPS] + march.counts[REJECTED]
         if done == CHANGED and taken == 0:
-            start_run(system, signals, controls, march, work, out)
+            start(system, signals, controls, march, work, out)
         elif done == CHANGED or march.counts[JUMPED] == 1:
             resume(system, signals, controls, march, work, aside)
         pause = next_instant(law)

@@ -19,10 +19,11 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.compiling import by_reference, routine
 
-# SampledLaw.counts: number of the next sample, of the next torques to act, whole periods of delay, a motor whose
-# torque is not finite, 1 + its place; the address of a compiled function.
+# SampledLaw.counts: number of the next sample, of the next torques to act, whole periods of delay, whether torques of
+# the next sample are not finite; the address of a compiled function.
 SAMPLED, ACTED, WHOLE, WRONG, FUNCTION = range(5)
 # SampledLaw.clock: of the first sample, period [s]; part of a period of delay; instants closer than this are one [s].
 START, PERIOD, PART, SLACK = range(4)
@@ -152,11 +153,9 @@ def filter_readings(law, k, y):
     """Readings as filters leave them; these go on to the next sample."""
     before, after = law.filtered, law.scratch[1]
     if k == 0:
-        for i in range(before.size):
-            before[i] = 0.0
+        fill(before, 0.0)
         multiply_add(law.filter_start, y, before)
-    for i in range(before.size):
-        after[i] = 0.0
+    fill(after, 0.0)
     multiply_add(law.filter_A, before, after)
     multiply_add(law.filter_B, y, after)
     for i in range(law.value.size):
@@ -180,24 +179,20 @@ def take_sample(law, k, q, v, a):
         call_function(law.counts[FUNCTION], k, law.t[k], errors, x, wanted)
     else:
         if k == 0:
-            for i in range(x.size):
-                x[i] = 0.0
+            fill(x, 0.0)
             multiply_add(law.first, errors, x)
-        plain = law.scratch[1]
-        for i in range(wanted.size):
-            plain[i] = 0.0
-        multiply_add(law.C, x, plain)
-        multiply_add(law.D, errors, plain)
-        for i in range(wanted.size):
-            wanted[i] = plain[i]
+        fill(wanted, 0.0)
+        multiply_add(law.C, x, wanted)
+        multiply_add(law.D, errors, wanted)
         if law.projector.size > 0:
-            for i in range(wanted.size):
-                wanted[i] = 0.0
+            plain = law.scratch[1]
+            copy(wanted, plain)
+            fill(wanted, 0.0)
             multiply_add(law.projector[k], plain, wanted)
     limited = False
     for i in range(wanted.size):
         if not isfinite(wanted[i]):
-            law.counts[WRONG] = 1 + i
+            law.counts[WRONG] = 1
             return False
         within = min(max(wanted[i], law.lowest[i]), law.highest[i])
         given[i] = min(max(within, law.last[i] - law.most[i]), law.last[i] + law.most[i])
@@ -212,8 +207,7 @@ def take_sample(law, k, q, v, a):
 def go_on_to_next(law, errors, wanted, given, limited):
     """States of a linear law at the next sample."""
     x, after = law.x, law.scratch[1]
-    for i in range(x.size):
-        after[i] = 0.0
+    fill(after, 0.0)
     multiply_add(law.A, x, after)
     multiply_add(law.B, errors, after)
     if limited:
