@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 Numbers = float | Mapping[str, float]
 Rows = Sequence[Sequence[float]]
+# Of a PID law.
+_GAINS = ("stiffness", "damping", "integral")
 
 
 class LawNames(NamedTuple):
@@ -102,8 +104,8 @@ class PIDDescription(CheckedFields):
         """See `DescribedLaw`."""
         from paraflex.control.laws import gains_of
 
-        for name, gain in self._gains(names.motors, only=False).items():
-            gains_of(gain, names.motors, name)
+        for name in _GAINS:
+            gains_of(getattr(self, name), names.motors, name)
         self.made(names.motors, 1.0)
         if names.inputs and names.outputs and len(names.inputs) != len(names.outputs):
             raise InputError(
@@ -116,11 +118,8 @@ class PIDDescription(CheckedFields):
         """See `DescribedLaw`."""
         from paraflex.control.laws import JointPID
 
-        return JointPID(**self._gains(outputs), project=self.project, cutoff=self.cutoff)
-
-    def _gains(self, motors: Sequence[str], *, only: bool = True) -> dict[str, Any]:
-        found = {name: getattr(self, name) for name in ("stiffness", "damping", "integral")}
-        return {name: of_names(gain, motors) for name, gain in found.items()} if only else found
+        gains: dict[str, Any] = {name: of_names(getattr(self, name), outputs) for name in _GAINS}
+        return JointPID(**gains, project=self.project, cutoff=self.cutoff)
 
 
 @given_as("a law", "a description of a law such as PIDDescription")

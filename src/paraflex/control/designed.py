@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from paraflex.arguments import checked_arguments
@@ -15,6 +16,7 @@ from paraflex.control.linear_law import LinearLaw
 from paraflex.control.loop_check import CODE
 from paraflex.control.references import OPEN_LOOP
 from paraflex.control.regulators import LQGDesign, lqg
+from paraflex.control.together import by_name, checked_number
 from paraflex.errors import InputError
 from paraflex.findings import Finding
 from paraflex.linear import LinearModel, linearise, reduce
@@ -162,7 +164,6 @@ class DesignedLQG:
 
 def _check(given: Any, field: str, unit: str, check: Any) -> None:
     """Check one number, or each by its name."""
-    if given is None:
-        return
-    for name, value in given.items() if isinstance(given, Mapping) else [("", given)]:
-        check(value, f"{field}.{name}" if name else field, unit)
+    if given is not None:
+        names = tuple(given) if isinstance(given, Mapping) else ()
+        by_name(given, names, field, "name", partial(checked_number, unit=unit, check=check))

@@ -253,15 +253,20 @@ class Loop:
         kept.given.append(torques)
         return torques
 
+    def keep_last(self) -> None:
+        """Let the controller in the compiled time loop have its last sample, as outside of it."""
+        law, controller = self.inside, self.controllers[0]
+        if law is None or not law.counts[SAMPLED]:
+            return
+        k = int(law.counts[SAMPLED]) - 1
+        assert isinstance(controller, SampledController)
+        controller.last = ChainSample(law.readings[k].copy(), law.wanted[k].copy(), law.given[k].copy())
+
     def torques_acted(self, after: int) -> Iterator[tuple[float, Array]]:
         """Times at which torques (motors,) of all motors began to act in the compiled time loop, after so many."""
         law = self.inside
         if law is None:
             return
-        k = int(law.counts[SAMPLED]) - 1
-        controller = self.controllers[0]
-        if k >= 0 and isinstance(controller, SampledController):
-            controller.last = ChainSample(law.readings[k].copy(), law.wanted[k].copy(), law.given[k].copy())
         for k in range(after, int(law.counts[ACTED])):
             torques = np.zeros(law.held.size)
             torques[law.outputs] = law.given[k]

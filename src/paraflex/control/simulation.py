@@ -427,6 +427,7 @@ class Simulation:
         """Note which torques acted in the compiled time loop."""
         if self._loop is None:
             return
+        self._loop.keep_last()
         for t, torques in self._loop.torques_acted(len(self._torques.log)):
             self._torques.note(t, torques)
 
