@@ -35,3 +35,14 @@ rotor = {{ x = 0.0, y = 0.0, phi = {angle} }}
 rotor = {{ x = 0.0, y = 0.0, phi = {rate} }}
 """
     return model_from(tomllib.loads(ROTOR + start), "rotor.toml")
+
+
+def under_rate_feedback(K, rate, samples):
+    """Angles of a rotor from zero: J theta'' = -K theta' sampled, with differences, once these are known."""
+    angle, last, theta = [0.0], 0.0, 0.0
+    for _ in range(samples):
+        torque = -K * (theta - last) / T
+        last = theta
+        theta, rate = theta + rate * T + 0.5 * torque / J * T * T, rate + torque / J * T
+        angle.append(theta)
+    return angle

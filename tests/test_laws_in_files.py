@@ -27,7 +27,7 @@ from paraflex.control.described_laws import LAWS
 from paraflex.designs.derivatives.plans import check_open_and_whole
 from paraflex.errors import InputError, ResultWarning
 from paraflex.files import model_from
-from rotors import ROTOR, J, T, rotor
+from rotors import ROTOR, J, T, rotor, under_rate_feedback
 from shell import paraflex
 
 LIBRARY = (Path(pf.__file__).parent / "mechanism" / "library" / "raparm_i.toml").read_text(encoding="utf-8")
@@ -249,13 +249,7 @@ def test_rate_feedback_is_the_law(model):
     rotor = model_from(tomllib.loads(ROTOR + start + law), "rotor.toml")
     run = Simulation(rotor, duration=0.02, samples=21).run(rotor.controllers["d"])
     # J theta'' = -K theta': once a difference is known the rate falls by 1 - K T / J a period, with a sample's memory.
-    angle, rate, last, theta = [0.0], 2.0, 0.0, 0.0
-    for _ in range(20):
-        torque = -1.5 * (theta - last) / T
-        last = theta
-        theta, rate = theta + rate * T + 0.5 * torque / J * T * T, rate + torque / J * T
-        angle.append(theta)
-    assert run.solution.q[:, 2] == pytest.approx(angle, abs=1e-9)
+    assert run.solution.q[:, 2] == pytest.approx(under_rate_feedback(1.5, 2.0, 20), abs=1e-9)
 
 
 def test_gains_are_used_of_the_motors_of_a_mode(model):

@@ -15,7 +15,7 @@ from paraflex.control.rates import RateFeedback
 from paraflex.control.references import planned_readings
 from paraflex.files import model_from
 from paraflex.mechanism import TorsionalSpring
-from rotors import ROTOR, J, T
+from rotors import ROTOR, T, under_rate_feedback
 
 STILL = (
     ROTOR
@@ -195,13 +195,7 @@ def test_feedback_of_a_rate_damps_a_rotor():
     start = "[start.velocity]\nangular = { rotor = 2.0 }\n"
     sim = Simulation(model_from(tomllib.loads(STILL + start), "rotor.toml"), duration=0.02, samples=21)
     run = sim.run(SampledController(RateFeedback({"tau": {"hub": 1.5}}), period=T))
-    angle, rate, last, theta = [0.0], 2.0, 0.0, 0.0
-    for _ in range(20):
-        torque = -1.5 * (theta - last) / T
-        last = theta
-        theta, rate = theta + rate * T + 0.5 * torque / J * T * T, rate + torque / J * T
-        angle.append(theta)
-    assert run.solution.q[:, 2] == pytest.approx(angle, abs=1e-9)
+    assert run.solution.q[:, 2] == pytest.approx(under_rate_feedback(1.5, 2.0, 20), abs=1e-9)
 
 
 @pytest.mark.parametrize(
