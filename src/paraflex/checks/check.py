@@ -66,7 +66,7 @@ def check(
     found: list[Finding] = [*doubtful_numbers(mechanism, duration), *pose_findings(seen, at_rest=at_rest)]
     if isinstance(model, Model):
         found += [*file_findings(model), *start_findings(model, seen, assembly)]
-        loose = loose_tolerance(model.study.integration().tolerance, seen.system.size)
+        loose = loose_tolerance(model.study.integration().tolerance_for(seen.system), seen.system.size)
         found += [] if loose is None else [loose]
     # Without an assembly there is no pose to run from.
     if isinstance(model, Model) and seen.starts:

@@ -19,6 +19,7 @@ from paraflex.integrators import (
     IntegrationOptions,
     JointLimit,
     SingularDistance,
+    TolerancePer,
     Treatment,
     check_events,
 )
@@ -26,7 +27,18 @@ from paraflex.mechanism import Mechanism
 from paraflex.units import quantities_in
 
 # Fields of a request that `IntegrationOptions` has too, and those that kineto-elastodynamics has no use for.
-_OPTIONS = ("tolerance", "alpha", "beta", "max_steps", "method", "step", "constraints", "automatic_gains")
+_OPTIONS = (
+    "tolerance",
+    "tolerance_per",
+    "control",
+    "alpha",
+    "beta",
+    "max_steps",
+    "method",
+    "step",
+    "constraints",
+    "automatic_gains",
+)
 _OF_STEPS = (*_OPTIONS, "parameters", "stop_at", "balanced", "after")
 # Units of what events are about; a joint's is known with the mechanism.
 _OF_JOINT, _OF_DEFLECTION = ("rad", "m"), ("m",)
@@ -164,6 +176,8 @@ def integration_parameters(options: IntegrationOptions, stop_at: Sequence[str]) 
     """How a run was integrated, for provenance."""
     return {
         "tolerance": options.tolerance,
+        "tolerance_per": None if options.tolerance_per is TolerancePer.CYCLE else options.tolerance_per.value,
+        "control": options.control and options.control.value,
         "alpha": options.alpha,
         "beta": options.beta,
         "method": options.method.name,

@@ -50,6 +50,8 @@ class IntegrationTable(Table):
 
     method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
     tolerance: Number | None = Field(default=None, description="the tolerance in m")
+    tolerance_per: Text | None = Field(default=None, description='"cycle" or "run": see [study]')
+    control: Text | None = Field(default=None, description='"positions" or "forces": see [study]')
     step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
     constraints: Text | None = Field(default=None, description='"baumgarte", "projection" or "ggl"')
     alpha: Number | None = Field(default=None, description="Baumgarte's coefficient alpha in 1/s")

@@ -126,6 +126,36 @@ def drive_torques(system: System, multipliers: Array) -> Array:
     return torques
 
 
+class LoadErrors(NamedTuple):
+    """How far the loads of joints and drives may be off.
+
+    Attributes
+    ----------
+    force : (joints,) array
+        Of the constraint forces of each joint [N].
+    moment : (joints,) array
+        Of its constraint moments [N m].
+    drive : (drives,) array
+        Of the torque [N m] or force [N] of each prescribed motion.
+    """
+
+    force: Array
+    moment: Array
+    drive: Array
+
+
+def load_errors(system: System, names: Sequence[str], errors: Array) -> LoadErrors:
+    """Bounds for the loads of joints by name and of all drives, from those of the multipliers (m,)."""
+    force, moment = np.zeros(len(names)), np.zeros(len(names))
+    for i, name in enumerate(names):
+        for rows, term in joint_parts(system, name).terms:
+            if term.kind == ANGLE:
+                moment[i] += abs(term.weight) * errors[rows[0]]
+            else:
+                force[i] += abs(term.weight) * float(np.linalg.norm(errors[rows]))
+    return LoadErrors(force, moment, np.abs(drive_torques(system, errors[None])[0]))
+
+
 class FrameLoad(NamedTuple):
     """What a mechanism does to the ground, its shaking force and moment.
 

@@ -14,8 +14,10 @@ from paraflex.errors import InputError
 from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.mechanism import AngleLaw, Mechanism, TabulatedLaw
 
-# Breaks of a prescribed law: its quintic Hermite pieces are this short, as a fraction of the run.
-_LAW_PIECES = 2000
+# Breaks of a prescribed law: its quintic Hermite pieces are this short, as a fraction of the run, and are halved as
+# often as it takes, within these numbers, until their middles are as near to the law, relative to its largest value.
+_LAW_PIECES, _MOST_PIECES, _HALVINGS = 2000, 500_000, 20
+_NEAR_LAW = 1e-10
 _SHORTEST_PIECE = 1e-6
 _DEGREE = 5
 
@@ -116,12 +118,37 @@ def law_signal(place: str, law: AngleLaw, end: float) -> tuple[InputSignals, lis
     # The law or a derivative may jump at a knot: pieces on either side take its one-sided limits.
     parts = []
     for a, b in pairwise([0.0, *inner, end]):
-        t = _grid(law, a, b, end)
-        inside = t.copy()
-        inside[0] = max(a + 1e-12 * (b - a), np.nextafter(a, b))
-        inside[-1] = min(b - 1e-12 * (b - a), np.nextafter(b, a))
-        parts.append(piecewise_quintic(t, *_evaluate(place, law, inside)))
+        parts.append(_refined(place, law, _grid(law, a, b, end)))
     return _join(parts), inner
+
+
+def _refined(place: str, law: AngleLaw, t: Array) -> InputSignals:
+    """Quintic pieces of a law between breaks, halved where it changes too fast for them.
+
+    Raises
+    ------
+    InputError
+        See `law_signal`; or it changes so fast that pieces are too many.
+    """
+    a, b = t[0], t[-1]
+    # At the ends of a stretch values and derivatives are those within it.
+    low, high = max(a + 1e-12 * (b - a), np.nextafter(a, b)), min(b - 1e-12 * (b - a), np.nextafter(b, a))
+    for _ in range(_HALVINGS):
+        pieces = piecewise_quintic(t, *_evaluate(place, law, np.clip(t, low, high)))
+        half = 0.5 * np.diff(t)
+        value = _evaluate(place, law, t[:-1] + half)[0]
+        powers = half[:, None] ** np.arange(_DEGREE + 1)
+        off = np.abs(np.sum(powers * pieces.coefficients, axis=1) - value)
+        coarse = off > _NEAR_LAW * np.max(np.abs(value))
+        if not coarse.any():
+            return pieces
+        t = np.sort(np.append(t, t[:-1][coarse] + half[coarse]))
+        if t.size > _MOST_PIECES:
+            break
+    raise InputError(
+        f"it changes too fast between t = {a:g} and {b:g} s to be followed", field=place,
+        remedy="give a shorter duration, or smoother laws; where it jumps or has a kink, pieces that end there",
+    )  # fmt: skip
 
 
 def _polyline(t: Array, value: Array) -> InputSignals:

@@ -792,7 +792,15 @@ class StudyDefaultsTable(_Table):
     method: Text | None = Field(
         default=None, description="the method of integration, by default esdirk5: see paraflex methods"
     )
-    tolerance: Number | None = Field(default=None, description="the tolerance of the integration in m, 1e-5 by default")
+    tolerance: Number | None = Field(
+        default=None, description="the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
+    )
+    tolerance_per: Literal["cycle", "run"] | None = Field(
+        default=None, description='the time in which errors may add up to it: a "cycle" of the motion or the "run"'
+    )
+    control: Literal["positions", "forces"] | None = Field(
+        default=None, description='whose errors choose the steps: "positions", or "forces", the default of rigid bodies'
+    )
     step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
     after: Literal["free", "hold"] = Field(
         default="free", description='what the active motors do after the path: "free" or "hold", by brakes'

@@ -39,6 +39,8 @@ class StudyDefaults:
         Of integration; the program's own where None.
     tolerance : float or None
         Of the integration [m].
+    tolerance_per, control : str or None
+        Of the integration: see `IntegrationOptions`.
     step : float or None
         Fixed [s].
     after : str
@@ -63,6 +65,8 @@ class StudyDefaults:
     orientation: float = 0.0
     method: str | None = None
     tolerance: float | None = None
+    tolerance_per: str | None = None
+    control: str | None = None
     step: float | None = None
     after: str = "free"
     reduced: int | None = None
@@ -91,7 +95,7 @@ class StudyDefaults:
             Options that do not go together.
         """
         given = {name: value for name, value in (chosen or {}).items() if value is not None}
-        own = {"method": self.method, "tolerance": self.tolerance, "step": self.step}
+        own = {name: getattr(self, name) for name in ("method", "tolerance", "tolerance_per", "control", "step")}
         if given.get("method", self.method) != self.method:
             own["step"] = None
         options = {name: value for name, value in own.items() if value is not None} | given

@@ -16,7 +16,9 @@ from paraflex.integrators.methods import (
     find_method as find_method,
 )
 from paraflex.integrators.options import (
+    Control as Control,
     IntegrationOptions as IntegrationOptions,
+    TolerancePer as TolerancePer,
     check_times as check_times,
     choose as choose,
     loose_tolerance as loose_tolerance,

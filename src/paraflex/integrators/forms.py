@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.dynamics import System, dependence, inputs_of
 from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import DEPENDENT_PART, MEMORY, Problem
+from paraflex.integrators.run import DEPENDENT_PART, Problem
+from paraflex.kernel.error import MEMORY_PART
 from paraflex.kernel.ode import (
     accelerations,
     descriptor_jacobian,
@@ -112,7 +113,7 @@ class OdeForm:
         """
         system = self.system
         q = error * np.sqrt(system.total_mass / (self.size * diagonal_mass(system)))
-        frequency = np.full(system.n, 1.0 / (MEMORY * span))
+        frequency = np.full(system.n, 1.0 / (MEMORY_PART * span))
         for body, packed in zip(system.bodies, system.packed.bodies, strict=True):
             omega2 = system.packed.modal[OMEGA2, packed["flex"] : packed["flex"] + body.nf]
             frequency[body.flexible] = np.maximum(frequency[body.flexible], np.sqrt(np.maximum(omega2, 0.0)))

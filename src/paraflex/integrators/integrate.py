@@ -164,13 +164,14 @@ class Integration:
         samples: int | None = None,
     ) -> None:
         self._began, self._begun, self._samples = time.perf_counter(), begun, samples
-        self._system, self._options = system, options or IntegrationOptions()
-        options = self._options
-        refuse_tolerance(options.tolerance, system.size)
-        self._loose = loose_tolerance(options.tolerance, system.size)
+        options = (options or IntegrationOptions()).for_system(system)
+        self._system, self._options, self._tolerance = system, options, options.tolerance_for(system)
+        refuse_tolerance(self._tolerance, system.size)
+        self._loose = loose_tolerance(self._tolerance, system.size)
         own = isinstance(options.method, NativeMethod)
         self._between = with_between(np.asarray(times, dtype=float), system.n) if samples and own else None
-        problem = make_problem(system, signals, initial, times if self._between is None else self._between.times, knots)
+        taken = (times, None) if self._between is None else self._between
+        problem = make_problem(system, signals, initial, taken[0], knots, taken[1])
         self._ends = BeamEnds(system, initial)
         self._crossing: Crossing | None = None
         self._functions = (*event_functions(system, initial.q, options.events), *self._ends.functions)
@@ -280,7 +281,7 @@ class Integration:
             return False
         self._looked = run.attempts
         largest = run.figures().constraint_position_max
-        limits = (run.dependent_rows, options.tolerance, options.treatment, largest)
+        limits = (run.dependent_rows, self._tolerance, options.treatment, largest)
         bent = bent_too_far(self._system, now.q)
         drift = come_apart(self._system, problem.signals, now.t, now.q, *limits)
         self._broken, self._drifts = bent or drift, drift is not None and bent is None
@@ -375,5 +376,6 @@ def _solution(
         singular_positions=tuple(figures.passages.mean(axis=0).tolist()),
         method=options.method.name,
         evaluations=figures.evaluations,
+        multiplier_errors=figures.multiplier_errors,
         event="" if crossing is None else str(crossing.function.event),
     )

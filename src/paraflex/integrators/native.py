@@ -6,20 +6,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, inputs_of
 from paraflex.errors import InputError
 from paraflex.integrators.method import NativeMethod, Treatment
 from paraflex.integrators.newmark import NewmarkMethod
-from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, MEMORY, Figures, Instant, Problem, Run, empty_samples
+from paraflex.integrators.options import IntegrationOptions, TolerancePer
+from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, Figures, Instant, Problem, Run, empty_samples
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Workspace
 from paraflex.kernel.run_state import (
     BALANCE,
     BAUMGARTE,
+    CYCLE,
     DPHI_MAX,
     FACTORS,
     FINISHED,
@@ -39,6 +41,7 @@ from paraflex.kernel.run_state import (
     STEPS,
     STOP,
     TIME,
+    UNRESOLVED,
     WORK,
     Controls,
     March,
@@ -47,11 +50,6 @@ from paraflex.kernel.run_state import (
     make_march,
 )
 from paraflex.kernel.sampled import SampledLaw, no_law
-
-# How long a velocity error that Newton leaves is taken to last, as a fraction of the run: it must count for more
-# than its share of one step, since it is of one sign while a factor is in use.
-_NEWTON_MEMORY = 0.02
-
 
 # A row not redundant at the start with less than this of its square left depends on others but for rounding.
 ROUNDING_PART = 1e-13
@@ -65,6 +63,14 @@ _NEAR_AHEAD = 0.2
 # The smallest step, as a fraction of the run, and in units of the clock's last digit: by so little a step may differ
 # from what the clock moves by.
 _LEAST, _DIGITS = 1e-12, 64.0
+# Errors of forces stated, over the sum of those of the steps of some cycles: where vibrations are not resolved the
+# library's are 0.3 to 1.5 times the sum.
+_FORCE_SAFETY = 2.0
+# So much of a turn, or of a vibration given in time, is in a step at most [rad]: forces and work follow it to less than
+# a thousandth. By the order of a method, four for higher ones.
+_PHASES = {1: 0.15, 2: 0.15, 3: 0.5, 4: 1.0}
+# Points this close are one, as a part of the mechanism's size.
+_SAME_PLACE = 1e-9
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
 _BAUMGARTE_GAIN = 0.1
 _TREATMENTS = {
@@ -163,7 +169,14 @@ class NativeRun:
             constraint_velocity_max=float(state.clock[DPHI_MAX]),
             energy_balance_max=float(state.clock[BALANCE]),
             passages=state.passages[:, : state.counts[PASSAGES]],
+            multiplier_errors=self._multiplier_errors(),
         )
+
+    def _multiplier_errors(self) -> Array | None:
+        """See `Solution`."""
+        if self.controls.fixed_step or not self.scheme.error.size:
+            return None
+        return _FORCE_SAFETY * self.state.forces[UNRESOLVED]
 
     def until(self, time: float) -> NativeRun:
         """The same run, whose steps end at a time before its end, where it pauses."""
@@ -213,6 +226,21 @@ def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
     return count
 
 
+def _turning(system: System) -> NDArray[np.int64]:
+    """The angles, as numbers of coordinates, of bodies on which forces depend on how they stand.
+
+    A rigid body with all its points and its centre of mass at its origin is none.
+    """
+    least = _SAME_PLACE * system.size
+    matters = [
+        body.nf > 0
+        or np.linalg.norm(np.real(body.integrals.S1)) > least * np.real(body.integrals.m)
+        or any(np.linalg.norm(np.real(point.x0)) > least for point in body.shape.points.values())
+        for body in system.bodies
+    ]
+    return np.array([body.angle for body, one in zip(system.bodies, matters, strict=True) if one], dtype=np.int64)
+
+
 def _least_step(problem: Problem) -> float:
     """The smallest step of a run, however large its times [s]."""
     latest = max(abs(problem.initial.time), abs(float(problem.stops[-1])))
@@ -229,12 +257,15 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     state = make_march(system.n, system.m, scheme.c.size, inputs_of(system.mechanism).acting, treatment)
     state.q[:], state.v[:] = initial.q, initial.v
     state.clock[TIME], state.clock[STEP] = initial.time, min(FIRST_STEP * span, options.max_step)
+    state.clock[CYCLE] = span
+    tolerance, phase = options.tolerance_for(system), _PHASES[min(method.order, 4)]
     workspace = system.workspace()
     controls = Controls(
-        tolerance_per_second=options.tolerance / span,
+        tolerance=tolerance,
+        span=span,
+        by_cycle=int(options.step is None and options.tolerance_per is TolerancePer.CYCLE),
+        force_part=options.force_part(system),
         newton_fraction=options.newton_fraction or method.newton_fraction,
-        newton_memory=_NEWTON_MEMORY * span,
-        memory=MEMORY * span,
         alpha=options.alpha,
         beta=options.beta,
         gain=_BAUMGARTE_GAIN if options.automatic_gains else 0.0,
@@ -242,7 +273,11 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         fixed_step=options.step or 0.0,
         least_step=_least_step(problem),
         max_step=options.max_step,
-        near_error=max(NEAR_ERROR * options.tolerance, LEAST_NEAR_ERROR * system.size),
+        near_error=max(NEAR_ERROR * tolerance, LEAST_NEAR_ERROR * system.size),
+        turning=_turning(system),
+        limit_t=problem.limits.times,
+        limit_h=phase * problem.limits.steps,
+        turn_in_step=phase,
         dependent_part=ROUNDING_PART,
         dependent_rows=_mark_redundant(system, initial.q, workspace),
     )
@@ -253,7 +288,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         state=state,
         workspace=workspace,
         slow=system.workspace(),
-        samples=empty_samples(problem.times, system),
+        samples=empty_samples(problem.times, system, problem.asked),
         aside=system.workspace(),
         law=no_law(),
     )

@@ -5,18 +5,25 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import InitVar, dataclass, replace
+from enum import Enum
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.dynamics import System
 from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators.events import Event
+from paraflex.integrators.method import Family
 from paraflex.integrators.methods import Method, MethodField, Treatment
 from paraflex.limits import SAMPLES, SHORTEST, at_most
 
 # A tolerance beyond this part of the mechanism's size is doubted: at a fifth the five-bar's tracking error is half as
 # large again.
 LOOSE = 0.05
+# The default tolerance, as a part of the mechanism's size (which is rounded to a power of two).
+RELATIVE_TOLERANCE = 4e-5
+# Under control of forces, what local errors within a cycle may change a force by, as a part of its largest value.
+FORCE_PART = 0.0025
 _REMEDIES = {
     "tolerance": "give a length in metres, say 1e-5",
     "step": "give a time in seconds",
@@ -26,6 +33,20 @@ _REMEDIES = {
 }
 
 
+class Control(Enum):
+    """Quantities whose errors choose the steps: positions alone, or the forces of joints and drives as well."""
+
+    POSITIONS = "positions"
+    FORCES = "forces"
+
+
+class TolerancePer(Enum):
+    """Time in which local errors may add up to the tolerance: a cycle of the motion, or the whole run."""
+
+    CYCLE = "cycle"
+    RUN = "run"
+
+
 @given_as("IntegrationOptions", "them, say IntegrationOptions(tolerance=1e-6)")
 @dataclass(frozen=True)
 class IntegrationOptions(CheckedFields):
@@ -33,9 +54,17 @@ class IntegrationOptions(CheckedFields):
 
     Attributes
     ----------
-    tolerance : float
-        Local errors over the whole run may add up to this much, in metres (root mean square over the mass). With a
-        fixed step it only says how exactly Newton's iteration solves.
+    tolerance : float, optional
+        What local errors within a cycle, or the whole run, may add up to [m] (root mean square over the mass); by
+        default 4e-5 of the mechanism's size. With a fixed step it only says how exactly Newton's iteration solves.
+    tolerance_per : TolerancePer or str
+        "cycle" (own methods): the time in which the fastest body so far turns once, or travels 2 pi times the size of
+        the mechanism, and no longer than the run. Errors of driven or damped motions then stay as they are, and those
+        of undamped ones grow with the number of cycles; the cost grows with the duration alone. "run": the whole run.
+    control : Control or str, optional
+        "forces": steps are so short that local errors within a cycle change no force of a joint or drive by more than
+        0.25 % of its largest value. "positions": by positions alone. By default "forces" where no body is flexible, as
+        vibrations of undamped beams would then be resolved down to the fastest that bears on a force.
     method : Method or str
         An object such as `paraflex.methods.GeneralisedAlpha(spectral_radius=0.8)`, or a name in `paraflex.METHODS`,
         which stands for the method with its default parameters.
@@ -64,7 +93,7 @@ class IntegrationOptions(CheckedFields):
     """
 
     _own = ("method",)
-    tolerance: float = 1e-5
+    tolerance: float | None = None
     alpha: float = 20.0
     beta: float = 20.0
     max_step: float = math.inf
@@ -77,6 +106,8 @@ class IntegrationOptions(CheckedFields):
     constraints: Treatment | str | None = None
     automatic_gains: bool = False
     events: tuple[Event, ...] = ()
+    control: Control | str | None = None
+    tolerance_per: TolerancePer | str = TolerancePer.CYCLE
 
     def __post_init__(self, parameters: Any) -> None:
         super().__post_init__()
@@ -89,14 +120,35 @@ class IntegrationOptions(CheckedFields):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise InputError("must be positive", field=name, value=value, remedy=remedy)
-        if not math.isfinite(self.tolerance):
+        if self.tolerance is not None and not math.isfinite(self.tolerance):
             raise InputError("must be finite", field="tolerance", value=self.tolerance, remedy=_REMEDIES["tolerance"])
         for name in ("alpha", "beta"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError("must not be negative", field=name, value=value, remedy="choose it from 0 to 50 1/s")
+        object.__setattr__(self, "tolerance_per", as_enum(TolerancePer, self.tolerance_per, "tolerance_per"))
+        if self.control is not None:
+            object.__setattr__(self, "control", as_enum(Control, self.control, "control"))
         self._check_step()
         self._check_constraints()
+
+    def tolerance_for(self, system: System) -> float:
+        """The tolerance [m], by default relative to the size of a system."""
+        return RELATIVE_TOLERANCE * system.size if self.tolerance is None else self.tolerance
+
+    def for_system(self, system: System) -> IntegrationOptions:
+        """The same options with the tolerance that they have for a system."""
+        return replace(self, tolerance=self.tolerance_for(system))
+
+    def force_part(self, system: System) -> float:
+        """Error allowed in forces, as a part of the largest; zero where positions alone choose the steps."""
+        by_forces = self.control is Control.FORCES or (self.control is None and not system.n_flexible)
+        return FORCE_PART if by_forces and self.estimates_forces else 0.0
+
+    @property
+    def estimates_forces(self) -> bool:
+        """Whether runs estimate what errors of integration make of forces: with embedded formulas, steps not fixed."""
+        return self.method.family is Family.ESDIRK and self.step is None
 
     @property
     def treatment(self) -> Treatment:
@@ -109,6 +161,7 @@ class IntegrationOptions(CheckedFields):
             "integration_method": self.method.name,
             "method_parameters": json.dumps(self.method.values),
             "constraints_treatment": self.treatment.value,
+            "tolerance_per": self.tolerance_per.value,
             "steps": "chosen by their errors" if self.step is None else f"fixed, {self.step:g} s",
             "stop_at": ", ".join(str(event) for event in self.events),
         }
@@ -118,6 +171,11 @@ class IntegrationOptions(CheckedFields):
             remedy = "leave it out, and choose a tolerance" if math.isfinite(self.step) else _REMEDIES["step"]
             problem = f"{self.method} chooses its steps itself" if math.isfinite(self.step) else "must be finite"
             raise InputError(problem, field="step", value=self.step, remedy=remedy)
+        if self.control is Control.FORCES and not self.estimates_forces:
+            raise InputError(
+                "steps are not chosen by errors of forces", field="control", value=self.control.value,
+                remedy="leave it out, or choose an ESDIRK method, say esdirk5, without a fixed step",
+            )  # fmt: skip
 
     def _check_constraints(self) -> None:
         if self.constraints is not None:

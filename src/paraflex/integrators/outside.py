@@ -176,9 +176,10 @@ def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
 def _stepper(problem: Problem, options: IntegrationOptions) -> Stepper:
     method = options.method
     assert isinstance(method, Guest)
-    error = method.error_factor * options.tolerance
+    tolerance = options.tolerance_for(problem.system)
+    error = method.error_factor * tolerance
     if method.multistep:
-        error *= (options.tolerance / _REFERENCE) ** (1.0 / method.highest_order)
+        error *= (tolerance / _REFERENCE) ** (1.0 / method.highest_order)
     steps = Steps(min(FIRST_STEP * problem.span, options.max_step), options.max_step, method.highest_order)
     if isinstance(method, IDA):
         kind = StabilisedForm if options.treatment == Treatment.GGL else DescriptorForm

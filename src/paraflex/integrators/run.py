@@ -6,20 +6,19 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, inputs_of
 from paraflex.errors import InputError
 from paraflex.integrators.jumps import hidden_from, jump_times
+from paraflex.integrators.limits import Limits, step_limits
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import Samples
 
 # Where the first step starts from, as a fraction of the run; error control takes over at once.
 FIRST_STEP = 1e-6
-# A velocity error of a step that nothing turns round moves the mechanism for half of the run, on average: by the error
-# times this fraction of the run.
-MEMORY = 0.25
 # Constraint rows with less than this of their squares left depend on the others: those that did at the start, whatever
 # errors leave of them; and for solvers of others any, small enough that this lasts a thousandth of a radian.
 DEPENDENT_PART = 1e-7
@@ -40,6 +39,10 @@ class Problem:
         At which steps end; the last is the end of the run [s].
     jumps : (j,) array
         Those of them at which something given jumps: no step may see what follows.
+    limits : Limits
+        Longest steps that resolve what is given in time.
+    asked : (k,) array of bool
+        Samples that are kept; others serve to find the largest loads.
     """
 
     system: System
@@ -48,6 +51,8 @@ class Problem:
     times: Array
     stops: Array
     jumps: Array
+    limits: Limits
+    asked: NDArray[np.bool_]
 
     @property
     def span(self) -> float:
@@ -74,7 +79,7 @@ class Instant:
 
 @dataclass(frozen=True)
 class Figures:
-    """Counts and residuals of a run: see `Solution`. Passages (2, p) are the intervals with dependent rows."""
+    """Counts, residuals and errors of a run: see `Solution`. Passages (2, p) are the intervals with dependent rows."""
 
     steps: int
     rejected: int
@@ -85,6 +90,7 @@ class Figures:
     constraint_velocity_max: float
     energy_balance_max: float
     passages: Array
+    multiplier_errors: Array | None = None
 
 
 class Run(Protocol):
@@ -142,7 +148,14 @@ class Run(Protocol):
         ...
 
 
-def make_problem(system: System, signals: Signals, initial: State, times: Array, knots: Array | None = None) -> Problem:
+def make_problem(
+    system: System,
+    signals: Signals,
+    initial: State,
+    times: Array,
+    knots: Array | None = None,
+    asked: NDArray[np.bool_] | None = None,
+) -> Problem:
     """A problem, its times checked: see `integrate` for the arguments.
 
     Raises
@@ -155,14 +168,18 @@ def make_problem(system: System, signals: Signals, initial: State, times: Array,
         raise InputError("times must ascend from the start", field="times", remedy="give at least one later time")
     inner = np.array([] if knots is None else knots, dtype=float)
     inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
-    jumps = jump_times(signals, inputs_of(system.mechanism), inner)
-    return Problem(system, signals, initial, times, np.append(inner, times[-1]), jumps)
+    inputs = inputs_of(system.mechanism)
+    jumps = jump_times(signals, inputs, inner)
+    asked = np.ones(times.size, dtype=bool) if asked is None else asked
+    limits = step_limits(signals, inputs)
+    return Problem(system, signals, initial, times, np.append(inner, times[-1]), jumps, limits, asked)
 
 
-def empty_samples(times: Array, system: System) -> Samples:
+def empty_samples(times: Array, system: System, asked: NDArray[np.bool_] | None = None) -> Samples:
     """Samples to be filled."""
     widths = {"q": system.n, "v": system.n, "a": system.n, "lam": system.m, "energy": 3}
     arrays = {name: apart((times.size, width)) for name, width in widths.items()}
     for array in arrays.values():
         array.fill(np.nan)
-    return Samples(times=times, **arrays)
+    asked = np.ones(times.size, dtype=bool) if asked is None else np.ascontiguousarray(asked)
+    return Samples(times=times, asked=asked, **arrays)

@@ -47,6 +47,9 @@ class Solution:
     event : str
         Which event stopped the run, whose time and state are then the last sample; empty for none. Also of a run that
         failed where a point came to the end of its beam.
+    multiplier_errors : (m,) array, optional
+        How far multipliers may be off by errors of integration [N, N m]: the sum of what the errors of single steps
+        make of them within three cycles, times two. None where steps are not chosen by such errors.
     brake_energy : float
         Kinetic energy that brakes took as they engaged [J]: `work` is less by it from then on.
     findings : tuple of Finding
@@ -77,6 +80,7 @@ class Solution:
     method: str = ""
     evaluations: int = 0
     event: str = ""
+    multiplier_errors: Array | None = None
     brake_energy: float = 0.0
     findings: tuple[Finding, ...] = ()
     resting: bool = False
@@ -123,5 +127,7 @@ class Solution:
             energy_balance_max=max(self.energy_balance_max, abs(gained - before) + other.energy_balance_max),
             singular_positions=self.singular_positions + other.singular_positions,
             brake_energy=energy,
+            # Locked joints have rows that this run does not have.
+            multiplier_errors=self.multiplier_errors,
             findings=self.findings + tuple(one for one in other.findings if one.place not in known),
         )

@@ -5,17 +5,38 @@ Without the filter (Hosea and Shampine 1996) an undamped axial mode would dictat
 
 from __future__ import annotations
 
-from paraflex.kernel.arrays import fill
+from math import exp
+
+from paraflex.kernel.arrays import fill, largest
 from paraflex.kernel.bending import subtract_geometric
-from paraflex.kernel.compiling import routine
+from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.linear import factor_system, jacobian_times, solve_system, to_body_frame, to_ground_frame
 from paraflex.kernel.metric import mass_norm, mass_times
 from paraflex.kernel.packed import OMEGA2
-from paraflex.kernel.run_state import LAST_STEP, STEPS
+from paraflex.kernel.run_state import (
+    CYCLE,
+    LAST_STEP,
+    LOCAL,
+    MEMORY,
+    NEAR,
+    PEAK,
+    RECENT,
+    STEPS,
+    UNRESOLVED,
+)
 
 # Steps after which the factor that filters velocity errors is renewed; it serves a norm, so an old one will do.
 SLOW_AGE = 25
+# A velocity error of a step that nothing turns round moves the mechanism for half of a cycle, on average: by the error
+# times this fraction of it.
+MEMORY_PART = 0.25
+# Errors of forces add up over so many cycles; before that, driven and damped motions have forgotten them.
+CYCLES = 3.0
+# Forces below this part of the largest, N and N m alike, are controlled as if they had it.
+SMALL_FORCE = 1e-2
+# In a step forces are controlled no closer than to this part of the largest, well above rounding.
+LEAST_PART = 1e-6
 
 
 @routine
@@ -57,29 +78,68 @@ def history_error(h, march):
 
 
 @routine
-def filtered_error(system, g, gains, memory, march, work, slow):
+def filtered_error(system, g, gains, march, work, slow):
     """Mass norms [m] of the estimate in march.eq and march.ev: of position, and of the later effect of velocity.
 
-    The velocity error is filtered once more, as if by a step as long as `memory`: what is left of it is the part that
-    no elastic force turns round, and that moves the mechanism by memory times its size before the run ends.
+    The velocity error is filtered once more, as if by a step as long as a part of the cycle, its memory: what is left
+    of it is the part that no elastic force turns round, and that moves the mechanism by memory times its size.
 
     With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
     (M + g D + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
     for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2. Where Phi' = 0 is
-    imposed, and no outcome of integration, Phi_q eps_v = 0. `gains` says which: 1, alpha and beta, or zeros.
+    imposed, and no outcome of integration, Phi_q eps_v = 0. `gains` says which: 1, alpha and beta, or zeros. Over g
+    these are a stage's equations for an acceleration error, so mu / g is what the error makes of the multipliers.
     """
     filter_error(system, g, gains, march.eq, march.ev, work)
+    for r in range(work.mu.size):
+        march.forces[LOCAL, r] = abs(work.mu[r]) / g
     for j in range(march.q.size):
         march.eq[j] += g * work.x[j]
     position = mass_norm(system, work, march.eq)
     if march.counts[STEPS] % SLOW_AGE == 0:
         note_friction(system, march.q, march.v, slow.mu, slow.compliance)
-        factor_system(system, memory * memory, march.q, slow)
+        march.clock[MEMORY] = MEMORY_PART * march.clock[CYCLE]
+        factor_system(system, march.clock[MEMORY] * march.clock[MEMORY], march.q, slow)
+    memory = march.clock[MEMORY]
     for j in range(march.q.size):
         march.eq[j] = 0.0
         march.ev[j] = work.x[j]
     filter_error(system, memory, gains, march.eq, march.ev, slow)
     return position, memory * mass_norm(system, slow, slow.x)
+
+
+@routine
+def force_error(controls, h, march):
+    """What the step's error makes of the multipliers, relative to what is allowed; zero where that is not controlled.
+
+    Multipliers much smaller than the largest count as this part of it.
+    """
+    worst = 0.0
+    if controls.force_part == 0.0 or march.counts[NEAR] > 0:
+        return worst
+    least = SMALL_FORCE * largest(march.forces[PEAK])
+    for r in range(march.guess_lam.size):
+        peak = max(march.forces[PEAK, r], least)
+        if peak > 0.0:
+            worst = max(worst, march.forces[LOCAL, r] / peak)
+    return worst / allowed_part(controls, h, march)
+
+
+@inlined
+def allowed_part(controls, h, march):
+    """Error allowed in forces in a step, as a part of the largest."""
+    return max(controls.force_part * h / march.clock[CYCLE], LEAST_PART)
+
+
+@routine
+def note_forces(h, march):
+    """Keep the largest multipliers, and what local errors have changed them by within some cycles."""
+    forgotten = exp(-h / (CYCLES * march.clock[CYCLE]))
+    for r in range(march.guess_lam.size):
+        march.forces[PEAK, r] = max(march.forces[PEAK, r], abs(march.stage_lam[0, r]))
+        if march.counts[NEAR] == 0:
+            march.forces[RECENT, r] = forgotten * march.forces[RECENT, r] + march.forces[LOCAL, r]
+            march.forces[UNRESOLVED, r] = max(march.forces[UNRESOLVED, r], march.forces[RECENT, r])
 
 
 @routine

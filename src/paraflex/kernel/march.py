@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from math import ceil, inf, sqrt
+from math import ceil, inf, pi, sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.bodies import system_energy, weight_work
-from paraflex.kernel.compiling import inlined, kernel, releases_lock, routine
+from paraflex.kernel.compiling import kernel, releases_lock, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
+from paraflex.kernel.error import note_forces
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_system
@@ -19,6 +20,7 @@ from paraflex.kernel.projection import project
 from paraflex.kernel.run_state import (
     BALANCE,
     BAUMGARTE,
+    CYCLE,
     DPHI_MAX,
     DRIFTED,
     ENERGY_0,
@@ -26,6 +28,7 @@ from paraflex.kernel.run_state import (
     ERROR_TEST,
     FACTOR_B,
     FAILURES,
+    FASTEST,
     FINISHED,
     HELD_END,
     JUMPED,
@@ -53,6 +56,7 @@ from paraflex.kernel.run_state import (
     WORK,
 )
 from paraflex.kernel.sampled import CHANGED, FAILED, SLACK, control, next_instant
+from paraflex.kernel.samples import place_samples, sample_energies, solve_samples, step_work
 from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
@@ -72,72 +76,9 @@ GROWING = 0.05
 LEAST_PART = 1e-11
 # A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
 SMALLEST_PART = 1e-4
+TURN = 2.0 * pi
 # Steps from one instant to the next that differ by less than this part of them, by rounding, are of one length.
 SAME_STEP = 1e-11
-
-
-@inlined
-def interpolate(q0, v0, a0, q1, v1, a1, h, x):
-    """Cubic Hermite q and v at fraction x of an interval h, and the derivative of v as a."""
-    y = 1.0 - x
-    h00, h10, h01, h11 = (1.0 + 2.0 * x) * y * y, x * y * y, x * x * (3.0 - 2.0 * x), -x * x * y
-    d00, d10, d11 = -6.0 * x * y, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
-    q = h00 * q0 + h01 * q1 + h * (h10 * v0 + h11 * v1)
-    v = h00 * v0 + h01 * v1 + h * (h10 * a0 + h11 * a1)
-    a = d00 * (v0 - v1) / h + d10 * a0 + d11 * a1
-    return q, v, a
-
-
-@routine
-def write_samples(system, tableau, t, h, march, work, out):
-    """Fill every sample time within the accepted step from t to t + h."""
-    piece = 0
-    i = march.counts[SAMPLE]
-    while i < out.times.size and out.times[i] <= t + h * (1.0 + 1e-12):
-        time = out.times[i]
-        while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
-            piece += 1
-        s0, s1 = tableau.dense[piece], tableau.dense[piece + 1]
-        width = (tableau.c[s1] - tableau.c[s0]) * h
-        x = min(max((time - t - tableau.c[s0] * h) / width, 0.0), 1.0)
-        for j in range(march.q.size):
-            out.q[i, j], out.v[i, j], out.a[i, j] = interpolate(
-                march.stage_q[s0, j], march.stage_v[s0, j], march.stage_a[1, s0, j],
-                march.stage_q[s1, j], march.stage_v[s1, j], march.stage_a[1, s1, j], width, x,
-            )  # fmt: skip
-        interpolate_multipliers(tableau, (time - t) / h, march, out.lam[i])
-        out.energy[i, 0], out.energy[i, 1] = system_energy(system, out.q[i], out.v[i], work.scratch)
-        out.energy[i, 1] += spring_energy(system, out.lam[i]) + line_energy(system, out.q[i], out.v[i])[0]
-        # Within the step by the cubic with the power at its ends; over the whole step by the scheme's own quadrature.
-        done, last = min(max((time - t) / h, 0.0), 1.0), march.power.size - 1
-        left = 1.0 - done
-        out.energy[i, 2] = march.clock[WORK] + done * done * (3.0 - 2.0 * done) * step_work(tableau, h, march)
-        out.energy[i, 2] += h * done * left * (left * march.power[0] - done * march.power[last])
-        out.energy[i, 2] += weight_work(system, out.q[i], work.scratch) - march.clock[WEIGHT_0]
-        i += 1
-    march.counts[SAMPLE] = i
-
-
-@routine
-def step_work(tableau, h, march):
-    """Work done in the step, by the scheme's own quadrature."""
-    last, work = tableau.c.size - 1, 0.0
-    for s in range(last + 1):
-        work += h * tableau.A[last, s] * march.power[s]
-    return work
-
-
-@routine
-def interpolate_multipliers(tableau, x, march, lam):
-    """Multipliers at fraction x of the step: the polynomial through those at the nodes."""
-    fill(lam, 0.0)
-    for k in tableau.nodes:
-        weight = 1.0
-        for l in tableau.nodes:
-            if l != k:
-                weight *= (x - tableau.c[l]) / (tableau.c[k] - tableau.c[l])
-        for r in range(lam.size):
-            lam[r] += weight * march.stage_lam[k, r]
 
 
 @routine
@@ -243,14 +184,53 @@ def note_constraints(system, signals, t, march, work):
 
 
 @routine
-def accept(system, signals, tableau, controls, t, h, march, work, out):
+def note_cycle(system, controls, march):
+    """The time in which errors may add up to the tolerance: a turn of the fastest body so far, the run at most.
+
+    A body that moves as fast as its mechanism is large turns by a radian in that time.
+    """
+    if controls.by_cycle == 0:
+        return
+    for i in range(system.bodies.size):
+        o = system.bodies[i].offset
+        rate = max(abs(march.v[o + 2]), sqrt(march.v[o] ** 2 + march.v[o + 1] ** 2) / system.size)
+        march.clock[FASTEST] = max(march.clock[FASTEST], rate)
+    if march.clock[FASTEST] * controls.span > TURN:
+        march.clock[CYCLE] = TURN / march.clock[FASTEST]
+
+
+@routine
+def resolved(controls, t, h, march):
+    """A step from t as long as h at most that resolves what is given in time, and how forces on bodies turn."""
+    for j in controls.turning:
+        if abs(march.v[j]) * h > controls.turn_in_step:
+            h = controls.turn_in_step / abs(march.v[j])
+    low, high = 0, controls.limit_t.size - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if controls.limit_t[middle] <= t:
+            low = middle
+        else:
+            high = middle - 1
+    while low < controls.limit_t.size and controls.limit_t[low] < t + h:
+        h = min(h, max(controls.limit_h[low], controls.limit_t[low] - t))
+        low += 1
+    return h
+
+
+@routine
+def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1
     if march.counts[NEAR] > 0:
         note_crossing(system, t, h, march, work)
     if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
-    write_samples(system, tableau, t, h, march, work, out)
+    first = place_samples(tableau, t, h, march, out)
+    # Near a singular position forces have poles.
+    if march.counts[NEAR] == 0:
+        solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
+    sample_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)
     copy(march.stage_v[last], march.v)
     march.clock[WORK] += step_work(tableau, h, march)
@@ -271,6 +251,8 @@ def accept(system, signals, tableau, controls, t, h, march, work, out):
     march.counts[DRIFTED] = march.counts[HELD_END]
     if march.counts[NEAR] == 0:
         march.counts[PREPARED] = 0
+    note_forces(h, march)
+    note_cycle(system, controls, march)
     kinetic, strain = system_energy(system, march.q, march.v, work.scratch)
     strain += spring_energy(system, march.stage_lam[0]) + line_energy(system, march.q, march.v)[0]
     done = march.clock[WORK] + weight_work(system, march.q, work.scratch) - march.clock[WEIGHT_0]
@@ -293,7 +275,7 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
     if law.counts.size == 0:
         if march.counts[JUMPED] == 1:
             resume(system, signals, controls, march, work, aside)
-        return advance(system, signals, tableau, controls, stops, inf, 0.0, max_steps, march, work, slow, out)
+        return advance(system, signals, tableau, controls, stops, inf, 0.0, max_steps, march, work, slow, out, aside)
     most = march.counts[STEPS] + march.counts[REJECTED] + max_steps
     while True:
         t = march.clock[TIME]
@@ -307,14 +289,15 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
             resume(system, signals, controls, march, work, aside)
         pause = next_instant(law)
         code = advance(
-            system, signals, tableau, controls, stops, pause, law.clock[SLACK], most - taken, march, work, slow, out
+            system, signals, tableau, controls, stops, pause, law.clock[SLACK], most - taken, march, work, slow, out,
+            aside,
         )  # fmt: skip
         if code != FINISHED or march.clock[TIME] >= stops[stops.size - 1]:
             return code
 
 
 @routine
-def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, march, work, slow, out):
+def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, march, work, slow, out, aside):
     """Advance to the last of the stops, or to a pause before it, or to a stop within a slack of that: see `march`."""
     exponent = 1.0 / tableau.order
     for _ in range(max_steps):
@@ -331,6 +314,8 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
         left = end - t
         h = min(march.clock[STEP], controls.max_step)
         landing = False
+        if controls.fixed_step == 0.0:
+            h = resolved(controls, t, h, march)
         if controls.fixed_step > 0.0:
             # Intervals between stops are divided evenly.
             h = left / max(1.0, ceil(left / longest - 1e-6))
@@ -352,7 +337,7 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
             continue
         if cause == PAUSED and error <= 1.0:
             after_failure = march.counts[FAILURES] > 0
-            accept(system, signals, tableau, controls, t, h, march, work, out)
+            accept(system, signals, tableau, controls, t, h, march, work, out, aside)
             march.clock[TIME] = end if landing else t + h
             if controls.fixed_step > 0.0:
                 continue

@@ -16,9 +16,9 @@ from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
-from paraflex.kernel.march import step_work, write_samples
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import SAMPLE, WORK
+from paraflex.kernel.samples import step_work, write_samples
 from paraflex.kernel.stage import equations, place
 from paraflex.kernel.step import input_power, stage_start
 from paraflex.kernel.tangent import note_slopes

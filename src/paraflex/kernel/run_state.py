@@ -30,6 +30,16 @@ ROOT, ROOT_RATE, WIDEST = range(12, 15)
 ROOT_B = 17
 # The length of the last step attempted.
 TRIED = 18
+# g and b of the last stage.
+STAGE_G, STAGE_B = 19, 20
+# The time in which local errors may add up to the tolerance, the largest rate of the motion until now [1/s], and how
+# long a velocity error is taken to last in the factor that filters it.
+CYCLE, FASTEST, MEMORY = 21, 22, 23
+# What the last sample solved has changed forces by, as a part of the largest.
+SAMPLE_CHANGE = 24
+# Rows of March.forces: the largest multipliers, and what local errors have changed them by: in the last step, in the
+# last cycles, and in those that had most.
+PEAK, LOCAL, RECENT, UNRESOLVED = range(4)
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
 # and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
@@ -73,14 +83,14 @@ class Tableau(NamedTuple):
 class Controls(NamedTuple):
     """Settings of a run by the user.
 
-    The tolerance is that of a whole run of duration T: local errors add up to it when each step's stays below
-    tolerance h / T.
+    Local errors add up to the tolerance within March.clock[CYCLE] when each step's stays below tolerance h / cycle.
     """
 
-    tolerance_per_second: float  # tolerance / T [m/s]
+    tolerance: float  # [m]
+    span: float  # duration of the run [s]
+    by_cycle: int  # whether the cycle is that of the motion where that is shorter than the run
+    force_part: float  # error allowed in forces within a cycle, as a part of the largest; zero for no such control
     newton_fraction: float  # of the error allowed in a step, the part left to Newton
-    newton_memory: float  # how long a velocity error left by Newton is taken to last [s]
-    memory: float  # how long a velocity error of a step does, where no vibration turns it round [s]
     alpha: float
     beta: float
     gain: float  # where positive alpha and beta are this over the step
@@ -90,6 +100,10 @@ class Controls(NamedTuple):
     fixed_step: float  # zero where steps are chosen by their errors
     near_error: float  # error allowed in a step near a singular position, where that is more [m]
     dependent_rows: int
+    turning: NDArray[np.int64]  # coordinates that are angles of bodies of which it matters how they stand
+    limit_t: NDArray[np.float64]  # times from which on steps are limited by what is given in time, ascending
+    limit_h: NDArray[np.float64]  # and the longest step from each to the next
+    turn_in_step: float  # by how much bodies turn within a step at most [rad]
     dependent_part: float  # a row with less than this of its diagonal left when others are eliminated depends on them
 
 
@@ -113,6 +127,8 @@ class March(NamedTuple):
     vs: NDArray[np.float64]
     eq: NDArray[np.float64]  # (n,) estimated errors of a step
     ev: NDArray[np.float64]
+    forces: NDArray[np.float64]  # (4, m) of multipliers: see PEAK
+    guess_lam: NDArray[np.float64]  # (m,) multipliers of a sample before the equations of motion are solved there
     torques: NDArray[np.float64]  # (acting,) of the motors at a stage, or forces, then of loads given in time
     algorithmic: NDArray[np.float64]  # (2, n) accelerations that the Newmark family carries, of the last step and this
     passages: NDArray[np.float64]  # (2, MOST_PASSAGES) from when to when more rows were dependent than at the start
@@ -126,6 +142,7 @@ class Samples(NamedTuple):
     """Dense output: requested times and the solution there."""
 
     times: NDArray[np.float64]
+    asked: NDArray[np.bool_]  # (times,) those that are kept; others serve to find the largest loads
     q: NDArray[np.float64]  # (times, n)
     v: NDArray[np.float64]
     a: NDArray[np.float64]
@@ -137,7 +154,7 @@ def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGA
     """Allocate the state of a run with n coordinates and m constraint rows."""
     stage_v = apart((stages, n))
     return March(
-        clock=apart(19),
+        clock=apart(25),
         counts=apart(18, np.int64),
         q=apart(n),
         v=apart(n),
@@ -153,6 +170,8 @@ def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGA
         vs=apart(n),
         eq=apart(n),
         ev=apart(n),
+        forces=apart((4, m)),
+        guess_lam=apart(m),
         torques=apart(acting),
         algorithmic=apart((2, n)),
         passages=apart((2, MOST_PASSAGES)),

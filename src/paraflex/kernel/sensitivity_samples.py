@@ -1,4 +1,4 @@
-"""Derivatives of a run at its samples within a step: those of the results of `march.write_samples`."""
+"""Derivatives of a run at its samples within a step: those of the results of `samples.write_samples`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, fill
 from paraflex.kernel.compiling import by_reference, routine
-from paraflex.kernel.march import interpolate
+from paraflex.kernel.samples import interpolate
 
 # Central differences of fourth order over this part of a parameter's size, and their places and weights.
 DIFFERENCE_STEP = 1e-3
@@ -89,7 +89,7 @@ def work_sensitivity(tableau, k, history, sensitivity):
 
 @routine
 def multiplier_sensitivity(tableau, k, fraction, d_fraction, history, sensitivity, out):
-    """Derivative of the multipliers at a fraction of step k that moves itself: see `march.interpolate_multipliers`."""
+    """Derivative of the multipliers at a fraction of step k that moves itself, as by `interpolate_multipliers`."""
     fill(out, 0.0)
     for s in tableau.nodes:
         weight = 1.0
@@ -110,7 +110,7 @@ def multiplier_sensitivity(tableau, k, fraction, d_fraction, history, sensitivit
 
 @routine
 def sensitivity_at_samples(tableau, k, history, sensitivity):
-    """Derivatives at every sample time within step k: those of the results of `march.write_samples`."""
+    """Derivatives at every sample time within step k: those of the results of `samples.write_samples`."""
     t, h, last = history.t[k], history.h[k], tableau.c.size - 1
     piece, i = 0, sensitivity.taken[0]
     while i < sensitivity.times.size and sensitivity.times[i] <= t + h * (1.0 + 1e-12):

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from math import isfinite
 
-from paraflex.kernel.arrays import copy, fill
+from paraflex.kernel.arrays import copy, fill, largest
 from paraflex.kernel.axes import axis_power
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import dissipated_power, note_friction
-from paraflex.kernel.error import embedded_error, filtered_error, history_error
+from paraflex.kernel.error import allowed_part, embedded_error, filtered_error, force_error, history_error
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
 from paraflex.kernel.linear import SINGULAR_PART, orient
@@ -34,6 +34,7 @@ from paraflex.kernel.newmark import newmark_end, newmark_start
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
     CONTRACTION,
+    CYCLE,
     ENTERS,
     EXCESS,
     FACTOR_B,
@@ -48,10 +49,13 @@ from paraflex.kernel.run_state import (
     NOT_FINITE,
     PART_END,
     PAUSED,
+    PEAK,
     POSITION,
     PREPARED,
     PROJECTION,
     REUSED,
+    STAGE_B,
+    STAGE_G,
     WIDEST,
 )
 from paraflex.kernel.signals import evaluate_signal
@@ -65,6 +69,9 @@ IMPATIENCE = 20
 # So many times a stage is gone on with: with slopes of friction where it has come to, or because it contracts and the
 # step is fixed.
 ROUNDS = 6
+# How long a velocity error that Newton leaves is taken to last, as a fraction of the cycle: it must count for more than
+# its share of one step, since it is of one sign while a factor is in use.
+NEWTON_MEMORY = 0.02
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
 
@@ -205,8 +212,12 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         if march.counts[PREPARED] == 0:
             return ENTERS, 0.0
         begin_near(system, march, work)
-    allowed = controls.tolerance_per_second * h
-    newton_tolerance = controls.newton_fraction * controls.tolerance_per_second * h
+    allowed = controls.tolerance * h / march.clock[CYCLE]
+    newton_tolerance, newton_memory = controls.newton_fraction * allowed, NEWTON_MEMORY * march.clock[CYCLE]
+    force = largest(march.forces[PEAK])
+    if controls.force_part > 0.0 and force > 0.0:
+        acceleration = controls.newton_fraction * allowed_part(controls, h, march) * force / system.total_mass
+        newton_tolerance = min(newton_tolerance, acceleration * max(b, g * newton_memory))
     before = march.counts[ITERATIONS]
     i, rounds, held = 1, 0, 0.0
     while i < stages:
@@ -220,7 +231,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             fill(march.shift, 0.0)
         status, iterations, contraction = solve_stage(
             system, signals, x, g, b, weights, march.qs, march.vs, march.stage_a[1, i], march.stage_lam[i], march.shift,
-            march.torques, newton_tolerance, controls.newton_memory, march.clock[CONTRACTION],
+            march.torques, newton_tolerance, newton_memory, march.clock[CONTRACTION],
             controls.dependent_part, march.counts[NEAR] > 0, held, lag, work,
         )  # fmt: skip
         march.counts[ITERATIONS] += iterations
@@ -266,6 +277,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             system, signals, march.stage_t[1, i], work.q, work.v, march.stage_lam[i], march.torques, work
         )
         i += 1
+    march.clock[STAGE_G], march.clock[STAGE_B] = g, b
     note_excess(system, march.counts[ITERATIONS] - before, fresh, march)
     moved = 0.0
     if march.counts[NEAR] > 0:
@@ -277,10 +289,10 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             embedded_error(tableau, h, march)
         else:
             history_error(h, march)
-        error_q, error_v = filtered_error(system, b**0.5, gains, controls.memory, march, work, slow)
+        error_q, error_v = filtered_error(system, b**0.5, gains, march, work, slow)
         if march.counts[NEAR] > 0:
             allowed = max(allowed, controls.near_error * share_of_passage(h, march))
-        error = max(max(error_q, error_v) / allowed, moved)
+        error = max(max(error_q, error_v) / allowed, moved, force_error(controls, h, march))
     if not isfinite(error):
         return NOT_FINITE, 0.0
     return PAUSED, error

@@ -13,7 +13,7 @@ from paraflex.plots.selection import names_of
 from paraflex.report.curves import followed
 from paraflex.report.page import Chart, Panel
 from paraflex.report.text import NO_VALUE, by_run, number, table
-from paraflex.results.loads import load_figures, ranked, sliding_joints
+from paraflex.results.loads import error_text, load_figures, ranked, sliding_joints
 from paraflex.results.sensors import sensor_groups
 from paraflex.units import STRESS, speed_text
 
@@ -77,12 +77,12 @@ def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str,
         if one["power_max"] is not None and one["speed_max"] is not None:
             speed = speed_text(one["speed_max"], one["speed_unit"] or "", ".3g")
             of += f"; up to {speed}, {number(one['power_max'])} W"
-        tiles.append((f"largest drive {kind}", f"{number(most)} {unit}".rstrip(), of))
+        tiles.append((f"largest drive {kind}", f"{number(most)}{error_text(one, 'torque')} {unit}".rstrip(), of))
     forces = ranked(figures, "joints", "force_max")
     if forces and forces[0][0]:
         most, run, joint, one = forces[0]
         where = f"{_whose(run)}{text_symbol(joint)}, t = {one['force_time']:.4g} s"
-        tiles.append(("largest joint force", f"{number(most)} N", where))
+        tiles.append(("largest joint force", f"{number(most)}{error_text(one, 'force')} N", where))
     return tiles
 
 
@@ -180,10 +180,12 @@ def _joints_of(joints: Mapping[str, Mapping[str, Any]], unit: str, what: str, wi
     for name, one in joints.items():
         cells = [number(one[key]) for key in ("least", "most", "speed_max", "speed_time")]
         for key in ("force", "moment"):
-            value = number(one[f"{key}_max"], beside=wide[f"{key}_max"])
+            value = number(one[f"{key}_max"], beside=wide[f"{key}_max"]) + error_text(one, key)
             cells += [value, NO_VALUE if value in ("0", NO_VALUE) else number(one[f"{key}_time"])]
         rows.append((text_symbol(name), cells))
     note = f"From and to: {coordinate}; largest magnitudes and their times."
+    if any(error_text(one, key) for one in joints.values() for key in ("force", "moment")):
+        note += " After ±: how far a load may be off by errors of integration, where that is more than 1 %."
     return table(heads, rows, caption=what, note=f"{what}. {note}")
 
 

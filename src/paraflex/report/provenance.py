@@ -18,6 +18,8 @@ _REQUEST_FIELDS = (
     "duration",
     "samples",
     "tolerance",
+    "tolerance_per",
+    "control",
     "method",
     "step",
     "constraints",

@@ -20,6 +20,7 @@ from paraflex.results.doubts import MODE, keep_findings
 from paraflex.results.following import KEPT_METRICS, ErrorSpan, Part, metric_variables, too_short
 from paraflex.results.labelled import (
     Variables,
+    error_variables,
     label,
     link_coordinates,
     link_variables,
@@ -77,6 +78,11 @@ def tracking_dataset(
         name: (("mode", "time", *dims), np.stack([padded(frame[name][1], motion.t.size) for frame in frames]))
         for name, (dims, _) in frames[0].items()
     }
+    errors = [error_variables(one) for one in records]
+    if all(errors):
+        data |= {
+            name: (("mode", *dims), np.stack([one[name][1] for one in errors])) for name, (dims, _) in errors[0].items()
+        }
     data |= load_variables(mechanism, motion.t)
     if any(one.controllers for one in records):
         internal = [padded(internal_torques(one.task, one.mode, one.torque), motion.t.size) for one in records]
@@ -102,7 +108,7 @@ def tracking_dataset(
     out = with_totals(xr.Dataset(data, coords=coordinates))
     out = out.assign(metric_variables(out, KEPT_METRICS, task.path.duration))
     label(out, mechanism)
-    out.attrs = provenance(mechanism, records[0].method, options or IntegrationOptions(), parameters) | {
+    out.attrs = provenance(task.system, records[0].method, options, parameters) | {
         "motion_end": task.path.duration,
         "after": task.after.value,
         "path_length_run": length_fraction(task.path, float(motion.t[-1])),

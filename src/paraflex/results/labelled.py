@@ -63,6 +63,9 @@ UNITS = (
         "tip_transverse": ("transverse tip displacement", "m"),
         "tip_slope": ("tip slope", "rad"),
         "point_position": ("position of a named point", "m"),
+        "joint_force_error": ("how far the force of a joint may be off by errors of integration", "N"),
+        "joint_moment_error": ("how far the moment of a joint may be off by errors of integration", "N m"),
+        "drive_torque_error": ("how far the torque of a prescribed motion may be off by errors of integration", "N m"),
         "joint_force": ("force of a joint's first body on its second, ground frame", "N"),
         "joint_moment": ("moment of a joint's first body on its second", "N m"),
         "multiplier": (
@@ -192,6 +195,15 @@ def _load_variables(links: Links, mechanism: Mechanism) -> Variables:
     return out
 
 
+def error_variables(links: Links) -> Variables:
+    """How far loads of joints and drives may be off in a run; none where that is not known."""
+    if links.load_errors is None:
+        return {}
+    force, moment, drive = links.load_errors
+    out: Variables = {"joint_force_error": (("joint",), force), "joint_moment_error": (("joint",), moment)}
+    return out | ({"drive_torque_error": (("drive",), drive)} if drive.size else {})
+
+
 def with_totals(data: xr.Dataset) -> xr.Dataset:
     """A dataset with what follows from its variables: powers, energies, the largest stresses."""
     for torque, name in (("torque", "motor"), ("applied_torque", "motor"), ("drive_torque", "drive")):
@@ -243,7 +255,7 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
     if READING in data:
         readings = list(mechanism.sensor_units())
         name_units(data[READING], list(dict.fromkeys(readings)), readings)
-    _name_efforts(data, drives, "drive_speed", ("drive_torque",))
+    _name_efforts(data, drives, "drive_speed", ("drive_torque", "drive_torque_error"))
     for name, of_angle, of_travel in (("joint_coordinate", "rad", "m"), ("joint_speed", "rad/s", "m/s")):
         if name in data:
             kinds = sorted({joint.slides for joint in mechanism.joints})
@@ -271,16 +283,17 @@ def name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -
 
 
 def provenance(
-    mechanism: Mechanism, method: str, options: IntegrationOptions, parameters: dict[str, Any] | None
+    system: System, method: str, options: IntegrationOptions | None, parameters: dict[str, Any] | None
 ) -> dict[str, Any]:
     """Origin of results: mechanism, method, options of own methods, the model as read, versions."""
+    mechanism, options = system.described, options or IntegrationOptions()
     # Other models and engines integrate in ways of their own.
     ours = options.to_dict() if method == options.method.title else {}
     effector = mechanism.end_effector
     return {
         "mechanism": mechanism.name,
         **({} if effector is None else {"end_effector_point": str(effector.point)}),
-        "tolerance": options.tolerance,
+        "tolerance": options.tolerance_for(system),
         "baumgarte_alpha": options.alpha,
         "baumgarte_beta": options.beta,
         "method": method,

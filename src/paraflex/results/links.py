@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
-from paraflex.dynamics.joint_loads import FrameLoad, drive_torques, frame_load, joint_loads
+from paraflex.dynamics.joint_loads import FrameLoad, LoadErrors, drive_torques, frame_load, joint_loads, load_errors
 from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
@@ -55,6 +55,8 @@ class Links:
         Angle of each joint [rad], or travel along its axis [m], and its rate; None of models that do not give them.
     drive_torque, drive_speed : (k, drives) arrays, optional
         Torque [N m] or force [N] of each prescribed motion on its joint's second body, and the rate of that joint.
+    load_errors : LoadErrors, optional
+        How far loads of joints and drives may be off by errors of integration; None where that is not known.
     frame_load : FrameLoad, optional
         What the mechanism does to the ground.
     sections : SectionResult, optional
@@ -84,6 +86,7 @@ class Links:
     joint_speed: Array | None = None
     drive_torque: Array | None = None
     drive_speed: Array | None = None
+    load_errors: LoadErrors | None = None
     frame_load: FrameLoad | None = None
     sections: SectionResult | None = None
     sensors: Array | None = None
@@ -110,7 +113,8 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
     points = stacked_motions([point_motion(system, ref, q, v, a) for ref in named], samples)
     multipliers = solution.multipliers[:samples]
     coordinates = {joint.name: joint_coordinate(system, joint.name, q, v) for joint in mechanism.joints}
-    loads = joint_loads(system, [joint.name for joint in mechanism.joints], q, multipliers, torques[:samples])
+    joints, errors = [joint.name for joint in mechanism.joints], solution.multiplier_errors
+    loads = joint_loads(system, joints, q, multipliers, torques[:samples])
     drawn = system_drawing(system, q)
     return Links(
         angle=q[:, first],
@@ -134,6 +138,7 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         joint_speed=_stacked([each.rate for each in coordinates.values()], samples),
         drive_torque=drive_torques(system, multipliers)[:, : len(mechanism.prescribed)],
         drive_speed=_stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
+        load_errors=None if errors is None else load_errors(system, joints, errors),
         frame_load=frame_load(system, drawn.joints, loads, q, v),
         sections=section_result(system, q, v, a, multipliers),
         sensors=_sensors(system, sensor_readings(system, q, v, a, multipliers, torques[:samples])),

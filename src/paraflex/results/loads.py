@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.results.numbers import finite_or_none, largest
 from paraflex.units import STRESS, speed_text
+from paraflex.validity.plausibility import RESOLVED
 
 Figures = dict[str, float | str | None]
 # Of the rate of a joint that a torque or a force drives.
@@ -27,7 +28,9 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
         `joints.<joint>` with least, most, their unit (rad or m), speed_max, force_max [N] and moment_max [N m];
         `motors.<motor>` and `drives.<prescribed motion>` with torque_max, its unit and that of speed_max (None of both
         kinds in results of earlier versions), speed_max, power_max [W] and energy [J]; `frame` with force_max and
-        moment_max of the mechanism on the ground. Times of the largest values are torque_time, force_time, ... [s].
+        moment_max of the mechanism on the ground. Of joints and drives force_error, moment_error and torque_error say
+        how far the loads may be off by errors of integration, where that is known. Times of the largest values are
+        torque_time, force_time, ... [s].
     """
     out: dict[str, Any] = {}
     if "stress_max" in run:
@@ -51,6 +54,7 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
                     "torque_unit": unit,
                     "speed_unit": None if unit is None else _RATES[unit],
                     **_most("torque", run[torque].sel({dim: name})),
+                    **_error_of(run, f"{torque}_error", {dim: name}, "torque_error"),
                     **_most("speed", run[f"{dim}_speed"].sel({dim: name})),
                     **_most("power", run[f"{dim}_power"].sel({dim: name})),
                     "energy": finite_or_none(run[f"{dim}_energy"].sel({dim: name}).item()),
@@ -76,6 +80,17 @@ def _most(name: str, values: xr.DataArray) -> Figures:
     if most is not None and "time" in sizes.dims:
         when = float(sizes["time"].values[np.nanargmax(np.where(np.isfinite(sizes.values), sizes.values, np.nan))])
     return {f"{name}_max": most, f"{name}_time": when}
+
+
+def _error_of(run: xr.Dataset, variable: str, place: Mapping[str, str], key: str) -> Figures:
+    """How far a load may be off by errors of integration; nothing where that is not known."""
+    return {key: finite_or_none(run[variable].sel(place).item())} if variable in run else {}
+
+
+def error_text(figures: Mapping[str, Any], load: str) -> str:
+    """How far a largest load may be off, to be put beside it, where that is more than a hundredth of it."""
+    most, error = figures[f"{load}_max"], figures.get(f"{load}_error")
+    return f" ± {error:.1g}" if most and error is not None and error > RESOLVED * most else ""
 
 
 def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
@@ -107,6 +122,8 @@ def _joint(one: xr.Dataset, *, slides: bool) -> Figures:
         **_most("speed", one["joint_speed"]),
         **_most("force", one["joint_force"]),
         **_most("moment", one["joint_moment"]),
+        **_error_of(one, "joint_force_error", {}, "force_error"),
+        **_error_of(one, "joint_moment_error", {}, "moment_error"),
     }
 
 
@@ -139,7 +156,7 @@ def joint_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
         return ""
     most, name, joint, one = known[0]
     whose = f"mode {name}: " if name else ""
-    return f"{whose}largest joint force {most:.4g} N in {joint}{_at(one['force_time'])}"
+    return f"{whose}largest joint force {most:.4g}{error_text(one, 'force')} N in {joint}{_at(one['force_time'])}"
 
 
 def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
@@ -169,7 +186,8 @@ def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
     whose = f"mode {mode}: " if mode else ""
     return [
         f"{whose}drive {name}: {_EFFORTS[one['torque_unit']]} up to "
-        f"{_with_unit(one['torque_max'], one['torque_unit'])}{_at(one['torque_time'])}; "
+        f"{one['torque_max']:.4g}{error_text(one, 'torque')} {one['torque_unit'] or ''}".rstrip()
+        + f"{_at(one['torque_time'])}; "
         f"speed up to {speed_text(one['speed_max'], one['speed_unit'] or '').rstrip()}; "
         f"power up to {one['power_max']:.4g} W{_at(one['power_time'])}"
         for name, one in figures.get("drives", {}).items()
@@ -182,7 +200,3 @@ _EFFORTS = {"N m": "torque", "N": "force", None: "torque or force"}
 
 def _at(time: float | None) -> str:
     return "" if time is None else f" at t = {time:.4g} s"
-
-
-def _with_unit(value: float, unit: str | None) -> str:
-    return f"{value:.4g} {unit or ''}".rstrip()

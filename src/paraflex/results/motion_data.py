@@ -21,6 +21,7 @@ from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import (
     Variables,
+    error_variables,
     label,
     link_coordinates,
     link_variables,
@@ -79,7 +80,7 @@ def motion_dataset(
     data: dict[str, Any] = {
         name: (("time", *dims), padded(each, run.times.size)) for name, (dims, each) in values.items()
     }
-    data |= load_variables(mechanism, run.times)
+    data |= error_variables(links) | load_variables(mechanism, run.times)
     data |= {name: getattr(solution, name) for name in RUN_FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
     if run.in_time:
@@ -89,7 +90,7 @@ def motion_dataset(
     coordinates = {"time": run.times, "coordinate": _coordinate_names(run), **link_coordinates(system, links)}
     out = with_totals(xr.Dataset(data, coords=coordinates))
     label(out, mechanism)
-    out.attrs = provenance(mechanism, title_of(solution.method), options or IntegrationOptions(), parameters) | {
+    out.attrs = provenance(system, title_of(solution.method), options, parameters) | {
         "kind": "motion",
         "singular_positions": json.dumps(solution.singular_positions),
     }

@@ -148,7 +148,9 @@ class LawStudy(Study[LawComparison], CheckedFields):
         laws = {name: ([one.name for one in self.laws[law]], path) for name, (law, path) in self.rows.items()}
         members = members_of(mechanism)
         columns = [column for name in self.metrics for column in METRICS[name].columns(members)]
-        about = provenance(mechanism, options.method.title, options, self.parameters) | {"error": self.error.value}
+        about = provenance(self._task.system, options.method.title, options, self.parameters) | {
+            "error": self.error.value
+        }
         return law_dataset(laws, modes, found, columns, members, about)
 
 

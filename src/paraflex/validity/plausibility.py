@@ -11,6 +11,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, missed_turns
+from paraflex.dynamics.joint_loads import load_errors
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
@@ -25,6 +26,10 @@ from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, doubtful_numbers, 
 # Energy that is missing or too much, over the largest: the library's runs have up to 3e-4 with the default tolerance.
 # An energy below the second part of weight times size is none.
 UNBALANCED, NO_ENERGY = 1e-3, 1e-9
+# Errors of forces over the largest value of each; loads below the second part of all weight, or of that times the size,
+# or of the largest load, do not matter.
+RESOLVED, _NO_FORCE = 0.01, 1e-3
+_NAMED = 3
 # Slope of a link in its frame beyond which it is a spring rather than a link [rad].
 STEEP = 0.7
 # Tracking error over the diagonal of the path: the library's worst mode, RAParM-I's +-+-, has 0.34, dwell included.
@@ -127,6 +132,7 @@ def doubtful_results(
         *_large_slopes(where, system, solution),
         *_overstressed(where, system, solution),
         *_unbalanced(where, system, solution),
+        *_unresolved(where, system, solution),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
     ]
@@ -191,9 +197,7 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
 
 
 def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
-    """Runs of flexible links whose energy is not what work has made it."""
-    if not system.n_flexible:
-        return
+    """Runs whose energy is not what work has made it."""
     energy = np.abs(solution.kinetic_energy) + np.abs(solution.strain_energy)
     # Models without energies have NaN there.
     largest = max(float(np.nanmax(each, initial=0.0)) for each in (energy, np.abs(solution.work)))
@@ -205,6 +209,43 @@ def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[F
             "energy is missing or too much, and motion and stresses may be as far off",
             "give a smaller tolerance; damping of the material helps where stiff links vibrate",
         )  # fmt: skip
+
+
+def _unresolved(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+    """Forces that errors of integration leave uncertain, as of vibrations that are faster than the steps follow."""
+    if solution.multiplier_errors is None:
+        return
+    names = [joint.name for joint in system.mechanism.joints]
+    errors = load_errors(system, names, solution.multiplier_errors)
+    peaks = load_errors(system, names, np.nanmax(np.abs(solution.multipliers), axis=0, initial=0.0))
+    weight = system.total_mass * STANDARD_GRAVITY
+    drives = ["N" if system.mechanism.slides(one.joint) else "N m" for one in system.mechanism.prescribed]
+    rows = [(f"force in {name}", "N", *pair) for name, *pair in zip(names, errors.force, peaks.force, strict=True)]
+    rows += [
+        (f"moment in {name}", "N m", *pair) for name, *pair in zip(names, errors.moment, peaks.moment, strict=True)
+    ]
+    rows += [
+        (f"{'force' if unit == 'N' else 'torque'} of prescribed.{one.name}", unit, *pair)
+        for one, unit, *pair in zip(system.mechanism.prescribed, drives, errors.drive, peaks.drive, strict=True)
+    ]
+    least = {
+        unit: _NO_FORCE * max([weight * arm, *(peak for _, other, _, peak in rows if other == unit)])
+        for unit, arm in (("N", 1.0), ("N m", system.size))
+    }
+    off = [row for row in rows if row[2] > RESOLVED * row[3] and row[3] > least[row[1]]]
+    if not off:
+        return
+    worst = sorted(off, key=lambda row: -row[2] / row[3])[:_NAMED]
+    listed = "; ".join(f"the {name} by {error:.1g} of {peak:.3g} {unit}" for name, unit, error, peak in worst)
+    more = f" and {len(off) - len(worst)} more" if len(off) > len(worst) else ""
+    flexible = system.n_flexible > 0
+    yield Finding(
+        "forces-unresolved", where.place,
+        f"forces may be off by errors of integration: {listed}{more}"
+        + ("; vibrations faster than the steps are left out, of stresses too" if flexible else ""),
+        ("give beams damping, say damping = { ratios = [0.01] }, choose control = \"forces\", or " if flexible else "")
+        + "give a smaller tolerance",
+    )  # fmt: skip
 
 
 def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:

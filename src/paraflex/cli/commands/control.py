@@ -54,7 +54,8 @@ class CompareLawsRequest:
         ),
     ] = field(default_factory=list)
     tolerance: Annotated[
-        float | None, Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 1e-5.")
+        float | None,
+        Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 4e-5 of the size."),
     ] = None
     method: MethodOption = None
     step: Annotated[

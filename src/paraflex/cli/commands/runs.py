@@ -54,7 +54,18 @@ class RunRequest:
         ),
     ] = field(default_factory=list)
     tolerance: Annotated[
-        float | None, Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 1e-5.")
+        float | None,
+        Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 4e-5 of the size."),
+    ] = None
+    tolerance_per: Annotated[
+        str | None,
+        Option(metavar="cycle|run", help="Time in which errors may add up to the tolerance. Default: cycle."),
+    ] = None
+    control: Annotated[
+        str | None,
+        Option(
+            metavar="positions|forces", help="Whose errors choose the steps. Default: forces, where links are rigid."
+        ),
     ] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
     alpha: Annotated[float | None, Option(metavar="1/S", parser=PER_SECOND, help="Baumgarte coefficient alpha.")] = None

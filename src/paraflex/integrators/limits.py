@@ -1,0 +1,76 @@
+"""Longest steps that resolve what is given in time: loads, torques and prescribed motions."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.dynamics import Inputs
+from paraflex.kernel.packed import Signals
+
+# Below this part of the largest value, or of its derivative by the shortest piece, changes are rounding.
+_SMALL, _ROUNDING = 1e-6, 1e-11
+# Limits are rounded down to powers of this, and one is kept where many pieces have the same.
+_GRADES = 2.0**0.5
+
+
+class Limits(NamedTuple):
+    """Longest steps [s] from some times on; empty where nothing is given that limits them.
+
+    Attributes
+    ----------
+    times : (k,) array
+        Ascending [s].
+    steps : (k,) array
+        The longest step from each time to the next [s]; infinite for none.
+    """
+
+    times: Array
+    steps: Array
+
+
+def step_limits(signals: Signals, inputs: Inputs) -> Limits:
+    """Limits of steps by all signals: a radian of them as if they were sines, h^2 |g''| <= max |g| in each piece.
+
+    g is the signal itself, or of a prescribed motion its acceleration, without what is constant in it.
+    """
+    looked_at = [(k, 0) for k in (*inputs.motors, *inputs.loads)] + [(k, 2) for k in inputs.prescribed]
+    own = [limits for k, order in looked_at if (limits := _limits_of(signals, k, order)).times.size]
+    if not own:
+        return Limits(np.zeros(0), np.zeros(0))
+    times = np.unique(np.concatenate([limits.times for limits in own]))
+    steps = np.min([limits.steps[_piece(limits.times, times)] for limits in own], axis=0)
+    first = np.append(True, steps[1:] != steps[:-1])
+    return Limits(np.ascontiguousarray(times[first]), np.ascontiguousarray(steps[first]))
+
+
+def _piece(starts: Array, times: Array) -> Array:
+    return np.clip(np.searchsorted(starts, times, side="right") - 1, 0, None)
+
+
+def _limits_of(signals: Signals, k: int, order: int) -> Limits:
+    first, last = int(signals.start[k]), int(signals.start[k + 1]) - 1
+    starts, coefficients = signals.breaks[first:last], signals.coefficients[first:last]
+    lengths = np.diff(signals.breaks[first : last + 1])
+    # At both ends and in the middle of each piece.
+    places = lengths[:, None] * np.array([0.0, 0.5, 1.0])
+    value, curvature = (_derivative(coefficients, n, places) for n in (order, order + 2))
+    shortest = float(np.min(lengths))
+    rounding = _ROUNDING * float(np.max(np.abs(coefficients[:, 0]), initial=0.0))
+    scale = max(0.5 * float(np.ptp(value)), _SMALL * float(np.max(np.abs(value))), rounding / shortest**order)
+    noise = rounding / shortest ** (order + 2)
+    bending = np.maximum(np.max(np.abs(curvature), axis=1) - noise, 0.0)
+    if scale == 0.0 or not bending.any():
+        return Limits(np.zeros(0), np.zeros(0))
+    with np.errstate(divide="ignore"):
+        steps = np.sqrt(scale / bending)
+        steps = _GRADES ** np.floor(np.log(steps) / np.log(_GRADES))
+    return Limits(starts, steps)
+
+
+def _derivative(coefficients: Array, order: int, x: Array) -> Array:
+    """Derivative of each piece's polynomial (k, 6), of ascending powers, at its places (k, j)."""
+    derived = np.polynomial.polynomial.polyder(coefficients.T, order)
+    return np.stack([np.polynomial.polynomial.polyval(column, derived, tensor=False) for column in x.T], axis=1)

@@ -1,0 +1,174 @@
+"""Samples within a step: positions and velocities between its stages, and the equations of motion solved there."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from paraflex.kernel.arrays import add, copy, fill, largest
+from paraflex.kernel.bending import note_all_axial_forces
+from paraflex.kernel.bodies import system_energy, weight_work
+from paraflex.kernel.compiling import inlined, routine
+from paraflex.kernel.constraints import note_friction
+from paraflex.kernel.factor import factor_bodies
+from paraflex.kernel.joints import line_energy, spring_energy
+from paraflex.kernel.linear import orient, right_hand_side, solve_system
+from paraflex.kernel.metric import mass_norm
+from paraflex.kernel.packed import INDEX_1
+from paraflex.kernel.run_state import SAMPLE, SAMPLE_CHANGE, STAGE_B, STAGE_G, WEIGHT_0, WORK
+from paraflex.kernel.stage import ROUNDING, WORST_CONTRACTION, note_torques, place, residuals
+
+# A sample this part of a step before its end is its end.
+SAME_TIME = 1e-9
+# Forces at a sample are solved to this part of the largest, in so many iterations at most.
+FORCES, MOST = 1e-4, 8
+# And between samples that are kept, interpolated ones may be off by this part.
+FORCES_BETWEEN = 2e-2
+
+
+@inlined
+def interpolate(q0, v0, a0, q1, v1, a1, h, x):
+    """Cubic Hermite q and v at fraction x of an interval h, and the derivative of v as a."""
+    y = 1.0 - x
+    h00, h10, h01, h11 = (1.0 + 2.0 * x) * y * y, x * y * y, x * x * (3.0 - 2.0 * x), -x * x * y
+    d00, d10, d11 = -6.0 * x * y, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
+    q = h00 * q0 + h01 * q1 + h * (h10 * v0 + h11 * v1)
+    v = h00 * v0 + h01 * v1 + h * (h10 * a0 + h11 * a1)
+    a = d00 * (v0 - v1) / h + d10 * a0 + d11 * a1
+    return q, v, a
+
+
+@routine
+def write_samples(system, tableau, t, h, march, work, out):
+    """Fill every sample time within the step from t to t + h, without solving the equations of motion there."""
+    first = place_samples(tableau, t, h, march, out)
+    sample_energies(system, tableau, t, h, first, march, work, out)
+
+
+@routine
+def place_samples(tableau, t, h, march, out):
+    """Interpolate the state, accelerations and multipliers at every sample time in the step; the first of them."""
+    piece, first = 0, march.counts[SAMPLE]
+    i = first
+    while i < out.times.size and out.times[i] <= t + h * (1.0 + 1e-12):
+        time = out.times[i]
+        while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
+            piece += 1
+        s0, s1 = tableau.dense[piece], tableau.dense[piece + 1]
+        width = (tableau.c[s1] - tableau.c[s0]) * h
+        x = min(max((time - t - tableau.c[s0] * h) / width, 0.0), 1.0)
+        for j in range(march.q.size):
+            out.q[i, j], out.v[i, j], out.a[i, j] = interpolate(
+                march.stage_q[s0, j], march.stage_v[s0, j], march.stage_a[1, s0, j],
+                march.stage_q[s1, j], march.stage_v[s1, j], march.stage_a[1, s1, j], width, x,
+            )  # fmt: skip
+        interpolate_multipliers(tableau, (time - t) / h, march, out.lam[i])
+        i += 1
+    march.counts[SAMPLE] = i
+    return first
+
+
+@routine
+def solve_samples(system, signals, controls, t, h, first, march, work, out, aside):
+    """Solve the equations of motion at the samples within the step that are not at its end.
+
+    Of samples that only serve to find the largest loads those are left that the last one solved lets expect to be near.
+    Each is a stage of its own, with the g and b of the last one and such explicit parts that q and v are those between
+    the stages where the acceleration is: elastic coordinates too stiff to be resolved follow the forces at the sample.
+    """
+    for i in range(first, march.counts[SAMPLE]):
+        needed = out.asked[i] or march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN
+        if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
+            solve_sample(system, signals, controls, i, march, work, out, aside)
+
+
+@routine
+def solve_sample(system, signals, controls, i, march, work, out, aside):
+    """Solve one sample with the factor of the step, or with a factor made there where that one does not serve."""
+    q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
+    g, b = march.clock[STAGE_G], march.clock[STAGE_B]
+    for j in range(q.size):
+        march.qs[j], march.vs[j] = q[j] - b * a[j], v[j] - g * a[j]
+        march.eq[j] = a[j]
+    copy(lam, march.guess_lam)
+    solved = solve_at(system, signals, out.times[i], g, b, march, work, a, lam, march.torques)
+    if not solved:
+        copy(march.eq, a)
+        copy(march.guess_lam, lam)
+        copy(work.redundant, aside.redundant)
+        note_friction(system, q, v, aside.mu, aside.compliance)
+        note_all_axial_forces(system, q, v, a, lam, aside, aside.geometric)
+        factor_bodies(system, b, q, aside)
+        orient(system, q, aside, controls.dependent_part)
+        solved = solve_at(system, signals, out.times[i], g, b, march, aside, a, lam, march.torques)
+    if not solved:
+        copy(march.eq, a)
+        copy(march.guess_lam, lam)
+    change, size = 0.0, 0.0
+    for r in range(lam.size):
+        change, size = max(change, abs(lam[r] - march.guess_lam[r])), max(size, abs(lam[r]))
+    march.clock[SAMPLE_CHANGE] = change / size if size > 0.0 else 0.0
+    for j in range(q.size):
+        q[j], v[j] = march.qs[j] + b * a[j], march.vs[j] + g * a[j]
+
+
+@routine
+def solve_at(system, signals, t, g, b, march, work, a, lam, torques):
+    """Newton's iteration at a sample, until forces are right to FORCES of the largest; whether it gets there."""
+    previous, contraction = 0.0, WORST_CONTRACTION
+    note_torques(signals, t, torques)
+    for _ in range(MOST):
+        place(march.qs, march.vs, g, b, a, march.shift[:0], work)
+        residuals(system, signals, t, INDEX_1, work.q, work.v, a, lam, torques, work)
+        right_hand_side(system, work, 1.0)
+        solve_system(system, work, work.x, work.mu)
+        add(work.x, a)
+        add(work.mu, lam)
+        # Of equations of motion: accelerations times the mass are forces.
+        change = max(largest(work.mu), system.total_mass * mass_norm(system, work, work.x))
+        size = max(largest(lam), system.total_mass * mass_norm(system, work, a))
+        if not isfinite(change):
+            return False
+        if previous > 0.0:
+            contraction = change / previous
+        if change <= ROUNDING * size or change * contraction <= FORCES * size:
+            return True
+        if contraction > WORST_CONTRACTION and previous > 0.0:
+            return False
+        previous = change
+    return False
+
+
+@routine
+def sample_energies(system, tableau, t, h, first, march, work, out):
+    """Energies and work at the samples of the step from the first on."""
+    for i in range(first, march.counts[SAMPLE]):
+        out.energy[i, 0], out.energy[i, 1] = system_energy(system, out.q[i], out.v[i], work.scratch)
+        out.energy[i, 1] += spring_energy(system, out.lam[i]) + line_energy(system, out.q[i], out.v[i])[0]
+        # Within the step by the cubic with the power at its ends; over the whole step by the scheme's own quadrature.
+        done, last = min(max((out.times[i] - t) / h, 0.0), 1.0), march.power.size - 1
+        left = 1.0 - done
+        out.energy[i, 2] = march.clock[WORK] + done * done * (3.0 - 2.0 * done) * step_work(tableau, h, march)
+        out.energy[i, 2] += h * done * left * (left * march.power[0] - done * march.power[last])
+        out.energy[i, 2] += weight_work(system, out.q[i], work.scratch) - march.clock[WEIGHT_0]
+
+
+@routine
+def step_work(tableau, h, march):
+    """Work done in the step, by the scheme's own quadrature."""
+    last, work = tableau.c.size - 1, 0.0
+    for s in range(last + 1):
+        work += h * tableau.A[last, s] * march.power[s]
+    return work
+
+
+@routine
+def interpolate_multipliers(tableau, x, march, lam):
+    """Multipliers at fraction x of the step: the polynomial through those at the nodes."""
+    fill(lam, 0.0)
+    for k in tableau.nodes:
+        weight = 1.0
+        for l in tableau.nodes:
+            if l != k:
+                weight *= (x - tableau.c[l]) / (tableau.c[k] - tableau.c[l])
+        for r in range(lam.size):
+            lam[r] += weight * march.stage_lam[k, r]
