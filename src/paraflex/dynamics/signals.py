@@ -134,7 +134,9 @@ def _refined(place: str, law: AngleLaw, t: Array) -> InputSignals:
     # At the ends of a stretch values and derivatives are those within it.
     low, high = max(a + 1e-12 * (b - a), np.nextafter(a, b)), min(b - 1e-12 * (b - a), np.nextafter(b, a))
     for _ in range(_HALVINGS):
-        pieces = piecewise_quintic(t, *_evaluate(place, law, np.clip(t, low, high)))
+        value, rate, acceleration = _evaluate(place, law, np.clip(t, low, high))
+        outside = t - np.clip(t, low, high)
+        pieces = piecewise_quintic(t, value + outside * rate, rate + outside * acceleration, acceleration)
         half = 0.5 * np.diff(t)
         value = _evaluate(place, law, t[:-1] + half)[0]
         powers = half[:, None] ** np.arange(_DEGREE + 1)

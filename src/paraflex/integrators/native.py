@@ -68,7 +68,7 @@ _LEAST, _DIGITS = 1e-12, 64.0
 _FORCE_SAFETY = 2.0
 # So much of a turn, or of a vibration given in time, is in a step at most [rad]: forces and work follow it to less than
 # a thousandth. By the order of a method, four for higher ones.
-_PHASES = {1: 0.15, 2: 0.15, 3: 0.5, 4: 1.0}
+_PHASES = {1: 0.15, 2: 0.15, 3: 0.4, 4: 0.7}
 # Points this close are one, as a part of the mechanism's size.
 _SAME_PLACE = 1e-9
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.

@@ -20,8 +20,9 @@ from paraflex.limits import SAMPLES, SHORTEST, at_most
 # A tolerance beyond this part of the mechanism's size is doubted: at a fifth the five-bar's tracking error is half as
 # large again.
 LOOSE = 0.05
-# The default tolerance, as a part of the mechanism's size (which is rounded to a power of two).
-RELATIVE_TOLERANCE = 4e-5
+# The default tolerance, as a part of the mechanism's size (which is rounded to a power of two): where bodies are flexible
+# and where none is, so that forces follow.
+RELATIVE_TOLERANCE, RELATIVE_TOLERANCE_RIGID = 4e-5, 4e-6
 # Under control of forces, what local errors within a cycle may change a force by, as a part of its largest value.
 FORCE_PART = 0.0025
 _REMEDIES = {
@@ -56,7 +57,7 @@ class IntegrationOptions(CheckedFields):
     ----------
     tolerance : float, optional
         What local errors within a cycle, or the whole run, may add up to [m] (root mean square over the mass); by
-        default 4e-5 of the mechanism's size. With a fixed step it only says how exactly Newton's iteration solves.
+        default 4e-5 of the mechanism's size, or 4e-6 where no body is flexible. With a fixed step it only says how exactly Newton's iteration solves.
     tolerance_per : TolerancePer or str
         "cycle" (own methods): the time in which the fastest body so far turns once, or travels 2 pi times the size of
         the mechanism, and no longer than the run. Errors of driven or damped motions then stay as they are, and those
@@ -134,7 +135,9 @@ class IntegrationOptions(CheckedFields):
 
     def tolerance_for(self, system: System) -> float:
         """The tolerance [m], by default relative to the size of a system."""
-        return RELATIVE_TOLERANCE * system.size if self.tolerance is None else self.tolerance
+        if self.tolerance is not None:
+            return self.tolerance
+        return system.size * (RELATIVE_TOLERANCE if system.n_flexible else RELATIVE_TOLERANCE_RIGID)
 
     def for_system(self, system: System) -> IntegrationOptions:
         """The same options with the tolerance that they have for a system."""

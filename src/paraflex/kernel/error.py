@@ -25,6 +25,7 @@ from paraflex.kernel.run_state import (
     STEPS,
     UNRESOLVED,
 )
+from paraflex.kernel.stage import largest_part
 
 # Steps after which the factor that filters velocity errors is renewed; it serves a norm, so an old one will do.
 SLOW_AGE = 25
@@ -33,8 +34,6 @@ SLOW_AGE = 25
 MEMORY_PART = 0.25
 # Errors of forces add up over so many cycles; before that, driven and damped motions have forgotten them.
 CYCLES = 3.0
-# Forces below this part of the largest, N and N m alike, are controlled as if they had it.
-SMALL_FORCE = 1e-2
 # In a step forces are controlled no closer than to this part of the largest, well above rounding.
 LEAST_PART = 1e-6
 
@@ -110,19 +109,10 @@ def filtered_error(system, g, gains, march, work, slow):
 
 @routine
 def force_error(controls, h, march):
-    """What the step's error makes of the multipliers, relative to what is allowed; zero where that is not controlled.
-
-    Multipliers much smaller than the largest count as this part of it.
-    """
-    worst = 0.0
-    if controls.force_part == 0.0 or march.counts[NEAR] > 0:
-        return worst
-    least = SMALL_FORCE * largest(march.forces[PEAK])
-    for r in range(march.guess_lam.size):
-        peak = max(march.forces[PEAK, r], least)
-        if peak > 0.0:
-            worst = max(worst, march.forces[LOCAL, r] / peak)
-    return worst / allowed_part(controls, h, march)
+    """What the step's error makes of the multipliers, relative to what is allowed; zero where that is not controlled."""
+    if controls.force_part == 0.0 or march.counts[NEAR] > 0 or largest(march.forces[PEAK]) == 0.0:
+        return 0.0
+    return largest_part(march.forces[LOCAL], march.forces[PEAK]) / allowed_part(controls, h, march)
 
 
 @inlined

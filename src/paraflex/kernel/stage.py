@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from paraflex.kernel.arrays import add
+from paraflex.kernel.arrays import add, largest
 from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.bodies import begin_body
 from paraflex.kernel.compiling import inlined, routine, unoptimised
@@ -45,6 +45,8 @@ WORST_CONTRACTION = 0.5
 # After a guess that was right but for a direction that the norm hardly sees, the second change may be larger than the
 # first by so much.
 SECOND_CONTRACTION = 20.0
+# Forces below this part of the largest, N and N m alike, are controlled as if they had it.
+SMALL_FORCE = 1e-2
 # A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it. It is not
 # taken to be better than this: motion that sets in makes it worse at once.
 AGEING, BEST_CONTRACTION = 1.05, 0.02
@@ -89,7 +91,7 @@ def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
 @routine
 def solve_stage(
     system, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, newton_tolerance, time_scale, contraction,
-    dependent_part, renew, held, lag, work,
+    dependent_part, renew, held, lag, peaks, force_tolerance, work,
 ):  # fmt: skip
     """Newton iteration for one stage; a and lam are starting guesses and then the solution.
 
@@ -108,6 +110,9 @@ def solve_stage(
         See `factor_schur`.
     renew : bool
         Whether every iteration factors the matrix where it stands, as near a singular position.
+    peaks, force_tolerance : (m,) array, float
+        Largest error left in each multiplier, as a part of these; zero where positions alone count. Where constraints
+        leave nothing free accelerations tell nothing of multipliers.
     held, lag : float
         There what rows say is trusted as far as these tell: see `hold_rows`.
 
@@ -135,6 +140,8 @@ def solve_stage(
         add(work.mu, lam)
         size = mass_norm(system, work, work.x)
         change = size * max(b, g * time_scale)
+        if force_tolerance > 0.0:
+            change = max(change, newton_tolerance / force_tolerance * largest_part(work.mu, peaks))
         if shift.size > 0:
             place(qs, vs, g, b, a, shift, work)
             constraint_values(system, signals, t, work.q, work.v, work.scratch, work.rows, work.mu)
@@ -161,6 +168,15 @@ def solve_stage(
             return CONVERGED, iteration, min(contraction, WORST_CONTRACTION)
         previous = change
     return SLOW, MAX_ITERATIONS, contraction
+
+
+@inlined
+def largest_part(mu, peaks):
+    """The largest of multipliers relative to peaks, of which small ones count as a part of the largest."""
+    part, least = 0.0, SMALL_FORCE * largest(peaks)
+    for r in range(mu.size):
+        part = max(part, abs(mu[r]) / max(peaks[r], least))
+    return part
 
 
 @inlined

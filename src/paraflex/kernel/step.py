@@ -72,6 +72,8 @@ ROUNDS = 6
 # How long a velocity error that Newton leaves is taken to last, as a fraction of the cycle: it must count for more than
 # its share of one step, since it is of one sign while a factor is in use.
 NEWTON_MEMORY = 0.02
+# The part of the error allowed in forces that Newton's iteration may leave, where they are controlled.
+FORCE_FRACTION = 0.03
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
 
@@ -214,10 +216,12 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         begin_near(system, march, work)
     allowed = controls.tolerance * h / march.clock[CYCLE]
     newton_tolerance, newton_memory = controls.newton_fraction * allowed, NEWTON_MEMORY * march.clock[CYCLE]
-    force = largest(march.forces[PEAK])
+    force, force_tolerance = largest(march.forces[PEAK]), 0.0
     if controls.force_part > 0.0 and force > 0.0:
-        acceleration = controls.newton_fraction * allowed_part(controls, h, march) * force / system.total_mass
-        newton_tolerance = min(newton_tolerance, acceleration * max(b, g * newton_memory))
+        force_tolerance = FORCE_FRACTION * allowed_part(controls, h, march)
+        newton_tolerance = min(
+            newton_tolerance, force_tolerance * force / system.total_mass * max(b, g * newton_memory)
+        )
     before = march.counts[ITERATIONS]
     i, rounds, held = 1, 0, 0.0
     while i < stages:
@@ -232,7 +236,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         status, iterations, contraction = solve_stage(
             system, signals, x, g, b, weights, march.qs, march.vs, march.stage_a[1, i], march.stage_lam[i], march.shift,
             march.torques, newton_tolerance, newton_memory, march.clock[CONTRACTION],
-            controls.dependent_part, march.counts[NEAR] > 0, held, lag, work,
+            controls.dependent_part, march.counts[NEAR] > 0, held, lag, march.forces[PEAK], force_tolerance, work,
         )  # fmt: skip
         march.counts[ITERATIONS] += iterations
         march.clock[CONTRACTION] = contraction

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, missed_turns
-from paraflex.dynamics.joint_loads import load_errors
+from paraflex.dynamics import System, joint_coordinate, missed_turns
+from paraflex.dynamics.joint_loads import drive_torques, load_errors
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
@@ -201,14 +201,23 @@ def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[F
     energy = np.abs(solution.kinetic_energy) + np.abs(solution.strain_energy)
     # Models without energies have NaN there.
     largest = max(float(np.nanmax(each, initial=0.0)) for each in (energy, np.abs(solution.work)))
+    largest = max(largest, _turned_over(system, solution))
     least = NO_ENERGY * system.total_mass * STANDARD_GRAVITY * system.size
     if largest > least and solution.energy_balance_max > UNBALANCED * largest:
         yield Finding(
             "energy-unbalanced", where.place,
             f"energy and work do not balance: {100.0 * solution.energy_balance_max / largest:.2g} % of the largest "
-            "energy is missing or too much, and motion and stresses may be as far off",
-            "give a smaller tolerance; damping of the material helps where stiff links vibrate",
+            "energy or work is missing or too much, and motion and stresses may be as far off",
+            "give a smaller tolerance or shorter steps; damping of the material helps where stiff links vibrate",
         )  # fmt: skip
+
+
+def _turned_over(system: System, solution: Solution) -> float:
+    """Work that prescribed motions do and take, which loads may take and do at once [J]."""
+    torques = np.nan_to_num(drive_torques(system, solution.multipliers))
+    rates = [joint_coordinate(system, one.joint, solution.q, solution.v).rate for one in system.mechanism.prescribed]
+    power = sum(np.abs(torque * rate) for torque, rate in zip(torques.T, rates, strict=True))
+    return float(np.trapezoid(power, solution.t)) if rates else 0.0
 
 
 def _unresolved(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
