@@ -20,8 +20,8 @@ from paraflex.limits import SAMPLES, SHORTEST, at_most
 # A tolerance beyond this part of the mechanism's size is doubted: at a fifth the five-bar's tracking error is half as
 # large again.
 LOOSE = 0.05
-# The default tolerance, as a part of the mechanism's size (which is rounded to a power of two): where bodies are flexible
-# and where none is, so that forces follow.
+# The default tolerance, as a part of the mechanism's size, which is rounded to a power of two: where bodies are flexible,
+# and where none is, as exactness costs little there.
 RELATIVE_TOLERANCE, RELATIVE_TOLERANCE_RIGID = 4e-5, 4e-6
 # Under control of forces, what local errors within a cycle may change a force by, as a part of its largest value.
 FORCE_PART = 0.0025
@@ -57,7 +57,8 @@ class IntegrationOptions(CheckedFields):
     ----------
     tolerance : float, optional
         What local errors within a cycle, or the whole run, may add up to [m] (root mean square over the mass); by
-        default 4e-5 of the mechanism's size, or 4e-6 where no body is flexible. With a fixed step it only says how exactly Newton's iteration solves.
+        default 4e-5 of the mechanism's size, or 4e-6 where no body is flexible. With a fixed step it only says how
+        exactly Newton's iteration solves.
     tolerance_per : TolerancePer or str
         "cycle" (own methods): the time in which the fastest body so far turns once, or travels 2 pi times the size of
         the mechanism, and no longer than the run. Errors of driven or damped motions then stay as they are, and those
