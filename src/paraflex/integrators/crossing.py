@@ -124,12 +124,14 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     scratch, end = make_scratch(packed), last.samples
     work += weight_work(packed, end.q[0], scratch) - weight_work(packed, problem.initial.q, scratch)
     end.energy[0, 2] = work
-    return Samples(*(np.concatenate([old[kept], new]) for old, new in zip(run.samples, end, strict=True)))
+    joined: list[Any] = [np.concatenate([old[kept], new]) for old, new in zip(run.samples, end, strict=True)]
+    return Samples(*joined)
 
 
 def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
     """A run that starts from a state, from which alone its first sample and the power there follow."""
-    here = replace(problem, initial=State(t, q, v), times=np.array([t]), stops=np.array([t + problem.span]))
+    moment = {"times": np.array([t]), "stops": np.array([t + problem.span]), "asked": np.ones(1, dtype=bool)}
+    here = replace(problem, initial=State(t, q, v), **moment)
     begun = native.prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))
     begun.start()
     return begun

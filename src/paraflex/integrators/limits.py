@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import Inputs
@@ -46,7 +47,7 @@ def step_limits(signals: Signals, inputs: Inputs) -> Limits:
     return Limits(np.ascontiguousarray(times[first]), np.ascontiguousarray(steps[first]))
 
 
-def _piece(starts: Array, times: Array) -> Array:
+def _piece(starts: Array, times: Array) -> NDArray[np.intp]:
     return np.clip(np.searchsorted(starts, times, side="right") - 1, 0, None)
 
 

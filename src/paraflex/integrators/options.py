@@ -20,8 +20,8 @@ from paraflex.limits import SAMPLES, SHORTEST, at_most
 # A tolerance beyond this part of the mechanism's size is doubted: at a fifth the five-bar's tracking error is half as
 # large again.
 LOOSE = 0.05
-# The default tolerance, as a part of the mechanism's size, which is rounded to a power of two: where bodies are flexible,
-# and where none is, as exactness costs little there.
+# The default tolerance, as a part of the mechanism's size, which is rounded to a power of two: of flexible bodies, and
+# where all are rigid, as exactness costs little there.
 RELATIVE_TOLERANCE, RELATIVE_TOLERANCE_RIGID = 4e-5, 4e-6
 # Under control of forces, what local errors within a cycle may change a force by, as a part of its largest value.
 FORCE_PART = 0.0025
@@ -59,11 +59,11 @@ class IntegrationOptions(CheckedFields):
         What local errors within a cycle, or the whole run, may add up to [m] (root mean square over the mass); by
         default 4e-5 of the mechanism's size, or 4e-6 where no body is flexible. With a fixed step it only says how
         exactly Newton's iteration solves.
-    tolerance_per : TolerancePer or str
+    tolerance_per : TolerancePer
         "cycle" (own methods): the time in which the fastest body so far turns once, or travels 2 pi times the size of
         the mechanism, and no longer than the run. Errors of driven or damped motions then stay as they are, and those
         of undamped ones grow with the number of cycles; the cost grows with the duration alone. "run": the whole run.
-    control : Control or str, optional
+    control : Control, optional
         "forces": steps are so short that local errors within a cycle change no force of a joint or drive by more than
         0.25 % of its largest value. "positions": by positions alone. By default "forces" where no body is flexible, as
         vibrations of undamped beams would then be resolved down to the fastest that bears on a force.
@@ -108,8 +108,8 @@ class IntegrationOptions(CheckedFields):
     constraints: Treatment | str | None = None
     automatic_gains: bool = False
     events: tuple[Event, ...] = ()
-    control: Control | str | None = None
-    tolerance_per: TolerancePer | str = TolerancePer.CYCLE
+    control: Control | None = None
+    tolerance_per: TolerancePer = TolerancePer.CYCLE
 
     def __post_init__(self, parameters: Any) -> None:
         super().__post_init__()
@@ -128,9 +128,6 @@ class IntegrationOptions(CheckedFields):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError("must not be negative", field=name, value=value, remedy="choose it from 0 to 50 1/s")
-        object.__setattr__(self, "tolerance_per", as_enum(TolerancePer, self.tolerance_per, "tolerance_per"))
-        if self.control is not None:
-            object.__setattr__(self, "control", as_enum(Control, self.control, "control"))
         self._check_step()
         self._check_constraints()
 

@@ -80,7 +80,8 @@ def motion_dataset(
     data: dict[str, Any] = {
         name: (("time", *dims), padded(each, run.times.size)) for name, (dims, each) in values.items()
     }
-    data |= error_variables(links) | load_variables(mechanism, run.times)
+    data |= error_variables(links)
+    data |= load_variables(mechanism, run.times)
     data |= {name: getattr(solution, name) for name in RUN_FIGURES}
     data |= {name: each.item() for name, each in validity_variables([run.validity]).items()}
     if run.in_time:

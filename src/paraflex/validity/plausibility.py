@@ -220,41 +220,48 @@ def _turned_over(system: System, solution: Solution) -> float:
     return float(np.trapezoid(power, solution.t)) if rates else 0.0
 
 
+class _Load(NamedTuple):
+    """A load of a joint or drive: its name, its unit, how far it may be off, and its largest value."""
+
+    name: str
+    unit: str
+    error: float
+    peak: float
+
+
 def _unresolved(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
     """Forces that errors of integration leave uncertain, as of vibrations that are faster than the steps follow."""
-    if solution.multiplier_errors is None:
-        return
-    names = [joint.name for joint in system.mechanism.joints]
-    errors = load_errors(system, names, solution.multiplier_errors)
-    peaks = load_errors(system, names, np.nanmax(np.abs(solution.multipliers), axis=0, initial=0.0))
+    loads = [] if solution.multiplier_errors is None else list(_loads(system, solution, solution.multiplier_errors))
     weight = system.total_mass * STANDARD_GRAVITY
-    drives = ["N" if system.mechanism.slides(one.joint) else "N m" for one in system.mechanism.prescribed]
-    rows = [(f"force in {name}", "N", *pair) for name, *pair in zip(names, errors.force, peaks.force, strict=True)]
-    rows += [
-        (f"moment in {name}", "N m", *pair) for name, *pair in zip(names, errors.moment, peaks.moment, strict=True)
-    ]
-    rows += [
-        (f"{'force' if unit == 'N' else 'torque'} of prescribed.{one.name}", unit, *pair)
-        for one, unit, *pair in zip(system.mechanism.prescribed, drives, errors.drive, peaks.drive, strict=True)
-    ]
     least = {
-        unit: _NO_FORCE * max([weight * arm, *(peak for _, other, _, peak in rows if other == unit)])
+        unit: _NO_FORCE * max([weight * arm, *(one.peak for one in loads if one.unit == unit)])
         for unit, arm in (("N", 1.0), ("N m", system.size))
     }
-    off = [row for row in rows if row[2] > RESOLVED * row[3] and row[3] > least[row[1]]]
+    off = [one for one in loads if one.error > RESOLVED * one.peak and one.peak > least[one.unit]]
     if not off:
         return
-    worst = sorted(off, key=lambda row: -row[2] / row[3])[:_NAMED]
-    listed = "; ".join(f"the {name} by {error:.1g} of {peak:.3g} {unit}" for name, unit, error, peak in worst)
-    more = f" and {len(off) - len(worst)} more" if len(off) > len(worst) else ""
-    flexible = system.n_flexible > 0
-    yield Finding(
-        "forces-unresolved", where.place,
-        f"forces may be off by errors of integration: {listed}{more}"
-        + ("; vibrations faster than the steps are left out, of stresses too" if flexible else ""),
-        ("give beams damping, say damping = { ratios = [0.01] }, choose control = \"forces\", or " if flexible else "")
-        + "give a smaller tolerance",
-    )  # fmt: skip
+    worst = sorted(off, key=lambda one: -one.error / one.peak)[:_NAMED]
+    listed = "; ".join(f"the {one.name} by {one.error:.1g} of {one.peak:.3g} {one.unit}" for one in worst)
+    text = f"forces may be off by errors of integration: {listed}"
+    text += f" and {len(off) - len(worst)} more" if len(off) > len(worst) else ""
+    remedy = "give a smaller tolerance"
+    if system.n_flexible:
+        text += "; vibrations faster than the steps are left out, of stresses too"
+        remedy = f'give beams damping, say damping = {{ ratios = [0.01] }}, choose control = "forces", or {remedy}'
+    yield Finding("forces-unresolved", where.place, text, remedy)
+
+
+def _loads(system: System, solution: Solution, errors: Array) -> Iterator[_Load]:
+    """Forces and moments of the joints and of the prescribed motions."""
+    mechanism, largest = system.mechanism, np.nanmax(np.abs(solution.multipliers), axis=0, initial=0.0)
+    names = [joint.name for joint in mechanism.joints]
+    off, peak = (load_errors(system, names, each) for each in (errors, largest))
+    for k, name in enumerate(names):
+        yield _Load(f"force in {name}", "N", float(off.force[k]), float(peak.force[k]))
+        yield _Load(f"moment in {name}", "N m", float(off.moment[k]), float(peak.moment[k]))
+    for k, one in enumerate(mechanism.prescribed):
+        what, unit = ("force", "N") if mechanism.slides(one.joint) else ("torque", "N m")
+        yield _Load(f"{what} of prescribed.{one.name}", unit, float(off.drive[k]), float(peak.drive[k]))
 
 
 def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
