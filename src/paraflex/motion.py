@@ -18,11 +18,11 @@ from paraflex.dynamics import (
     State,
     System,
     balanced_state,
-    build_system,
     consistent_state,
     constant_signals,
     law_signal,
     pack_signals,
+    standing_system,
     start_state,
 )
 from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning
@@ -195,9 +195,9 @@ def motion_start(
     if duration is None:
         raise InputError("is missing", field="duration", remedy="give it in seconds, or in the model's [study]")
     check_times(duration, samples)
-    system = build_system(Mechanism.made_of(given))
     if isinstance(start, State) and balanced:
         raise InputError("a state is as it is", field="balanced", value=balanced, remedy="leave one of the two out")
+    system = standing_system(Mechanism.made_of(given), start)
     state = start if isinstance(start, State) else _state(system, start, balanced)
     return system, state, np.linspace(state.time, state.time + duration, samples)
 

@@ -26,7 +26,7 @@ from paraflex.dynamics.linearise import BALANCED as BALANCED, LOWEST
 from paraflex.errors import NumericalError, ProportionError
 from paraflex.findings import Finding
 from paraflex.limits import OUT_OF_PROPORTION
-from paraflex.mechanism import Mechanism
+from paraflex.mechanism import Mechanism, standing
 from paraflex.mechanism.poses import approximate_poses
 from paraflex.validity import stiff_modes
 
@@ -72,8 +72,9 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
     InputError
         An unknown assembly.
     """
+    mechanism = standing(mechanism, assembly)
     system, rigid = build_system(mechanism), build_system(mechanism.rigid())
-    starts = tuple(closure_of(rigid, one) for one in mechanism.assemblies)
+    starts = tuple(closure_of(_standing(rigid, one.name), one) for one in mechanism.assemblies)
     if not mechanism.assemblies:
         return Examination(system, rigid, starts, None, None, None)
     wanted = mechanism.assembly(assembly)
@@ -85,6 +86,12 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
         return Examination(system, rigid, starts, chosen, free, reach(rigid, chosen.state, free.freedoms))
     except ProportionError as error:
         return Examination(system, rigid, starts, chosen, None, None, str(error))
+
+
+def _standing(rigid: System, assembly: str) -> System:
+    """The system in an assembly, anew only if prescribed motions begin elsewhere in it."""
+    begun = standing(rigid.mechanism, assembly)
+    return rigid if begun.prescribed == rigid.mechanism.prescribed else build_system(begun)
 
 
 def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Finding]:

@@ -14,8 +14,8 @@ from paraflex.dynamics import (
     State,
     System,
     Vibration,
+    assembled_position,
     natural_frequencies,
-    project_position,
     static_equilibrium,
     undeformed,
 )
@@ -86,7 +86,7 @@ def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float
         )
     q = start.q
     for time in np.linspace(0.0, at, _POSES_BETWEEN + 1)[1:]:
-        q = project_position(rigid, moment_signals(model.mechanism, float(time)), float(time), q)
+        q = assembled_position(rigid, moment_signals(model.mechanism, float(time)), float(time), q)
     return State(at, q, np.zeros(rigid.n))
 
 

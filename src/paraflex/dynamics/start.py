@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
-from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
@@ -22,7 +22,17 @@ from paraflex.dynamics.system import System, build_system
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
-from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start, check_start
+from paraflex.mechanism import (
+    Assembly,
+    BodyValues,
+    Deflection,
+    Mechanism,
+    PointRef,
+    Start,
+    begun_at,
+    check_start,
+    standing,
+)
 
 # Largest gap of joints at a given start [sizes of the mechanism, rad], and largest error of velocities, as a fraction
 # of them.
@@ -78,6 +88,27 @@ def start_state(
     if q is None:
         q = _coordinates(system, signals, start, assembly, time)
     return State(time, q, _velocities(system, signals, start, time, q))
+
+
+def standing_system(mechanism: Mechanism, start: Start | State | str | None, assembly: str | None = None) -> System:
+    """The system of a mechanism; prescribed motions whose start is not given begin at that of a run.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    start : Start, State or str, optional
+        Start of the run; a text is the name of an assembly.
+    assembly : str, optional
+        The first by default.
+    """
+    if isinstance(start, State):
+        system = build_system(mechanism)
+        begun = begun_at(
+            mechanism, lambda joint: float(joint_coordinate(system, joint, start.q[None]).value[0]), start.time
+        )
+        return system if begun is mechanism else build_system(begun)
+    named = isinstance(start, str)
+    return build_system(standing(mechanism, start if named else assembly, None if named else start))
 
 
 def pose_at_rest(system: System, start: Start | State | None, assembly: str | None = None) -> State:

@@ -12,6 +12,7 @@ import scipy
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
+from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.projection import (
     NAMED,
     assemble,
@@ -36,11 +37,9 @@ from paraflex.mechanism.poses import approximate_poses
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
 # Rotation of links at the start of the damped iteration [rad].
 _ASIDE = 1e-2
-# Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
-_POSITION_STIFFNESS = 1.0
 # Links that must be deflected by more than this part of their size for loops to close do not fit together.
 _LARGEST_DEFLECTION = 0.1
-# The same for velocities: rates of deflection are to be small against those of links.
+# Weight of stiffness against mass [s^2] for velocities: rates of deflection are to be small against those of links.
 _VELOCITY_STIFFNESS = 1e3
 
 
@@ -126,7 +125,7 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
         rigid = build_system(system.described.rigid())
         signals = moment_signals(rigid.mechanism, 0.0)
         start = reference_pose(rigid, rigid.mechanism.assembly(assembly.name))
-        pose = project_position(rigid, signals, 0.0, start)
+        pose = assembled_position(rigid, signals, 0.0, start)
         return undeformed(system, rigid, State(0.0, pose, np.zeros(rigid.n))).q
     q = np.zeros(system.n)
     placed = set()
@@ -170,6 +169,24 @@ def point_position(system: System, q: Array, ref: PointRef) -> Array:
     return q[body.position] + np.array([c * local[0] - s * local[1], s * local[0] + c * local[1]])
 
 
+def assembled_position(system: System, signals: Signals, t: float, q: Array) -> Array:
+    """Coordinates (n,) of an assembly with closed loops, followed from its approximate pose to where drives start.
+
+    Raises
+    ------
+    AssemblyError
+        See `project_position`; the limit of reach is named if one is between the assembly and the start of a drive.
+    """
+    moved, limit = follow_drives(system, signals, t, q)
+    try:
+        return project_position(system, signals, t, moved)
+    except AssemblyError as error:
+        if not limit:
+            raise
+        remedy = "start prescribed motions within the mechanism's reach"
+        raise AssemblyError(f"{limit}, the limit of their reach,", Moment(t, 0), error.partial, remedy) from error
+
+
 def project_position(system: System, signals: Signals, t: float, q: Array) -> Array:
     """The nearest coordinates, in the metric of mass and stiffness, that satisfy the constraints.
 
@@ -178,7 +195,7 @@ def project_position(system: System, signals: Signals, t: float, q: Array) -> Ar
     AssemblyError
         The loops cannot be closed from there; its partial result is where they come closest to it.
     """
-    change = partial(constraint_change, system, stiffness=_POSITION_STIFFNESS)
+    change = partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
     closest, phi = assemble(system, signals, t, q, change)
     if closed(system, closest, phi) and _keeps_shape(system, q, closest):
         return closest
@@ -230,7 +247,7 @@ def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Arra
     for _ in range(_MAX_DESCENT):
         if closed(system, q, phi) or damping > _LARGEST_DAMPING:
             break
-        trial = q - constraint_change(system, q, _POSITION_STIFFNESS, damping)(phi)
+        trial = q - constraint_change(system, q, POSITION_STIFFNESS, damping)(phi)
         gap, _ = system.constraints(signals, t, trial)
         gain = 1.0 - np.linalg.norm(gap / system.row_units) / np.linalg.norm(phi / system.row_units)
         if gain > 0.0:
@@ -299,7 +316,7 @@ def consistent_state(
         body = system.body(name)
         q[body.flexible] = np.linalg.lstsq(body.integrals.D, nodal, rcond=None)[0]
     signals = moment_signals(system.mechanism, time)
-    q = project_position(system, signals, time, q)
+    q = assembled_position(system, signals, time, q)
     if velocity is None:
         v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)
     else:
