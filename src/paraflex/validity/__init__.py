@@ -26,6 +26,7 @@ from paraflex.validity.indicators import (
     of_linear,
     of_second_order,
 )
+from paraflex.validity.moved import moved_far as moved_far
 from paraflex.validity.numbers import doubtful_numbers as doubtful_numbers, mechanism_size as mechanism_size
 from paraflex.validity.plausibility import (
     Driven as Driven,
