@@ -127,7 +127,11 @@ def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.
     schur = dense @ weighted
     if damping:
         schur += damping * np.mean(np.diag(schur)) * np.eye(units.size)
-    return lambda wanted: weighted @ np.linalg.lstsq(schur, wanted / units, rcond=1e-12)[0]
+    # Rows of one size: those of links without mass would make others look dependent.
+    size = np.sqrt(np.diag(schur))
+    scale = 1.0 / np.where(size > 0.0, size, 1.0)
+    schur *= scale[:, None] * scale
+    return lambda wanted: weighted @ (scale * np.linalg.lstsq(schur, scale * wanted / units, rcond=1e-12)[0])
 
 
 def constraint_change(
