@@ -101,8 +101,7 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
     for start in seen.starts:
         if not start.closes:
             yield Finding(
-                "assembly-open", f"assembly.{start.assembly}", start.problem,
-                "correct lengths, places of points, or the angles",
+                "assembly-open", f"assembly.{start.assembly}", start.problem, start.remedy
             )  # fmt: skip
         else:
             assert start.state is not None

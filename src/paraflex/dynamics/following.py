@@ -10,8 +10,8 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.inputs import inputs_of
-from paraflex.dynamics.joint_coordinates import joint_coordinate
-from paraflex.dynamics.projection import LeastChange, assemble, closed, constraint_change, row_unit
+from paraflex.dynamics.joint_coordinates import value_text
+from paraflex.dynamics.projection import LeastChange, assemble, closed, constraint_change
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT, Signals
@@ -136,10 +136,7 @@ def _side(system: System, q: Array) -> float:
 
 def _limit(system: System, away: Array, q: Array) -> str:
     """Names of drives with the values at which a pose bars their way."""
-    places = []
-    for motion, row in driven_rows(system):
-        if away[row]:
-            value = float(joint_coordinate(system, motion.joint, q[None]).value[0])
-            places.append(f"{motion.name} at {value:.6g} {row_unit(system.rows[row])}")
-    held = " and ".join(places)
+    held = ", ".join(
+        f"{motion.name} at {value_text(system, motion.joint, q)}" for motion, row in driven_rows(system) if away[row]
+    )
     return f"the joints bar the way from the assembly to where prescribed motions start: they hold {held}"

@@ -26,8 +26,9 @@ from paraflex.dynamics.projection import (
 )
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
+from paraflex.dynamics.special import special_start
 from paraflex.dynamics.system import System, build_system
-from paraflex.errors import AssemblyError, Moment
+from paraflex.errors import AssemblyError, InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
 from paraflex.mechanism import GROUND, Assembly, PointRef
@@ -317,11 +318,16 @@ def consistent_state(
         q[body.flexible] = np.linalg.lstsq(body.integrals.D, nodal, rcond=None)[0]
     signals = moment_signals(system.mechanism, time)
     q = assembled_position(system, signals, time, q)
-    if velocity is None:
-        v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)
-    else:
-        v = project_velocity(system, signals, time, q, velocity)
-    check_accelerations(system, signals, time, q, v)
+    try:
+        if velocity is None:
+            v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)
+        else:
+            v = project_velocity(system, signals, time, q, velocity)
+        check_accelerations(system, signals, time, q, v)
+    except InconsistentConstraintsError as error:
+        wanted = -system.constraints(signals, time, q)[1]
+        cause, remedy = special_start(system, signals, time, q, system.jacobian(q), wanted)
+        raise InconsistentConstraintsError(cause, error.moment, remedy=remedy) if cause else error from None
     return State(time, q, v)
 
 
