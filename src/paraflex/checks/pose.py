@@ -20,6 +20,7 @@ from paraflex.dynamics import (
     mobility,
     natural_frequencies,
     reach,
+    standing_system,
     undeformed,
 )
 from paraflex.dynamics.linearise import BALANCED as BALANCED, LOWEST
@@ -71,7 +72,7 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
     """
     mechanism = standing(mechanism, assembly)
     system, rigid = build_system(mechanism), build_system(mechanism.rigid())
-    starts = tuple(closure_of(_standing(rigid, one.name), one) for one in mechanism.assemblies)
+    starts = tuple(closure_of(standing_system(rigid.mechanism, one.name), one) for one in mechanism.assemblies)
     if not mechanism.assemblies:
         return Examination(system, rigid, starts, None, None, None)
     wanted = mechanism.assembly(assembly)
@@ -85,12 +86,6 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
         return Examination(system, rigid, starts, chosen, None, None, str(error))
 
 
-def _standing(rigid: System, assembly: str) -> System:
-    """The system in an assembly, anew only if prescribed motions begin elsewhere in it."""
-    begun = standing(rigid.mechanism, assembly)
-    return rigid if begun.prescribed == rigid.mechanism.prescribed else build_system(begun)
-
-
 def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Finding]:
     """What is wrong or doubtful about the pose, and whether what starts there at rest would stay."""
     if not seen.starts:
@@ -100,9 +95,7 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
         )  # fmt: skip
     for start in seen.starts:
         if not start.closes:
-            yield Finding(
-                "assembly-open", f"assembly.{start.assembly}", start.problem, start.remedy
-            )  # fmt: skip
+            yield Finding("assembly-open", f"assembly.{start.assembly}", start.problem, start.remedy)
         else:
             assert start.state is not None
             yield from moved_far(seen.rigid, seen.rigid.mechanism.assembly(start.assembly), start.state.q)

@@ -26,9 +26,6 @@ from paraflex.files import Model
 from paraflex.kinematics import follow_path
 from paraflex.motion import UNBALANCED
 
-# Poses between the start and the time asked for, where prescribed angles lead there.
-_POSES_BETWEEN = 200
-
 
 def frequencies(
     model: Model, system: System, rigid: System, start: State, assembly: str, request: InfoRequest
@@ -84,9 +81,7 @@ def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float
             value=at,
             remedy="leave it out",
         )
-    q = start.q
-    for time in np.linspace(0.0, at, _POSES_BETWEEN + 1)[1:]:
-        q = assembled_position(rigid, moment_signals(model.mechanism, float(time)), float(time), q)
+    q = assembled_position(rigid, moment_signals(rigid.mechanism, at), at, start.q)
     return State(at, q, np.zeros(rigid.n))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy
 
@@ -21,7 +23,7 @@ _BESIDE = "start prescribed motions beside this pose and within the mechanism's 
 _TWO_BRANCHES = "give one of these rates in [start.velocity.angular], or start beside this pose"
 
 
-def special_start(system: System, signals: Signals, t: float, q: Array, rows: Array, wanted: Array) -> tuple[str, str]:
+def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, wanted: Array) -> tuple[str, str]:
     """Description of a pose at which the branches of a motion meet, and the remedy; both empty for any other pose.
 
     Velocities v0 + x n, n the null vector of the rows, have accelerations if w Phi''(v0 + x n) = 0, a quadratic
@@ -31,13 +33,15 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: Ar
     ----------
     q : (n,) array
         Closed coordinates.
-    rows, wanted : (k, n) and (k,) arrays
+    rows, wanted : (k, n) array or sparse matrix, and (k,) array
         Phi_q and rows of given velocities, and what rows v is to be.
     """
-    found = dependence(system, q) if system.m <= DENSE_ROWS else None
-    scaled = rows * system.units
+    found = dependence(system, q) if 0 < system.m <= DENSE_ROWS else None
+    if found is None or not found.dropped.size:
+        return "", ""
+    scaled = (rows.toarray() if scipy.sparse.issparse(rows) else rows) * system.units
     null = scipy.linalg.null_space(scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-300), 1e-9)
-    if found is None or not found.dropped.size or null.shape[1] != 1:
+    if null.shape[1] != 1:
         return "", ""
     v, along = system.units * np.linalg.lstsq(scaled, wanted, rcond=1e-9)[0], system.units * null[:, 0]
 
@@ -55,6 +59,8 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: Ar
     roots = np.roots([curvature[k], 0.5 * (missing(1.0) - missing(-1.0))[k], missing(0.0)[k]])
     if np.iscomplexobj(roots):
         return f"a dead centre, the limit of reach, with {drives}, beyond which prescribed motions lead,", _BESIDE
+    if abs(roots[0] - roots[1]) <= _ROUNDING:
+        return "", ""
     rates = []
     for joint in system.mechanism.joints:
         row = joint_coordinate(system, joint.name, q[None]).rows[0]

@@ -17,6 +17,7 @@ from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.special import special_start
 from paraflex.dynamics.state import State, consistent_state, reference_pose, undeformed
 from paraflex.dynamics.system import System, build_system
 from paraflex.errors import InputError
@@ -91,24 +92,14 @@ def start_state(
 
 
 def standing_system(mechanism: Mechanism, start: Start | State | str | None, assembly: str | None = None) -> System:
-    """The system of a mechanism; prescribed motions whose start is not given begin at that of a run.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-    start : Start, State or str, optional
-        Start of the run; a text is the name of an assembly.
-    assembly : str, optional
-        The first by default.
-    """
-    if isinstance(start, State):
-        system = build_system(mechanism)
-        begun = begun_at(
-            mechanism, lambda joint: float(joint_coordinate(system, joint, start.q[None]).value[0]), start.time
-        )
-        return system if begun is mechanism else build_system(begun)
-    named = isinstance(start, str)
-    return build_system(standing(mechanism, start if named else assembly, None if named else start))
+    """The system of a mechanism; prescribed motions whose start is not given begin at a start or a named assembly."""
+    if isinstance(start, str):
+        start, assembly = None, start
+    if not isinstance(start, State):
+        return build_system(standing(mechanism, assembly, start))
+    system, q = build_system(mechanism), start.q[None]
+    begun = begun_at(mechanism, lambda joint: float(joint_coordinate(system, joint, q).value[0]), start.time)
+    return system if begun is mechanism else build_system(begun)
 
 
 def pose_at_rest(system: System, start: Start | State | None, assembly: str | None = None) -> State:
@@ -257,6 +248,9 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SMALL_TERMS)
     if np.any(bad):
         _refuse_velocities(system, given, slip, bad)
+    cause, remedy = special_start(system, signals, time, q, C, wanted)
+    if cause:
+        raise InputError(cause.rstrip(","), field=given[0].field if given else "start", remedy=remedy)
     return v
 
 

@@ -45,6 +45,7 @@ _WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
 _PASSING_METHODS = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
+_AROUND = "start or drive the mechanism so that it does not get there"
 _WITHIN_REACH = "prescribe motions that end, or turn back, before it"
 _SHORTER = "take a shorter step, or leave it out and choose a tolerance"
 _NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
@@ -301,17 +302,10 @@ class Integration:
         error = ConstraintDriftError if self._drifts else IntegrationError
         if len(lost) > run.dependent_rows:
             error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)}),"
-            remedy = (
-                "start or drive the mechanism so that it does not get there"
-                if options.method.family is Family.ESDIRK
-                else _PASSING_METHODS
-            )
+            remedy = _AROUND if options.method.family is Family.ESDIRK else _PASSING_METHODS
             drives = barred_drives(system, now.q, dependence(system, now.q, _NEARLY_DEPENDENT))
             if drives:
-                cause, remedy = (
-                    f"the constraints lose rank, a dead centre: the limit of reach, with {drives},",
-                    _WITHIN_REACH,
-                )
+                cause, remedy = f"the constraints lose rank at the limit of reach, {drives},", _WITHIN_REACH
         elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
             error, cause = SingularPositionError, _before_singular(options.method.name, run.singular_ahead)
             remedy = _PASSING_METHODS

@@ -9,7 +9,7 @@ from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import RigidBody
 from paraflex.mechanism.joints import PointRef
-from paraflex.mechanism.laws import ConstantSpeed
+from paraflex.mechanism.laws import AngleLaw, ConstantSpeed
 from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.phases import joint_value
 from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
@@ -92,23 +92,10 @@ class Start(CheckedFields):
 def standing(mechanism: Mechanism, assembly: str | None = None, start: Start | None = None) -> Mechanism:
     """The mechanism with prescribed motions that begin where an assembly stands, if their start is not given.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    assembly : str, optional
-        The first by default.
-    start : Start, optional
-        Bodies with coordinates in it stand there.
-
-    Raises
-    ------
-    InputError
-        An unknown assembly.
+    Bodies whose coordinates a start gives stand there.
     """
-    if not any(getattr(one.law, "from_assembly", False) for one in mechanism.prescribed):
-        return mechanism
     poses: dict[str, Pose] = {}
-    if mechanism.assemblies:
+    if mechanism.assemblies and mechanism.prescribed:
         chosen = mechanism.assembly(assembly)
         poses = approximate_poses(mechanism, chosen) | placed_poses(mechanism, chosen)
     given = {} if start is None else start.coordinates
@@ -118,13 +105,13 @@ def standing(mechanism: Mechanism, assembly: str | None = None, start: Start | N
 
 def begun_at(mechanism: Mechanism, value: Callable[[str], float], time: float = 0.0) -> Mechanism:
     """The mechanism with prescribed motions whose start is not given at the values of their joints at a time [s]."""
-    begun = tuple(
-        replace(one, law=replace(one.law, angle=value(one.joint) - time * one.law.speed))
-        if isinstance(one.law, ConstantSpeed) and one.law.from_assembly
-        else one
-        for one in mechanism.prescribed
-    )
-    return mechanism if begun == mechanism.prescribed else replace(mechanism, prescribed=begun)
+
+    def begun(law: AngleLaw, joint: str) -> AngleLaw:
+        free = isinstance(law, ConstantSpeed) and law.from_assembly
+        return replace(law, angle=value(joint) - time * law.speed) if free else law
+
+    prescribed = tuple(replace(one, law=begun(one.law, one.joint)) for one in mechanism.prescribed)
+    return mechanism if prescribed == mechanism.prescribed else replace(mechanism, prescribed=prescribed)
 
 
 @checked_arguments()

@@ -26,12 +26,12 @@ from paraflex.validity.indicators import (
     of_linear,
     of_second_order,
 )
-from paraflex.validity.moved import moved_far as moved_far
 from paraflex.validity.numbers import doubtful_numbers as doubtful_numbers, mechanism_size as mechanism_size
 from paraflex.validity.plausibility import (
     Driven as Driven,
     doubtful_results as doubtful_results,
     doubtful_stresses as doubtful_stresses,
+    moved_far as moved_far,
     stiff_modes as stiff_modes,
 )
 
