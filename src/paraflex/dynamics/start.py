@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
+from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
@@ -44,7 +45,7 @@ _SMALL_TERMS = 1e-4
 # Given deflections of one beam may contradict each other by this fraction of them.
 _CONTRADICTION = 1e-9
 # Weight of stiffness against mass [s^2]: links move and do not begin to bend, unless they must.
-_POSITION_STIFFNESS, _VELOCITY_STIFFNESS = 1.0, 1e3
+_VELOCITY_STIFFNESS = 1e3
 
 
 @checked_arguments()
@@ -210,7 +211,8 @@ def _coordinates(system: System, signals: Signals, start: Start, assembly: Assem
 
 def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArray[np.bool_]) -> Array:
     """Joints closed by the least change of the coordinates that are not held."""
-    change = partial(constraint_change, system, stiffness=_POSITION_STIFFNESS, free=~held)
+    q = q if np.any(held) else follow_drives(system, signals, time, q)[0]
+    change = partial(constraint_change, system, stiffness=POSITION_STIFFNESS, free=~held)
     q, phi = assemble(system, signals, time, q, change, free=~held)
     worst = int(np.argmax(np.abs(phi) / system.row_units)) if phi.size else 0
     if system.gap(phi) > _GAP:
