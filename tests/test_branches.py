@@ -34,6 +34,8 @@ from paraflex.mechanism import (
 from shell import paraflex
 
 LENGTHS = (1.0, 0.5, 1.2, 0.8)
+# The branches of this one come within 0.03 rad of each other on the way: it is nearly a change-point mechanism.
+NARROW = ((1.02160967, 0.3255869, 0.82152807, 0.52611172), 0.7678788853396403, 1.0, 3.3815175168739025)
 
 
 def body(name, length, first, last, mass=1.0):
@@ -115,7 +117,7 @@ def random_four_bars(count):
 # --- Drives that start away from the assembly ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("lengths", "crank", "side", "start"), list(random_four_bars(40)))
+@pytest.mark.parametrize(("lengths", "crank", "side", "start"), [NARROW, *random_four_bars(40)])
 def test_a_drive_that_starts_elsewhere_stays_on_the_branch_of_the_assembly(lengths, crank, side, start):
     mechanism = four_bar(lengths, crank, side, ConstantSpeed(start, 1.0))
     found = found_angles(mechanism, consistent_state(build_system(mechanism), None).q)

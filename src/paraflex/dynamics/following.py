@@ -21,6 +21,8 @@ from paraflex.mechanism import PrescribedAngle
 POSITION_STIFFNESS = 1.0
 # Prescribed motions nearer to the pose than this start there [sizes of the mechanism, rad].
 _NEAR = 1e-9
+# Poses nearer to one another than this are one [sizes of the mechanism, rad].
+_SAME = 1e-5
 # Longest predicted step [sizes of the mechanism, rad], shortest as a part of the way, largest number of steps.
 _LONGEST, _SHORTEST, _MAX_STEPS = 0.25, 1e-9, 2000
 # A step is accepted if its correction, and the change of the direction, are smaller than these parts of it.
@@ -44,7 +46,8 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> tuple
     Returns
     -------
     q : (n,) array
-        Coordinates with the drives at their values; as given if the way there is barred.
+        Coordinates with the drives at their values; as given if the way there is barred, or if closing the loops from
+        there leads to the same pose.
     limit : str
         Limit of reach that bars the way; empty for none.
     """
@@ -54,7 +57,12 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> tuple
     for begun in (_turned(system, signals, t, q, away), q):
         found, limit = _follow(system, signals, t, begun)
         if found is not None:
-            return found, ""
+            # Where closing at once leads to the same pose it is left to the caller, with fewer roundings.
+            direct, _ = assemble(
+                system, signals, t, q, partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
+            )
+            same = np.max(np.abs(direct - found) / system.units) <= _SAME
+            return (q if same else found), ""
     return q, limit
 
 
