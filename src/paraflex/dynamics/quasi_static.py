@@ -163,8 +163,8 @@ def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> 
 
 
 def _smooth_load(load: Load, time: float) -> Load:
-    parts = tuple(_smooth(part, time) if isinstance(part, AngleLaw) else part for part in load.components)
-    return replace(load, **{load.kind: parts if len(parts) > 1 else parts[0]})
+    parts = [_smooth(part, time) if isinstance(part, AngleLaw) else part for part in load.components]
+    return replace(load, **{load.kind: tuple(parts) if len(parts) > 1 else parts[0]})
 
 
 def _smooth(law: AngleLaw, time: float) -> DrivenAngle:

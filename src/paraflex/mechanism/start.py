@@ -107,8 +107,9 @@ def begun_at(mechanism: Mechanism, value: Callable[[str], float], time: float = 
     """The mechanism with prescribed motions whose start is not given at the values of their joints at a time [s]."""
 
     def begun(law: AngleLaw, joint: str) -> AngleLaw:
-        free = isinstance(law, ConstantSpeed) and law.from_assembly
-        return replace(law, angle=value(joint) - time * law.speed) if free else law
+        if isinstance(law, ConstantSpeed) and law.from_assembly:
+            return replace(law, angle=value(joint) - time * law.speed)
+        return law
 
     prescribed = tuple(replace(one, law=begun(one.law, one.joint)) for one in mechanism.prescribed)
     return mechanism if prescribed == mechanism.prescribed else replace(mechanism, prescribed=prescribed)
