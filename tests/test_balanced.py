@@ -35,10 +35,13 @@ from paraflex.mechanism import (
     LumpedMass,
     Material,
     Mechanism,
+    PointForce,
     PointRef,
     PrescribedAngle,
     RevoluteJoint,
+    SampledAngle,
     Section,
+    TabulatedLaw,
     TorsionalDamper,
     finite_segments,
     raparm_i,
@@ -307,3 +310,19 @@ def test_a_four_bar_runs_balanced_to_its_end(tmp_path):
     summary = json.loads(done.stdout)
     assert summary["status"] == "complete"
     assert summary["constraint_position_max"] < 1e-5
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "spline"])
+def test_a_moving_balanced_start_takes_a_load_table_that_begins_with_the_run(interpolation):
+    """A force that grows linearly, as a table from t = 0 on and as functions of any time."""
+    table = TabulatedLaw((0.0, 1.0), (2.0, 12.0), interpolation)
+    anytime = SampledAngle(lambda t: 2.0 + 10.0 * t, lambda t: 10.0 + 0.0 * t, lambda t: 0.0 * t)
+    tip = PointRef("crank", "P")
+    found, same = (
+        start_of(dataclasses.replace(turning_crank(4.0), loads=(PointForce("push", tip, (0.0, law)),)))[2]
+        for law in (table, anytime)
+    )
+    assert found.q == pytest.approx(same.q, rel=1e-9, abs=1e-12)
+    assert found.v == pytest.approx(same.v, rel=1e-6, abs=1e-9)
+    unloaded = start_of(turning_crank(4.0))[2]
+    assert np.max(np.abs(found.q - unloaded.q)) > 1e-4

@@ -475,3 +475,10 @@ def test_a_pose_in_which_the_constraints_lose_rank_is_an_error(raparm):
     assert partial.solution.status == "failed"
     assert partial.solution.t[-1] < moment.time
     assert partial.solution.steps == moment.step - 1
+
+
+def test_what_it_cannot_describe_is_not_sent_to_an_option_that_it_refuses(short):
+    """KED has no geometry to choose: `--ked` and `--geometry` exclude one another."""
+    worst = simulate_ked(short, "++++").validity.worst
+    assert "--geometry" not in worst.remedy
+    assert "without --ked" in worst.remedy

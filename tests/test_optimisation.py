@@ -537,3 +537,16 @@ def test_control_c_keeps_what_is_done(tmp_path):
     assert "the same command goes on from there" in done.stderr
     assert len(pd.read_parquet(out / "unfinished.parquet")) > 0
     assert json.loads((out / "result.json").read_text())["interrupted"]
+
+
+@pytest.mark.parametrize("metrics", ["", 'metrics = ["tracking_rms"]'])
+def test_an_objective_that_is_not_kept_by_default_is_computed(tmp_path, metrics):
+    text = STUDY.replace('metrics = ["tracking_rms", "peak_torque_max", "total_mass"]', metrics)
+    objective = "[objective]\nminimise = { joint_force_max = 1.0 }\n"
+    study = load_optimisation(write_study(tmp_path, f"{text}\n{objective}[search]\nevaluations = 1\n"))
+    assert "joint_force_max" in study.base.setting.metrics
+    assert "tracking_rms" in study.base.setting.metrics
+    result = optimise(study, tmp_path / "out")
+    row = pd.read_parquet(result.table).iloc[0]
+    assert row["joint_force_max"] == pytest.approx(result.metrics["joint_force_max"])
+    assert row["joint_force_max"] > 0.0

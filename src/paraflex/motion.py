@@ -18,11 +18,11 @@ from paraflex.dynamics import (
     State,
     System,
     balanced_state,
-    build_system,
     consistent_state,
     constant_signals,
     law_signal,
     pack_signals,
+    standing_system,
     start_state,
 )
 from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning
@@ -32,7 +32,7 @@ from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import AngleLaw, Mechanism, Start
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, doubtful_results, warn, with_blame
+from paraflex.validity import Validity, assess, doubtful_results, moved_far, warn, with_blame
 
 # Remedy of a balanced start that is not found.
 UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
@@ -154,10 +154,10 @@ def simulate_motion(
         if not isinstance(torque, AngleLaw) and not np.isfinite(torque):
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: (torques or {}).get(name, 0.0) for name in names}
-    system, state, times = motion_start(given, duration, samples, start, balanced=balanced)
+    system, state, times = motion_start(given, duration, samples, start, balanced=balanced, warning=warning)
     end = float(times[-1])
     motors, own = _motor_signals(values, end)
-    signals, knots = pack_signals(mechanism, motors, end)
+    signals, knots = pack_signals(system.mechanism, motors, end)
     try:
         solution = integrate(
             system, signals, state, times, knots=np.array([*own, *knots]), options=options, samples=samples,
@@ -180,6 +180,7 @@ def motion_start(
     start: State | Start | str | None,
     *,
     balanced: bool,
+    warning: bool = True,
 ) -> tuple[System, State, Array]:
     """System, start and times (samples,) of a run without a path: see `simulate_motion` for the arguments.
 
@@ -195,10 +196,14 @@ def motion_start(
     if duration is None:
         raise InputError("is missing", field="duration", remedy="give it in seconds, or in the model's [study]")
     check_times(duration, samples)
-    system = build_system(Mechanism.made_of(given))
     if isinstance(start, State) and balanced:
         raise InputError("a state is as it is", field="balanced", value=balanced, remedy="leave one of the two out")
+    system = standing_system(Mechanism.made_of(given), start)
     state = start if isinstance(start, State) else _state(system, start, balanced)
+    placed = isinstance(start, State) or (isinstance(start, Start) and start.places)
+    if warning and not placed and system.mechanism.assemblies:
+        assembly = system.mechanism.assembly(start if isinstance(start, str) else None)
+        warn_of(moved_far(system, assembly, state.q), ResultWarning)
     return system, state, np.linspace(state.time, state.time + duration, samples)
 
 

@@ -41,7 +41,7 @@ from paraflex.integrators import IntegrationOptions, Method, Solution, check_tim
 from paraflex.integrators.beam_ends import leave_beam
 from paraflex.integrators.between import SAMPLES
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
-from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode
+from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode, standing
 from paraflex.mechanism.laws import stops
 from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn, with_blame
 
@@ -340,6 +340,7 @@ def plan_tracking(
         See `kinematics.follow_path`; a path that takes a sliding point off its beam, where `at_end` says "error".
     """
     mechanism, path = _planned(mechanism, path)
+    mechanism = standing(mechanism, assembly)
     end = path.duration if duration is None else duration
     check_times(end, samples)
     times = np.linspace(0.0, end, samples)

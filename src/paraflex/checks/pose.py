@@ -20,18 +20,16 @@ from paraflex.dynamics import (
     mobility,
     natural_frequencies,
     reach,
+    standing_system,
     undeformed,
 )
 from paraflex.dynamics.linearise import BALANCED as BALANCED, LOWEST
 from paraflex.errors import NumericalError, ProportionError
 from paraflex.findings import Finding
 from paraflex.limits import OUT_OF_PROPORTION
-from paraflex.mechanism import Mechanism
-from paraflex.mechanism.poses import approximate_poses
-from paraflex.validity import stiff_modes
+from paraflex.mechanism import Mechanism, standing
+from paraflex.validity import moved_far, stiff_modes
 
-# A body that closing the loops turned further than this had another angle in mind, or another elbow [rad].
-FAR_TURN = 0.5
 # A first natural frequency below this is that of no link [Hz].
 SLOWEST_LINK = 0.1
 
@@ -72,8 +70,9 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
     InputError
         An unknown assembly.
     """
+    mechanism = standing(mechanism, assembly)
     system, rigid = build_system(mechanism), build_system(mechanism.rigid())
-    starts = tuple(closure_of(rigid, one) for one in mechanism.assemblies)
+    starts = tuple(closure_of(standing_system(rigid.mechanism, one.name), one) for one in mechanism.assemblies)
     if not mechanism.assemblies:
         return Examination(system, rigid, starts, None, None, None)
     wanted = mechanism.assembly(assembly)
@@ -96,12 +95,10 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
         )  # fmt: skip
     for start in seen.starts:
         if not start.closes:
-            yield Finding(
-                "assembly-open", f"assembly.{start.assembly}", start.problem,
-                "correct lengths, places of points, or the angles",
-            )  # fmt: skip
+            yield Finding("assembly-open", f"assembly.{start.assembly}", start.problem, start.remedy)
         else:
-            yield from _elbow(seen.rigid, start)
+            assert start.state is not None
+            yield from moved_far(seen.rigid, seen.rigid.mechanism.assembly(start.assembly), start.state.q)
     if seen.problem:
         yield Finding("out-of-proportion", "assembly", seen.problem, OUT_OF_PROPORTION)
     if seen.mobility is not None and seen.reach is not None:
@@ -112,32 +109,6 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
     if seen.chosen is not None and seen.chosen.state is not None:
         yield from axes_along_beams(seen.system.described, seen.rigid, seen.chosen.state.q)
     yield from _vibration(seen, at_rest)
-
-
-def _elbow(rigid: System, start: Closure) -> Iterator[Finding]:
-    assert start.state is not None
-    assembly = rigid.mechanism.assembly(start.assembly)
-    given = approximate_poses(rigid.mechanism, assembly)
-    found = {body.name: float(start.state.q[body.angle]) for body in rigid.bodies}
-    turned = {name: abs(math.remainder(found[name] - given[name].angle, 2.0 * math.pi)) for name in found}
-    far = sorted((name for name in turned if turned[name] > FAR_TURN), key=lambda name: -turned[name])
-    if far:
-        which = ", ".join(
-            f"{name} at {_both(found[name])} where {given[name].angle:.3g} rad "
-            f"{'was given' if name in assembly.angles else 'follows from the points given'}"
-            for name in far[:3]
-        )
-        yield Finding(
-            "assembly-elbow", f"assembly.{start.assembly}",
-            f"it closed far from what was given: {which}{' and others' if len(far) > 3 else ''}",
-            "if another elbow was meant, give angles nearer to it, in rad",
-        )  # fmt: skip
-
-
-def _both(angle: float) -> str:
-    """An angle within half a turn, in radians and degrees."""
-    turned = math.remainder(angle, 2.0 * math.pi)
-    return f"{turned:.3g} rad ({math.degrees(turned):.3g} degrees)"
 
 
 def _mobility(free: Mobility, drives: Reach) -> Iterator[Finding]:

@@ -28,6 +28,7 @@ from paraflex.files import Model
 from paraflex.folders import COMPARISON, ResultsFolder
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
+from paraflex.mechanism import standing
 from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_case, tracking_case
 
 
@@ -112,7 +113,8 @@ def _mode(model: Model, request: CompareMethodsRequest) -> str | None:
 
 
 def _motion(model: Model, request: CompareMethodsRequest) -> Case:
-    study, mechanism = own_motion(model, request.plan), model.mechanism
+    study = own_motion(model, request.plan)
+    mechanism = standing(model.mechanism, study.assembly, model.start)
     assert study.duration is not None
     try:
         start = start_of(model, mechanism, study.assembly, balanced=False)

@@ -14,8 +14,8 @@ from paraflex.dynamics import (
     State,
     System,
     Vibration,
+    assembled_position,
     natural_frequencies,
-    project_position,
     static_equilibrium,
     undeformed,
 )
@@ -25,9 +25,6 @@ from paraflex.errors import AssemblyError, InputError
 from paraflex.files import Model
 from paraflex.kinematics import follow_path
 from paraflex.motion import UNBALANCED
-
-# Poses between the start and the time asked for, where prescribed angles lead there.
-_POSES_BETWEEN = 200
 
 
 def frequencies(
@@ -84,9 +81,7 @@ def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float
             value=at,
             remedy="leave it out",
         )
-    q = start.q
-    for time in np.linspace(0.0, at, _POSES_BETWEEN + 1)[1:]:
-        q = project_position(rigid, moment_signals(model.mechanism, float(time)), float(time), q)
+    q = assembled_position(rigid, moment_signals(rigid.mechanism, at), at, start.q)
     return State(at, q, np.zeros(rigid.n))
 
 

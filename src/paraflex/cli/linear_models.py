@@ -15,7 +15,7 @@ from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.request import asked_model, at_fault, find_modes, find_path, flagged, of_assembly, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
-from paraflex.dynamics import State, build_system, pose_at_rest, undeformed
+from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed
 from paraflex.errors import ActuationError, AssemblyError, InputError
 from paraflex.files import Model, library_names
 from paraflex.files.fields import number_in
@@ -174,12 +174,12 @@ def moments_along(found: AskedModels, count: int) -> list[list[LinearModel]]:
 def pose_asked(model: Model, wanted: str | None, assembly: str | None, flag: str) -> State:
     """The pose at rest that an option names; by default the model's start, or that of an assembly."""
     mechanism = model.mechanism
-    system = build_system(mechanism)
+    system = standing_system(mechanism, model.start, assembly or model.study.assembly)
     try:
         if wanted is not None and "," in wanted:
             return _at_place(model, wanted, flag)
         if wanted in [one.name for one in mechanism.assemblies]:
-            return pose_at_rest(system, None, wanted)
+            return pose_at_rest(standing_system(mechanism, wanted), None, wanted)
         if wanted is not None and (wanted != START or model.start is None):
             raise InputError("no such pose", field=flag, value=wanted, remedy=_poses(model))
         return pose_at_rest(system, model.start, assembly or model.study.assembly)

@@ -31,7 +31,7 @@ from paraflex.cli.tables import controllers, loads, plain_console, reduction, va
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription, simulate_controlled_motion
-from paraflex.dynamics import State, build_system
+from paraflex.dynamics import State, build_system, standing_system
 from paraflex.dynamics.state import nearest_state
 from paraflex.errors import AssemblyError, ControllerError, InputError, IntegrationError, ResultWarning, ValidityWarning
 from paraflex.files import Model, StudyDefaults
@@ -194,7 +194,7 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     if not balanced and model.start is None:
         return None
     try:
-        return state_at(build_system(mechanism), model.start, assembly, balanced=balanced)
+        return state_at(standing_system(mechanism, model.start, assembly), model.start, assembly, balanced=balanced)
     except InputError as error:
         raise (error.at("--balanced") if error.field == "balanced" else error) from error
 

@@ -51,9 +51,14 @@ from paraflex.dynamics.soundness import (
     closure_of as closure_of,
     mobility as mobility,
 )
-from paraflex.dynamics.start import pose_at_rest as pose_at_rest, start_state as start_state
+from paraflex.dynamics.start import (
+    pose_at_rest as pose_at_rest,
+    standing_system as standing_system,
+    start_state as start_state,
+)
 from paraflex.dynamics.state import (
     State as State,
+    assembled_position as assembled_position,
     consistent_state as consistent_state,
     momentum as momentum,
     project_position as project_position,

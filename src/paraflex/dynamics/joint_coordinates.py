@@ -43,6 +43,12 @@ def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None
     return JointCoordinate(np.sum(e * d, axis=1), np.sum(rows * v, axis=1), rows)
 
 
+def value_text(system: System, name: str, q: Array) -> str:
+    """The coordinate of a joint at q (n,), with its unit."""
+    value = float(joint_coordinate(system, name, q[None]).value[0])
+    return f"{value:.6g} {'m' if system.mechanism.slides(name) else 'rad'}"
+
+
 def place_along_beam(system: System, name: str, q: Array) -> Array:
     """Distance from the beam's first end (k,) of the point of a sliding joint, in the undeformed beam [m]."""
     joint = system.mechanism.joint(name)

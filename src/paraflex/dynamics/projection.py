@@ -48,6 +48,7 @@ def assemble(
     *,
     free: NDArray[np.bool_] | None = None,
     longest: float = math.inf,
+    offset: Array | float = 0.0,
 ) -> tuple[Array, Array]:
     """Newton's iteration on Phi(q, t) = 0, each step the least change in some measure.
 
@@ -65,6 +66,8 @@ def assemble(
         Coordinates that may change; all by default.
     longest : float
         No step is longer [sizes of the mechanism, rad].
+    offset : (m,) array
+        Values that the constraints are to have, zero by default.
 
     Returns
     -------
@@ -72,13 +75,13 @@ def assemble(
         Coordinates, and what is left of the constraints there: see `closed`.
     """
     q, free = q.copy(), np.ones(system.n, dtype=bool) if free is None else free
-    phi, _ = system.constraints(signals, t, q)
+    phi = system.constraints(signals, t, q)[0] - offset
     for _ in range(_MAX_ITERATIONS):
         if closed(system, q, phi) or not np.any(free):
             break
         change = change_at(q)(phi)
         q[free] -= change * shortened(change / system.units[free], longest)
-        phi, _ = system.constraints(signals, t, q)
+        phi = system.constraints(signals, t, q)[0] - offset
     return q, phi
 
 
@@ -124,7 +127,11 @@ def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.
     schur = dense @ weighted
     if damping:
         schur += damping * np.mean(np.diag(schur)) * np.eye(units.size)
-    return lambda wanted: weighted @ np.linalg.lstsq(schur, wanted / units, rcond=1e-12)[0]
+    # Rows of one size: those of links without mass would make others look dependent.
+    size = np.sqrt(np.diag(schur))
+    scale = 1.0 / np.where(size > 0.0, size, 1.0)
+    schur *= scale[:, None] * scale
+    return lambda wanted: weighted @ (scale * np.linalg.lstsq(schur, scale * wanted / units, rcond=1e-12)[0])
 
 
 def constraint_change(

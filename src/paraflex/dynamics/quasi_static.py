@@ -18,7 +18,7 @@ from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import State
 from paraflex.dynamics.system import System, build_system
-from paraflex.mechanism import AngleLaw, PrescribedAngle
+from paraflex.mechanism import AngleLaw, Load, PrescribedAngle
 
 # Weight of stiffness against mass [s^2]: that of `dynamics.state`, links move and do not begin to bend.
 _STIFFNESS = 1e3
@@ -149,7 +149,7 @@ class _Motion:
 
 
 def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> System:
-    """The same system with the joints driven too, each by a smooth law with its motion at the start."""
+    """The same system with the joints driven too, each by a smooth law with its motion at the start, as are loads."""
     own = tuple(
         replace(prescribed, law=_smooth(prescribed.law, start.time)) for prescribed in system.mechanism.prescribed
     )
@@ -158,7 +158,13 @@ def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> 
         PrescribedAngle(f"drive of {name}", name, DrivenAngle(start.time, values[name], motion))
         for name, motion in driven.items()
     )
-    return build_system(replace(system.mechanism, prescribed=(*own, *more)), system)
+    loads = tuple(_smooth_load(load, start.time) for load in system.mechanism.loads)
+    return build_system(replace(system.mechanism, prescribed=(*own, *more), loads=loads), system)
+
+
+def _smooth_load(load: Load, time: float) -> Load:
+    parts = [_smooth(part, time) if isinstance(part, AngleLaw) else part for part in load.components]
+    return replace(load, **{load.kind: tuple(parts) if len(parts) > 1 else parts[0]})
 
 
 def _smooth(law: AngleLaw, time: float) -> DrivenAngle:

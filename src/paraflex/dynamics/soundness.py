@@ -45,6 +45,8 @@ class Closure:
     problem : str
         Why there is no start; empty for none.
     state : State or None
+    remedy : str
+        What to do about the problem.
     """
 
     assembly: str
@@ -55,6 +57,7 @@ class Closure:
     where: tuple[str, ...]
     problem: str
     state: State | None
+    remedy: str = "correct lengths, places of points, or the angles"
 
     @property
     def closes(self) -> bool:
@@ -76,7 +79,7 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
         gaps = joint_gaps(system, system.constraints(signals, time, error.partial)[0])
         return Closure(assembly.name, before, nan, nan, max(gaps.values()), tuple(gaps), error.cause, None)
     except (InconsistentConstraintsError, ProportionError) as error:
-        return Closure(assembly.name, before, nan, nan, 0.0, (), error.cause, None)
+        return Closure(assembly.name, before, nan, nan, 0.0, (), error.cause, None, error.remedy)
     phi, rate = system.constraints(signals, time, state.q, state.v)
     position, velocity = (float(np.max(np.abs(part), initial=0.0)) for part in (phi, rate))
     return Closure(assembly.name, before, position, velocity, 0.0, (), "", state)

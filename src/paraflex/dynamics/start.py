@@ -13,16 +13,28 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
-from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
+from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.special import special_start
 from paraflex.dynamics.state import State, consistent_state, reference_pose, undeformed
 from paraflex.dynamics.system import System, build_system
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
-from paraflex.mechanism import Assembly, BodyValues, Deflection, PointRef, Start, check_start
+from paraflex.mechanism import (
+    Assembly,
+    BodyValues,
+    Deflection,
+    Mechanism,
+    PointRef,
+    Start,
+    begun_at,
+    check_start,
+    standing,
+)
 
 # Largest gap of joints at a given start [sizes of the mechanism, rad], and largest error of velocities, as a fraction
 # of them.
@@ -33,7 +45,7 @@ _SMALL_TERMS = 1e-4
 # Given deflections of one beam may contradict each other by this fraction of them.
 _CONTRADICTION = 1e-9
 # Weight of stiffness against mass [s^2]: links move and do not begin to bend, unless they must.
-_POSITION_STIFFNESS, _VELOCITY_STIFFNESS = 1.0, 1e3
+_VELOCITY_STIFFNESS = 1e3
 
 
 @checked_arguments()
@@ -78,6 +90,17 @@ def start_state(
     if q is None:
         q = _coordinates(system, signals, start, assembly, time)
     return State(time, q, _velocities(system, signals, start, time, q))
+
+
+def standing_system(mechanism: Mechanism, start: Start | State | str | None, assembly: str | None = None) -> System:
+    """The system of a mechanism; prescribed motions whose start is not given begin at a start or a named assembly."""
+    if isinstance(start, str):
+        start, assembly = None, start
+    if not isinstance(start, State):
+        return build_system(standing(mechanism, assembly, start))
+    system, q = build_system(mechanism), start.q[None]
+    begun = begun_at(mechanism, lambda joint: float(joint_coordinate(system, joint, q).value[0]), start.time)
+    return system if begun is mechanism else build_system(begun)
 
 
 def pose_at_rest(system: System, start: Start | State | None, assembly: str | None = None) -> State:
@@ -188,7 +211,8 @@ def _coordinates(system: System, signals: Signals, start: Start, assembly: Assem
 
 def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArray[np.bool_]) -> Array:
     """Joints closed by the least change of the coordinates that are not held."""
-    change = partial(constraint_change, system, stiffness=_POSITION_STIFFNESS, free=~held)
+    q = q if np.any(held) else follow_drives(system, signals, time, q)[0]
+    change = partial(constraint_change, system, stiffness=POSITION_STIFFNESS, free=~held)
     q, phi = assemble(system, signals, time, q, change, free=~held)
     worst = int(np.argmax(np.abs(phi) / system.row_units)) if phi.size else 0
     if system.gap(phi) > _GAP:
@@ -226,6 +250,9 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SMALL_TERMS)
     if np.any(bad):
         _refuse_velocities(system, given, slip, bad)
+    cause, remedy = special_start(system, signals, time, q, C, wanted)
+    if cause:
+        raise InputError(cause.rstrip(","), field=given[0].field if given else "start", remedy=remedy)
     return v
 
 

@@ -12,6 +12,7 @@ import scipy
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
+from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.projection import (
     NAMED,
     assemble,
@@ -25,8 +26,9 @@ from paraflex.dynamics.projection import (
 )
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
+from paraflex.dynamics.special import special_start
 from paraflex.dynamics.system import System, build_system
-from paraflex.errors import AssemblyError, Moment
+from paraflex.errors import AssemblyError, InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
 from paraflex.mechanism import GROUND, Assembly, PointRef
@@ -36,11 +38,9 @@ from paraflex.mechanism.poses import approximate_poses
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
 # Rotation of links at the start of the damped iteration [rad].
 _ASIDE = 1e-2
-# Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
-_POSITION_STIFFNESS = 1.0
 # Links that must be deflected by more than this part of their size for loops to close do not fit together.
 _LARGEST_DEFLECTION = 0.1
-# The same for velocities: rates of deflection are to be small against those of links.
+# Weight of stiffness against mass [s^2] for velocities: rates of deflection are to be small against those of links.
 _VELOCITY_STIFFNESS = 1e3
 
 
@@ -126,7 +126,7 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
         rigid = build_system(system.described.rigid())
         signals = moment_signals(rigid.mechanism, 0.0)
         start = reference_pose(rigid, rigid.mechanism.assembly(assembly.name))
-        pose = project_position(rigid, signals, 0.0, start)
+        pose = assembled_position(rigid, signals, 0.0, start)
         return undeformed(system, rigid, State(0.0, pose, np.zeros(rigid.n))).q
     q = np.zeros(system.n)
     placed = set()
@@ -170,6 +170,24 @@ def point_position(system: System, q: Array, ref: PointRef) -> Array:
     return q[body.position] + np.array([c * local[0] - s * local[1], s * local[0] + c * local[1]])
 
 
+def assembled_position(system: System, signals: Signals, t: float, q: Array) -> Array:
+    """Coordinates (n,) of an assembly with closed loops, followed from its approximate pose to where drives start.
+
+    Raises
+    ------
+    AssemblyError
+        See `project_position`; the limit of reach is named if one is between the assembly and the start of a drive.
+    """
+    moved, limit = follow_drives(system, signals, t, q)
+    try:
+        return project_position(system, signals, t, moved)
+    except AssemblyError as error:
+        if not limit:
+            raise
+        remedy = "start prescribed motions within the mechanism's reach"
+        raise AssemblyError(f"{limit}, the limit of their reach,", Moment(t, 0), error.partial, remedy) from error
+
+
 def project_position(system: System, signals: Signals, t: float, q: Array) -> Array:
     """The nearest coordinates, in the metric of mass and stiffness, that satisfy the constraints.
 
@@ -178,7 +196,7 @@ def project_position(system: System, signals: Signals, t: float, q: Array) -> Ar
     AssemblyError
         The loops cannot be closed from there; its partial result is where they come closest to it.
     """
-    change = partial(constraint_change, system, stiffness=_POSITION_STIFFNESS)
+    change = partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
     closest, phi = assemble(system, signals, t, q, change)
     if closed(system, closest, phi) and _keeps_shape(system, q, closest):
         return closest
@@ -230,7 +248,7 @@ def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Arra
     for _ in range(_MAX_DESCENT):
         if closed(system, q, phi) or damping > _LARGEST_DAMPING:
             break
-        trial = q - constraint_change(system, q, _POSITION_STIFFNESS, damping)(phi)
+        trial = q - constraint_change(system, q, POSITION_STIFFNESS, damping)(phi)
         gap, _ = system.constraints(signals, t, trial)
         gain = 1.0 - np.linalg.norm(gap / system.row_units) / np.linalg.norm(phi / system.row_units)
         if gain > 0.0:
@@ -299,12 +317,17 @@ def consistent_state(
         body = system.body(name)
         q[body.flexible] = np.linalg.lstsq(body.integrals.D, nodal, rcond=None)[0]
     signals = moment_signals(system.mechanism, time)
-    q = project_position(system, signals, time, q)
-    if velocity is None:
-        v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)
-    else:
-        v = project_velocity(system, signals, time, q, velocity)
-    check_accelerations(system, signals, time, q, v)
+    q = assembled_position(system, signals, time, q)
+    try:
+        if velocity is None:
+            v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)
+        else:
+            v = project_velocity(system, signals, time, q, velocity)
+        check_accelerations(system, signals, time, q, v)
+    except InconsistentConstraintsError as error:
+        wanted = -system.constraints(signals, time, q)[1]
+        cause, remedy = special_start(system, signals, time, q, system.jacobian(q), wanted)
+        raise InconsistentConstraintsError(cause, error.moment, remedy=remedy) if cause else error from None
     return State(time, q, v)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from paraflex.arguments import checked_arguments
-from paraflex.dynamics import State, build_system, pose_at_rest
+from paraflex.dynamics import State, pose_at_rest, standing_system
 from paraflex.equilibria.branch import Branch, Point
 from paraflex.equilibria.equations import Equations
 from paraflex.equilibria.given import ModelWithStatics, StaticsDefaults, conditions
@@ -103,7 +103,7 @@ def _followed(
 ) -> Statics:
     """The equilibria; an error carries those until then."""
     given = conditions(mechanism, asked)
-    system = build_system(mechanism)
+    system = standing_system(mechanism, start, assembly)
     equations = Equations(system, pose_at_rest(system, start, assembly), given)
     found: list[Equilibrium] = []
     try:

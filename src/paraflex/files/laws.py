@@ -122,7 +122,7 @@ def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
     """
     match law:
         case ConstantSpeed(angle=angle, speed=speed, knots=()):
-            return {key: value for key, value in ((quantity, angle), ("speed", speed)) if value != 0.0}
+            return ({} if law.from_assembly else {quantity: angle}) | ({"speed": speed} if speed else {})
         case ExpressionLaw(text=text, knots=()):
             return {quantity: text}
         case TabulatedLaw(times=times, values=values):
@@ -297,7 +297,9 @@ def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
         return _pieces(entry.pieces, parameters)
     field = "angle" if entry.displacement is None else "displacement"
     given = entry.angle if entry.displacement is None else entry.displacement
-    return _expression(0.0 if given is None else given, parameters, field, entry.speed or 0.0)
+    if given is None:
+        return ConstantSpeed(0.0, entry.speed or 0.0, from_assembly=True)
+    return _expression(given, parameters, field, entry.speed or 0.0)
 
 
 def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseLaw:

@@ -27,7 +27,7 @@ from paraflex.files.study import StudyDefaults, check_study
 from paraflex.files.tables import model_tables
 from paraflex.findings import warn_of
 from paraflex.kinematics import Path
-from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode
+from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode, standing
 from paraflex.mechanism.quantities import known
 from paraflex.tracking import Ending, TrackingTask, plan_tracking
 from paraflex.validity import doubtful_numbers
@@ -416,7 +416,8 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
         )  # fmt: skip
     start = None if table.start is None else read_start(table.start, mechanism)
     model = Model(
-        mechanism=mechanism, paths=paths, study=study, source=source, parameters=data, start=start, text=text,
+        mechanism=standing(mechanism, study.assembly, start), paths=paths, study=study, source=source, parameters=data,
+        start=start, text=text,
         statics=_statics(table, mechanism), controllers=read_controllers(table, mechanism),
     )  # fmt: skip
     try:

@@ -425,10 +425,12 @@ class PrescribedTable(_Table):
 
     joint: Text = Field(description="the name of a joint")
     angle: FunctionOfTime | None = Field(
-        default=None, description="the angle at t = 0 in rad, or an expression of the time t"
+        default=None,
+        description="the angle at t = 0 in rad, by default that of the assembly, or an expression of the time t",
     )
     displacement: FunctionOfTime | None = Field(
-        default=None, description="the displacement at t = 0 in m, or an expression of the time t"
+        default=None,
+        description="the displacement at t = 0 in m, by default that of the assembly, or an expression of the time t",
     )
     speed: Number | None = Field(default=None, description="the speed in rad/s or m/s, from a constant start")
     pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = Field(

@@ -12,7 +12,8 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, redundant_rows
+from paraflex.dynamics import State, System, dependence
+from paraflex.dynamics.special import barred_drives
 from paraflex.errors import (
     ConstraintDriftError,
     IntegrationError,
@@ -26,7 +27,7 @@ from paraflex.integrators.between import samples_too_few, with_between
 from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
-from paraflex.integrators.method import NativeMethod
+from paraflex.integrators.method import Family, NativeMethod
 from paraflex.integrators.options import IntegrationOptions, loose_tolerance, refuse_tolerance
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Instant, Problem, Run, make_problem
@@ -43,7 +44,11 @@ _SLICE = 200
 _WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
+# And this close where steps become too small at a drive's limit of reach.
+_NEAR = 2e-3
 _PASSING_METHODS = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
+_AROUND = "start or drive the mechanism so that it does not get there"
+_WITHIN_REACH = "prescribe motions that end, or turn back, before it"
 _SHORTER = "take a shorter step, or leave it out and choose a tolerance"
 _NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
 _UNITS_REMEDY = "look for masses, stiffnesses, loads and laws in a wrong unit"
@@ -296,11 +301,17 @@ class Integration:
         cause, remedy = self._broken or _breakdown(code, options, self._pace.most)
         now = run.now()
         # Near a singular position it may be Newton or the error test that gives up first.
-        lost = redundant_rows(system, now.q, _NEARLY_DEPENDENT) if code != PAUSED and self._broken is None else []
+        stopped = code != PAUSED and self._broken is None
+        lost = dependence(system, now.q, _NEARLY_DEPENDENT if stopped else _NEAR)
+        drives = "" if self._drifts or lost.dropped.size <= run.dependent_rows else barred_drives(system, now.q, lost)
         error = ConstraintDriftError if self._drifts else IntegrationError
-        if len(lost) > run.dependent_rows:
-            error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({', '.join(lost)}),"
-            remedy = f"prescribe motions within the mechanism's reach, or {_PASSING_METHODS}"
+        if drives:
+            error, cause = SingularPositionError, f"the constraints lose rank at the limit of reach, {drives},"
+            remedy = _WITHIN_REACH
+        elif stopped and lost.dropped.size > run.dependent_rows:
+            rows = ", ".join(sorted(system.rows[k] for k in lost.dropped))
+            error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({rows}),"
+            remedy = _AROUND if options.method.family is Family.ESDIRK else _PASSING_METHODS
         elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
             error, cause = SingularPositionError, _before_singular(options.method.name, run.singular_ahead)
             remedy = _PASSING_METHODS

@@ -13,8 +13,8 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import (
     System,
+    assembled_position,
     build_system,
-    project_position,
     records,
     redundant_rows,
     reference_pose,
@@ -298,7 +298,7 @@ class PathClosure:
 
     def assemble(self, assembly: Assembly) -> Array:
         """The pose of an assembly, loops closed."""
-        return project_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
+        return assembled_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
     def task(self, q: Array) -> Array:
         """Task coordinates at a pose."""

@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, build_system, pose_at_rest, static_equilibrium
+from paraflex.dynamics import State, System, pose_at_rest, standing_system, static_equilibrium
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.dynamics.sensors import sensor_rows
 from paraflex.dynamics.tangents import MotionPoint
@@ -154,7 +154,7 @@ def sought_motion(
         point = point_at(0 if at is None else nearest_sample(times, at))
         return Sought(coordinates_of(system, ports.prescribed, first), point, ports, about)
     given = start if start is not None or isinstance(source, Mechanism) else source.start
-    system = build_system(mechanism)
+    system = standing_system(mechanism, given, assembly)
     state = pose_at_rest(system, given, assembly)
     if balanced:
         joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]

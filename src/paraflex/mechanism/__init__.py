@@ -113,5 +113,7 @@ from paraflex.mechanism.start import (
     BodyValues as BodyValues,
     Deflection as Deflection,
     Start as Start,
+    begun_at as begun_at,
     check_start as check_start,
+    standing as standing,
 )

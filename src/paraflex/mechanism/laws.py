@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from itertools import pairwise
@@ -58,13 +58,18 @@ class SampledAngle(CheckedFields):
 
 @dataclass(frozen=True)
 class ConstantSpeed(CheckedFields):
-    """A start value [rad or m] and a constant speed [rad/s or m/s]."""
+    """A start value [rad or m] and a constant speed [rad/s or m/s].
+
+    With `from_assembly` the start value of a prescribed motion is not given: it is that of the assembly or start which
+    a run begins from, and `angle` is its number there.
+    """
 
     _table = "law"
 
     angle: float
     speed: float
     knots: tuple[float, ...] = ()
+    from_assembly: bool = field(default=False, compare=False)
 
     def evaluate(self, t: Array) -> Values:
         """Value, rate and acceleration at times t."""

@@ -40,7 +40,7 @@ def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
         )  # fmt: skip
     assembly = mechanism.assemblies[0]
     poses = approximate_poses(mechanism, assembly) | placed_poses(mechanism, assembly)
-    first, second = (_coordinate(mechanism, mechanism.joint(name), poses) for name in relation.joints)
+    first, second = (joint_value(mechanism, mechanism.joint(name), poses) for name in relation.joints)
     if first is None or second is None:
         raise InputError(
             f"a {group.word}'s phase is not given, and assembly {assembly.name} does not determine its joints",
@@ -49,7 +49,7 @@ def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
     return replace(relation, phase=second - relation.transmission * first)
 
 
-def _coordinate(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:
+def joint_value(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:
     """A joint's angle or travel at approximate poses of the bodies; None if a place is not known."""
 
     def angle(ref: PointRef) -> float:

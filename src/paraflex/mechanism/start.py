@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import RigidBody
 from paraflex.mechanism.joints import PointRef
+from paraflex.mechanism.laws import AngleLaw, ConstantSpeed
 from paraflex.mechanism.mechanism import Mechanism
+from paraflex.mechanism.phases import joint_value
+from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
 from paraflex.mechanism.quantities import known
 
 
@@ -84,6 +87,32 @@ class Start(CheckedFields):
     def places(self) -> bool:
         """Whether it gives coordinates, and not velocities alone."""
         return bool(self.deflection or self.coordinates)
+
+
+def standing(mechanism: Mechanism, assembly: str | None = None, start: Start | None = None) -> Mechanism:
+    """The mechanism with prescribed motions that begin where an assembly stands, if their start is not given.
+
+    Bodies whose coordinates a start gives stand there.
+    """
+    poses: dict[str, Pose] = {}
+    if mechanism.assemblies and mechanism.prescribed:
+        chosen = mechanism.assembly(assembly)
+        poses = approximate_poses(mechanism, chosen) | placed_poses(mechanism, chosen)
+    given = {} if start is None else start.coordinates
+    poses |= {name: Pose(values.phi, (values.x, values.y)) for name, values in given.items()}
+    return begun_at(mechanism, lambda joint: joint_value(mechanism, mechanism.joint(joint), poses) or 0.0)
+
+
+def begun_at(mechanism: Mechanism, value: Callable[[str], float], time: float = 0.0) -> Mechanism:
+    """The mechanism with prescribed motions whose start is not given at the values of their joints at a time [s]."""
+
+    def begun(law: AngleLaw, joint: str) -> AngleLaw:
+        if isinstance(law, ConstantSpeed) and law.from_assembly:
+            return replace(law, angle=value(joint) - time * law.speed)
+        return law
+
+    prescribed = tuple(replace(one, law=begun(one.law, one.joint)) for one in mechanism.prescribed)
+    return mechanism if prescribed == mechanism.prescribed else replace(mechanism, prescribed=prescribed)
 
 
 @checked_arguments()

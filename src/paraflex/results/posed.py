@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.dynamics import System, build_system, closure_of, start_state
+from paraflex.dynamics import System, closure_of, standing_system, start_state
 from paraflex.dynamics.projection import joint_gaps, row_unit
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.signals import moment_signals
@@ -125,7 +125,7 @@ def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path
             remedy="add an [assembly.NAME] table with an approximate angle of each body, in rad",
         )  # fmt: skip
     chosen = mechanism.assembly(assembly)
-    rigid = build_system(mechanism.rigid())
+    rigid = standing_system(mechanism.rigid(), chosen.name)
     found = closure_of(rigid, chosen)
     if found.state is None:
         q = reference_pose(rigid, chosen)
@@ -143,7 +143,7 @@ def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path
 
 def _started(mechanism: Mechanism, assembly: str | None, start: Start) -> Posed:
     """The pose of a start; where it cannot be taken, that of the assembly."""
-    system = build_system(mechanism)
+    system = standing_system(mechanism, start, assembly)
     chosen = mechanism.assembly(assembly) if mechanism.assemblies else None
     try:
         state = start_state(system, start, chosen)

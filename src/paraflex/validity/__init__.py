@@ -6,7 +6,7 @@ both, and leaves out terms of fourth order in the slopes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from paraflex.dynamics import System
 from paraflex.errors import ValidityWarning
@@ -31,6 +31,7 @@ from paraflex.validity.plausibility import (
     Driven as Driven,
     doubtful_results as doubtful_results,
     doubtful_stresses as doubtful_stresses,
+    moved_far as moved_far,
     stiff_modes as stiff_modes,
 )
 
@@ -91,6 +92,9 @@ def assess(system: System, solution: Solution, following: Following | None = Non
     bodies = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
     linear, second = [one for one in bodies if one.linear], [one for one in bodies if not one.linear]
     indicators = [*of_linear(linear, solution, following), *of_second_order(second, solution)]
+    if not solution.method:
+        # Kineto-elastodynamics is linear in the displacements whatever the geometry.
+        indicators = [replace(one, remedy="run it without --ked, in second-order geometry") for one in indicators]
     return Validity(tuple(indicators)) if indicators else None
 
 

@@ -150,9 +150,15 @@ def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) 
     for field, column in columns.items():
         check_metric(column, field)
     counting = [metric_of(column).name for column in columns.values()]
-    metrics = list(dict.fromkeys([*table.metrics, *counting])) if table.metrics else []
     sampling = SamplingTable(kind=RANDOM, number=1)
-    base = make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
+
+    def study(metrics: list[str]) -> SweepStudy:
+        return make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
+
+    base = study(list(dict.fromkeys([*table.metrics, *counting])) if table.metrics else [])
+    # Not every metric is kept unless it is named.
+    missing = [name for name in counting if name not in base.setting.metrics]
+    base = study([*base.setting.metrics, *dict.fromkeys(missing)]) if missing else base
     for field, column in columns.items():
         _check_column(field, column, base.members)
     start = [

@@ -1,0 +1,131 @@
+"""Start of prescribed motions away from an assembly: its pose is moved there by continuation, on its branch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.dynamics.inputs import inputs_of
+from paraflex.dynamics.joint_coordinates import value_text
+from paraflex.dynamics.projection import assemble, closed, constraint_change
+from paraflex.dynamics.rank import DENSE_ROWS
+from paraflex.dynamics.system import System
+from paraflex.kernel.packed import CONSTRAINT, Signals
+from paraflex.mechanism import PrescribedAngle
+
+# Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
+POSITION_STIFFNESS = 1.0
+# Prescribed motions nearer to the pose than this start there [sizes of the mechanism, rad].
+_NEAR = 1e-9
+# Poses nearer to one another than this are one [sizes of the mechanism, rad].
+_SAME = 1e-5
+# Longest predicted step [sizes of the mechanism, rad], shortest as a part of the way, largest number of steps.
+_LONGEST, _SHORTEST, _MAX_STEPS = 0.25, 1e-9, 2000
+# A step is accepted if its correction, and the change of the direction, are smaller than these parts of it.
+_CORRECTION, _TURN = 0.25, 0.5
+
+
+def follow_drives(system: System, signals: Signals, t: float, q: Array) -> tuple[Array, str]:
+    """Move a pose until prescribed motions are at their values, along the poses that the joints allow.
+
+    Whole turns of a drive are added to the angle of the body it turns; if the rest of the way is barred, or gears turn
+    other bodies too, all of it is followed.
+
+    Parameters
+    ----------
+    system, signals
+    t : float
+        Time of the values [s].
+    q : (n,) array
+        Approximate coordinates of the pose.
+
+    Returns
+    -------
+    q : (n,) array
+        Coordinates with the drives at their values; as given if the way there is barred, or if closing the loops from
+        there leads to the same pose.
+    limit : str
+        Limit of reach that bars the way; empty for none.
+    """
+    away, limit = _away(system, signals, t, q), ""
+    if system.gap(away) <= _NEAR:
+        return q, limit
+    for begun in (_turned(system, signals, t, q, away), q):
+        found, limit = _follow(system, signals, t, begun)
+        if found is not None:
+            # Where closing at once leads to the same pose it is left to the caller, with fewer roundings.
+            direct, _ = assemble(
+                system, signals, t, q, partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
+            )
+            same = np.max(np.abs(direct - found) / system.units) <= _SAME
+            return (q if same else found), ""
+    return q, limit
+
+
+def driven_rows(system: System) -> Iterator[tuple[PrescribedAngle, int]]:
+    """Prescribed motions, each with the number of its constraint row."""
+    signals = system.packed.rows["signal"].tolist()
+    for motion, signal in zip(system.mechanism.prescribed, inputs_of(system.mechanism).prescribed, strict=True):
+        yield motion, signals.index(signal)
+
+
+def _away(system: System, signals: Signals, t: float, q: Array) -> Array:
+    """Coordinates of driven joints less their prescribed values in their rows (m,), zero in the others."""
+    return np.where(system.packed.rows["signal"] >= 0, system.constraints(signals, t, q)[0], 0.0)
+
+
+def _turned(system: System, signals: Signals, t: float, q: Array, away: Array) -> Array:
+    """The pose with whole turns of drives; as it is if other constraints do not allow them."""
+    turned = q.copy()
+    for motion, row in driven_rows(system):
+        joint = system.mechanism.joint(motion.joint)
+        moved, sign = (joint.a, 1.0) if joint.b.on_ground else (joint.b, -1.0)
+        if not joint.slides:
+            turned[system.body(moved.body).angle] += sign * 2.0 * math.pi * round(away[row] / (2.0 * math.pi))
+    others = system.packed.rows["signal"] < 0
+    change = (system.constraints(signals, t, turned)[0] - system.constraints(signals, t, q)[0]) * others
+    return turned if system.gap(change) <= _NEAR * max(1.0, system.gap(away)) else q
+
+
+def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array | None, str]:
+    """The pose with the drives at their values, by predictor and corrector; None with the limit if it is barred."""
+    change_at = partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
+    away = _away(system, signals, t, q)
+
+    def pose_at(part: float, q: Array) -> Array | None:
+        pose, phi = assemble(system, signals, t, q, change_at, offset=(1.0 - part) * away)
+        return pose if closed(system, pose, phi) else None
+
+    pose, part, step = pose_at(0.0, q), 0.0, 1.0
+    if pose is None:
+        return None, ""
+    rate, side = -change_at(pose)(away) / system.units, _side(system, pose)
+    for _ in range(_MAX_STEPS):
+        size = float(np.max(np.abs(rate)))
+        step = min(step, 1.0 - part, _LONGEST / max(size, _LONGEST))
+        predicted = pose + step * system.units * rate
+        found = pose_at(part + step, predicted)
+        if found is not None and np.max(np.abs(found - predicted) / system.units) <= _CORRECTION * step * size:
+            onwards = -change_at(found)(away) / system.units
+            if np.max(np.abs(onwards - rate)) <= _TURN * size and _side(system, found) == side:
+                if part + step >= 1.0:
+                    return found, ""
+                pose, rate, part, step = found, onwards, part + step, 4.0 * step
+        step *= 0.5
+        if step < _SHORTEST:
+            break
+    held = [f"{one.name} at {value_text(system, one.joint, pose)}" for one, row in driven_rows(system) if away[row]]
+    return None, f"the joints bar the way from the assembly to the start of prescribed motions, {', '.join(held)}"
+
+
+def _side(system: System, q: Array) -> float:
+    """Sign of det Phi_q for a rigid mechanism in which all is driven: it changes where branches meet. Else zero."""
+    rows = system.packed.rows["kind"] == CONSTRAINT
+    rigid = [body.offset + k for body in system.bodies for k in range(3)]
+    if np.sum(rows) != len(rigid) or len(rigid) > DENSE_ROWS:
+        return 0.0
+    return float(np.linalg.slogdet(system.jacobian(q)[np.ix_(rows, rigid)])[0])

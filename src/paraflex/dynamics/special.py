@@ -1,0 +1,81 @@
+"""Starts where branches meet: change points, with the two velocities possible, and dead centres of drives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy
+
+from paraflex.arrays import Array
+from paraflex.dynamics.following import driven_rows
+from paraflex.dynamics.joint_coordinates import joint_coordinate, value_text
+from paraflex.dynamics.projection import NAMED, second_rates
+from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence
+from paraflex.dynamics.system import System
+from paraflex.kernel.packed import Signals
+
+# Curvatures and rates below this part of the largest are rounding.
+_ROUNDING = 1e-7
+# Rows with less than this part in a dependence near a singular position have none.
+_PART = 1e-2
+_BESIDE = "start prescribed motions beside this pose and within the mechanism's reach"
+_TWO_BRANCHES = "give one of these rates in [start.velocity.angular], or start beside this pose"
+
+
+def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, wanted: Array) -> tuple[str, str]:
+    """Description of a pose at which the branches of a motion meet, and the remedy; both empty for any other pose.
+
+    Velocities v0 + x n, n the null vector of the rows, have accelerations if w Phi''(v0 + x n) = 0, a quadratic
+    equation in x; w is the combination of the rows of Phi_q that vanishes.
+
+    Parameters
+    ----------
+    q : (n,) array
+        Closed coordinates.
+    rows, wanted : (k, n) array or sparse matrix, and (k,) array
+        Phi_q and rows of given velocities, and what rows v is to be.
+    """
+    found = dependence(system, q) if 0 < system.m <= DENSE_ROWS else None
+    if found is None or not found.dropped.size:
+        return "", ""
+    scaled = (rows.toarray() if scipy.sparse.issparse(rows) else rows) * system.units
+    null = scipy.linalg.null_space(scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-300), 1e-9)
+    if null.shape[1] != 1:
+        return "", ""
+    v, along = system.units * np.linalg.lstsq(scaled, wanted, rcond=1e-9)[0], system.units * null[:, 0]
+
+    def missing(x: float, v: Array = v) -> Array:
+        return found.conflict(second_rates(system, signals, t, q, v + x * along, np.zeros(system.n)))
+
+    curvature = 0.5 * (missing(1.0, 0.0 * v) + missing(-1.0, 0.0 * v)) - missing(0.0, 0.0 * v)
+    k = int(np.argmax(np.abs(curvature)))
+    if abs(curvature[k]) <= _ROUNDING * system.row_units[found.dropped[k]]:
+        return "", ""
+    drives = barred_drives(system, q, found)
+    barred = found.conflict(-wanted[: system.m])[k]
+    if abs(barred) > _ROUNDING * np.max(np.abs(wanted)):
+        return f"a dead centre, the limit of reach, with {drives}, where prescribed motions are not at rest,", _BESIDE
+    roots = np.roots([curvature[k], 0.5 * (missing(1.0) - missing(-1.0))[k], missing(0.0)[k]])
+    if np.iscomplexobj(roots):
+        return f"a dead centre, the limit of reach, with {drives}, beyond which prescribed motions lead,", _BESIDE
+    if abs(roots[0] - roots[1]) <= _ROUNDING:
+        return "", ""
+    rates = []
+    for joint in system.mechanism.joints:
+        row = joint_coordinate(system, joint.name, q[None]).rows[0]
+        if abs(row @ along) > _ROUNDING:
+            unit = "m/s" if joint.slides else "rad/s"
+            rates.append(f"{joint.name} at " + " or ".join(f"{row @ (v + x * along):.6g}" for x in roots) + f" {unit}")
+    what = f"a dead centre, with {drives}" if drives else "a change point"
+    return f"{what}, at which two branches meet: joints move, {', '.join(rates[:NAMED])},", _TWO_BRANCHES
+
+
+def barred_drives(system: System, q: Array, found: Dependence) -> str:
+    """Prescribed motions, with the values of their joints, that take part in dependences of rows; empty for none."""
+    units, rows = system.row_units, set()
+    for k, row in enumerate(found.dropped):
+        part = np.abs(found.coefficients[:, k]) * units[found.kept] / units[row]
+        rows |= {row, *found.kept[part > _PART * max(1.0, part.max(initial=0.0))].tolist()}
+    drives = [motion for motion, row in driven_rows(system) if row in rows]
+    return ", ".join(f"{one.name} at {value_text(system, one.joint, q)}" for one in drives)
