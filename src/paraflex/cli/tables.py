@@ -193,7 +193,8 @@ def below_tolerance(console: Console, summaries: Mapping[str, Any], modes: Mappi
     if settings.get("step") is not None or settings.get("ked"):
         return
     key = HEADLINE[ErrorSpan(first["error"])]
-    if line := below_tolerance_line({name: mode.get(key) for name, mode in modes.items()}, settings["tolerance"]):
+    tolerance = first.get("tolerance") or settings["tolerance"]
+    if line := below_tolerance_line({name: mode.get(key) for name, mode in modes.items()}, tolerance):
         console.print(line, soft_wrap=True)
 
 

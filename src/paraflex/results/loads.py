@@ -21,6 +21,8 @@ _RATES = {"N m": "rad/s", "N": "m/s"}
 def load_figures(run: xr.Dataset) -> dict[str, Any]:
     """Largest magnitudes of one run; None for what a model does not give, and no group that results do not hold.
 
+    A run that failed has none: its largest loads may be those of the failure.
+
     Returns
     -------
     dict
@@ -33,6 +35,8 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
         torque_time, force_time, ... [s].
     """
     out: dict[str, Any] = {}
+    if "status" in run and run["status"].item() == "failed":
+        return out
     if "stress_max" in run:
         bent = set(map(str, run["section_body"].values))
         out["beams"] = {

@@ -81,6 +81,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         modes[name] = {"status": "failed", "message": reason}
     return {
         "mechanism": data.attrs["mechanism"],
+        "tolerance": data.attrs.get("tolerance"),
         "error": data.attrs.get("error", ErrorSpan.WHOLE.value),
         "after": data.attrs.get("after", "free"),
         "verdict": verdict_of(data).to_dict(),

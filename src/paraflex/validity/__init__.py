@@ -95,7 +95,9 @@ def assess(system: System, solution: Solution, following: Following | None = Non
     if not solution.method:
         # Kineto-elastodynamics is linear in the displacements whatever the geometry.
         indicators = [replace(one, remedy="run it without --ked, in second-order geometry") for one in indicators]
-    return Validity(tuple(indicators)) if indicators else None
+    found = Validity(tuple(indicators)) if indicators else None
+    # That the part before a failure is within the model would be no verdict on the run.
+    return None if found is not None and found.holds and solution.status == "failed" else found
 
 
 def warn(validity: Validity | None, whose: str = "") -> None:

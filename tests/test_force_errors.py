@@ -1,0 +1,252 @@
+"""Forces at samples and how well runs know them: closed forms, steps that resolve what acts, estimates beside truth."""
+
+import json
+
+import numpy as np
+import pytest
+
+import paraflex as pf
+from paraflex.dynamics import constant_signals, law_signal, pack_signals
+from paraflex.dynamics.inputs import inputs_of
+from paraflex.dynamics.joint_loads import drive_torques, joint_loads
+from paraflex.errors import IntegrationError
+from paraflex.files.laws import ExpressionLaw
+from paraflex.integrators.limits import step_limits
+from paraflex.results.loads import load_figures
+from shell import paraflex
+
+ARM = """
+name = "arm"
+gravity = [0.0, -9.81]
+ground = { O = [0.0, 0.0] }
+[body.arm]
+type = "rigid"
+mass = 2.0
+inertia = 0.3
+centre_of_mass = [0.4, 0.0]
+points = { O = [0.0, 0.0], T = [0.8, 0.0] }
+[joint]
+O = ["ground.O", "arm.O"]
+[assembly.home]
+arm = 0.0
+"""
+TURNED = ARM + '[prescribed.drive]\njoint = "O"\nspeed = 10.0\n[study]\nduration = 2.5\nsamples = 251\n'
+HELD = (
+    ARM.replace("-9.81", "0.0")
+    + '[prescribed.drive]\njoint = "O"\n[load.F]\ntype = "force"\npoint = "arm.T"\nforce = [0.0, "10*sin(50*t)"]\n'
+    + "[study]\nduration = 2.5\nsamples = 251\n"
+)
+OWN = ["tr-bdf2", "trapezoidal", "esdirk3", "esdirk4", "esdirk5", "generalised-alpha", "hht-alpha"]
+
+
+@pytest.fixture
+def model(tmp_path):
+    def load(text):
+        (tmp_path / "model.toml").write_text(text)
+        return pf.load(tmp_path / "model.toml")
+
+    return load
+
+
+def motion(given, **options):
+    return pf.simulate_motion(
+        given, samples=given.study.samples, warning=False, options=pf.IntegrationOptions(**options)
+    )
+
+
+def joint_forces(run):
+    solution, names = run.solution, [joint.name for joint in run.system.described.joints]
+    none = np.zeros((solution.t.size, len(run.system.described.motors)))
+    return joint_loads(run.system, names, solution.q, solution.multipliers, none)
+
+
+@pytest.mark.parametrize("method", OWN)
+def test_a_turned_arm_needs_the_torque_of_its_weight(model, method):
+    run = motion(model(TURNED), method=method)
+    t, solution = run.solution.t, run.solution
+    torque = drive_torques(run.system, solution.multipliers)[:, 0]
+    np.testing.assert_allclose(torque, 2.0 * 9.81 * 0.4 * np.cos(10.0 * t), rtol=0.0, atol=7.8e-4)
+    # Weight and the force towards the pivot: at most 2 (9.81 + 100 * 0.4) N, which no joint force exceeds.
+    force = np.linalg.norm(joint_forces(run).force[:, 0], axis=1)
+    exact = 2.0 * np.hypot(-40.0 * np.cos(10.0 * t), 9.81 - 40.0 * np.sin(10.0 * t))
+    np.testing.assert_allclose(force, exact, rtol=0.0, atol=1e-2)
+    assert solution.energy_balance_max < 1e-3 * 125.0
+    assert not [one.code for one in run.doubts]
+
+
+@pytest.mark.parametrize("method", OWN)
+def test_an_arm_held_still_bears_a_load_that_oscillates(model, method):
+    run = motion(model(HELD), method=method)
+    torque = drive_torques(run.system, run.solution.multipliers)[:, 0]
+    np.testing.assert_allclose(torque, -8.0 * np.sin(50.0 * run.solution.t), rtol=0.0, atol=8e-4)
+
+
+def test_a_bearing_bears_a_load_at_it(model):
+    text = (
+        HELD.replace("arm.T", "arm.O").replace('[prescribed.drive]\njoint = "O"\n', "").replace("[0.4, 0.0]", "[0, 0]")
+    )
+    run = motion(model(text + "[start.velocity.angular]\narm = 3.0\n"))
+    force = joint_forces(run).force[:, 0]
+    np.testing.assert_allclose(force[:, 1], -10.0 * np.sin(50.0 * run.solution.t), rtol=0.0, atol=1e-3)
+    np.testing.assert_allclose(force[:, 0], 0.0, atol=1e-3)
+
+
+def test_a_pulse_within_a_long_step_is_met(model):
+    """A load that is nothing for most of the time, and 10 N for some milliseconds."""
+    pulse = HELD.replace("10*sin(50*t)", "10*exp(-((t - 1.303) / 0.004)**2)").replace("samples = 251", "samples = 6")
+    run = motion(model(pulse))
+    whole = pf.simulate_motion(model(pulse), samples=2501, warning=False)
+    assert np.max(np.abs(drive_torques(whole.system, whole.solution.multipliers))) == pytest.approx(8.0, rel=1e-2)
+    (found,) = [one for one in run.doubts if one.code == "samples-coarse"]
+    assert "prescribed.drive" in found.text
+
+
+def test_limits_of_steps_follow_what_is_given_in_time(model):
+    mechanism = model(HELD).mechanism
+    signals, _ = pack_signals(mechanism, constant_signals([], 2.5), 2.5)
+    limits = step_limits(signals, inputs_of(mechanism))
+    # A radian of sin(50 t), rounded down by a grade; nothing limits steps where the load does not bend.
+    assert np.min(limits.steps) == pytest.approx(1.0 / 50.0, rel=0.3)
+    still = step_limits(*(lambda m: (pack_signals(m, [], 1.0)[0], inputs_of(m)))(model(TURNED).mechanism))
+    assert still.times.size == 0
+
+
+def test_laws_are_followed_however_often_they_change_in_a_run():
+    """A thousand seconds of 50 rad/s: pieces of half a second each would hold four vibrations."""
+    law, end = ExpressionLaw("sin(50*t)"), 1000.0
+    signal, _ = law_signal("load.F", law, end)
+    t = np.random.default_rng(0).uniform(0.0, end, 1000)
+    piece = np.searchsorted(signal.breaks, t, side="right") - 1
+    powers = (t - signal.breaks[piece])[:, None] ** np.arange(6)
+    np.testing.assert_allclose(
+        np.sum(powers * signal.coefficients[piece], axis=1), np.sin(50.0 * t), rtol=0.0, atol=1e-8
+    )
+    with pytest.raises(pf.InputError, match="changes too fast"):
+        law_signal("load.F", ExpressionLaw("sin(1e6*t)"), end)
+
+
+@pytest.mark.parametrize("name", ["five_bar", "four_bar", "geared_five_bar", "slider_crank_flexible"])
+def test_estimates_of_force_errors_are_of_the_size_of_the_errors(name):
+    """Undamped beams: vibrations that the steps do not resolve are missing in forces."""
+    given = pf.load(name)
+
+    def run(**options):
+        chosen = pf.IntegrationOptions(**options)
+        if given.paths:
+            task = pf.plan(given.mechanism, next(iter(given.paths.values())), duration=given.study.duration)
+            return task.simulate("+" * len(given.mechanism.motors), options=chosen, warning=False)
+        return pf.simulate_motion(given, samples=701, options=chosen, warning=False)
+
+    usual, fine = run(), run(tolerance=1e-8)
+    error = np.max(np.abs(usual.solution.multipliers - fine.solution.multipliers), axis=0)
+    peak = np.max(np.abs(fine.solution.multipliers), axis=0)
+    relative = error / np.maximum(peak, 1e-2 * peak.max())
+    worst = int(np.argmax(relative))
+    assert relative[worst] > 0.01
+    ratio = usual.solution.multiplier_errors[worst] / error[worst]
+    assert 0.6 < ratio < 12.0
+    assert "forces-unresolved" in [one.code for one in usual.doubts]
+
+
+def test_errors_stand_beside_the_numbers(tmp_path):
+    out = tmp_path / "out"
+    assert paraflex("run", "four_bar", "--out", str(out)).returncode == 0
+    summary = json.loads((out / "summary.json").read_text())
+    joint = summary["loads"]["joints"]["Q"]
+    assert joint["force_error"] > 0.01 * joint["force_max"]
+    assert summary["loads"]["drives"]["drive"]["torque_error"] > 0.0
+    assert "±" in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize("size", [3e-4, 1e-2, 1.0, 50.0])
+def test_forces_are_as_exact_in_mechanisms_of_any_size(model, size):
+    """A four-bar turned at a speed for which inertia matters at every size."""
+    text = f"""
+name = "four-bar"
+gravity = [0.0, -9.81]
+ground = {{ O = [0.0, 0.0], D = [{size}, 0.0] }}
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "coupler.A"]
+B = ["coupler.B", "rocker.B"]
+D = ["ground.D", "rocker.D"]
+[prescribed.drive]
+joint = "O"
+angle = 1.0
+speed = {5.0 / size**0.5}
+[assembly.home]
+crank = 1.0
+coupler = 0.20478212391844935
+rocker = 0.9808133088983201
+[study]
+duration = {1.0 * size**0.5}
+samples = 101
+"""
+    for name, points, length in (("crank", "OA", 0.5), ("coupler", "AB", 1.2), ("rocker", "DB", 0.8)):
+        text += f"""
+[body.{name}]
+type = "rigid"
+mass = {size**3}
+inertia = {0.1 * size**5}
+centre_of_mass = [{0.5 * length * size}, 0.0]
+points = {{ {points[0]} = [0.0, 0.0], {points[1]} = [{length * size}, 0.0] }}
+"""
+    given = model(text)
+    usual, fine = motion(given), motion(given, method="esdirk4", step=2.5e-4 * size**0.5, tolerance=1e-9 * size)
+    torques = [drive_torques(one.system, one.solution.multipliers)[:, 0] for one in (usual, fine)]
+    np.testing.assert_allclose(*torques, rtol=0.0, atol=5e-4 * np.max(np.abs(torques[1])))
+    assert usual.solution.energy_balance_max < 1e-5 * np.max(usual.solution.kinetic_energy)
+
+
+def test_steps_a_cycle_do_not_grow_with_the_duration(model):
+    given = model(ARM.replace("home]\narm = 0.0", "home]\narm = -0.57") + "[study]\nduration = 1.0\nsamples = 11\n")
+
+    def steps(duration, **options):
+        return pf.simulate_motion(given, duration, samples=11, warning=False, options=pf.IntegrationOptions(**options))
+
+    short, long = (steps(duration).solution.steps / duration for duration in (50.0, 500.0))
+    assert long == pytest.approx(short, rel=0.1)
+    by_run = steps(500.0, tolerance_per="run").solution
+    assert by_run.steps > 5.0 * 500.0 * long
+    assert by_run.energy_balance_max < 1e-4 * steps(500.0).solution.energy_balance_max
+
+
+def test_control_of_forces_resolves_a_stiff_spring(model):
+    """The spring's torque is known to positions' tolerance times its stiffness alone, unless forces are controlled."""
+    text = ARM + '[spring.s]\njoint = "O"\nstiffness = 1e5\n[study]\nduration = 0.2\nsamples = 201\n'
+    loose = {"tolerance": 1e-4}
+    fine = motion(model(text), method="esdirk4", step=1e-6, tolerance=1e-9).solution
+    row = int(np.argmax(np.max(np.abs(fine.multipliers), axis=0)))
+    errors = []
+    for control in ("positions", "forces"):
+        found = motion(model(text), control=control, **loose).solution
+        errors.append(
+            np.max(np.abs(found.multipliers - fine.multipliers)[:, row]) / np.max(np.abs(fine.multipliers[:, row]))
+        )
+    assert errors[0] > 0.1
+    assert errors[1] < 0.02
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"control": "torques"}, "control"),
+        ({"control": "forces", "method": "radau"}, "control"),
+        ({"control": "forces", "step": 1e-3}, "control"),
+        ({"tolerance_per": "second"}, "tolerance_per"),
+        ({"tolerance": float("nan")}, "tolerance"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(options, field):
+    with pytest.raises(pf.InputError) as refused:
+        pf.IntegrationOptions(**options)
+    assert refused.value.field == field
+
+
+def test_a_run_that_failed_has_no_loads_and_no_good_verdict():
+    given = pf.load("slider_crank_flexible")
+    with pytest.raises(IntegrationError) as failed:
+        pf.simulate_motion(given, options=pf.IntegrationOptions(max_steps=40), warning=False)
+    run = failed.value.partial
+    assert run.validity is None
+    assert load_figures(pf.motion_dataset(run)) == {}
