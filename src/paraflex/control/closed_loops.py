@@ -17,6 +17,7 @@ from paraflex.control.discrete import DiscreteModel, check_discrete, matrices_of
 from paraflex.control.reach import frequency_of
 from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.errors import InputError, ResultWarning, warn_user
+from paraflex.linear.named import places_in_s
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import positive
 
@@ -100,7 +101,7 @@ class ClosedLoop:
         """
         upper, added, follow = self._triangular
         eye, one = np.eye(len(upper)), np.eye(added.shape[1])
-        z = np.exp(1j * np.atleast_1d(np.asarray(omega, dtype=float)) * self.plant.period)
+        z = np.exp(places_in_s(omega, "omega") * self.plant.period)
         return np.array([one + follow @ scipy.linalg.solve_triangular(at * eye - upper, added) for at in z])
 
     def loop(self, omega: ArrayLike) -> Complex:

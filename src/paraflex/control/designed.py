@@ -21,7 +21,7 @@ from paraflex.errors import InputError
 from paraflex.findings import Finding
 from paraflex.linear import LinearModel, linearise, reduce
 from paraflex.mechanism import mode_of_motors
-from paraflex.mechanism.quantities import not_negative, positive
+from paraflex.mechanism.quantities import finite, not_negative, positive
 
 Numbers = float | Mapping[str, float]
 
@@ -90,6 +90,8 @@ class DesignedLQG:
         _check(disturbance, "disturbance", "N m or N", not_negative)
         for name, each in (coloured or {}).items():
             deviation_and_filter(name, each)
+        if at is not None:
+            finite(at, "at")
         if states is not None and states < 1:
             raise InputError("no such number of states", field="states", value=states, remedy="say 16, or leave it out")
         self.outputs: tuple[str, ...] = tuple(effort) if isinstance(effort, Mapping) else ()

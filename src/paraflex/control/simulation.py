@@ -28,6 +28,7 @@ from paraflex.kernel.sampled import SampledLaw
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
 from paraflex.mechanism.measured import encoders_of, measured_sensors
+from paraflex.mechanism.quantities import finite
 from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask
 from paraflex.validity import warn, with_blame
@@ -260,13 +261,15 @@ class Simulation:
         Raises
         ------
         InputError
-            Controllers with unknown sensors or motors, or one named twice, or with periods that are no multiples of the
-            shortest; a law that gives the whole torque beside another or beside feed-forward.
+            A time that is not finite; controllers with unknown sensors or motors, one named twice, or with periods that
+            are no multiples of the shortest; a law that gives the whole torque beside another or feed-forward.
         ControllerError
             One raised an error, or returned what cannot be torques; it carries the run so far.
         IntegrationError
             It cannot go on; it carries the run so far.
         """
+        if until is not None:
+            finite(until, "until")
         end = self.end if until is None else min(until, self.end)
         try:
             if controllers is not None:

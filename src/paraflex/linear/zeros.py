@@ -4,8 +4,10 @@ Zeros are the s at which [A - s, B; C, D] loses rank (Emami-Naeini and Van Doore
 axial vibrations of links that are a thousand times as fast: they are found as the largest eigenvalues
 theta = 1 / (s - sigma) of a pencil inverted at a shift sigma; zeros at infinity are those where theta is zero.
 
-Systems that are not square are made so by random combinations of inputs or outputs, twice: what is a zero of both, and
-where the matrix that is not square loses rank, is one of the system.
+A response may have a smaller rank than it has inputs or outputs at every s: of two motors at geared joints, say, or of
+a motor and a sensor on parts that move independently. Such systems, and those that are not square, are replaced by
+random combinations of as many inputs and outputs as the rank, twice: a zero of both at which the matrix of all inputs
+and outputs loses rank is one of the system.
 """
 
 from __future__ import annotations
@@ -23,8 +25,10 @@ from paraflex.linear.independent import unit_rows
 Complex = NDArray[np.complex128]
 # Zeros of two squared systems that agree this well are one.
 _SAME = 1e-6
-# At a zero the least singular value of the matrix, entries of size one, is smaller: rounding leaves 1e-14 of it.
+# Singular values below this are zero in a matrix with entries of size one: rounding leaves 1e-14 of them.
 _RANK = 1e-11
+# The rank at almost every s is the largest at these multiples of the shift, none of which is a likely zero.
+_ANYWHERE = (1.0, 2.718281828, 31.41592654)
 # An eigenvalue theta below this part of the largest is that of a zero at infinity.
 _INFINITE = 1e-12
 # Of a general system such zeros are blurred: those further out than this part of the fastest pole are left out.
@@ -61,18 +65,21 @@ def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
     shift : float
         Positive, of the size of low frequencies [rad/s].
     """
-    inputs, outputs = modes.B.shape[1], modes.C.shape[0]
-    if inputs != outputs:
 
-        def squared(mix: Array) -> Complex:
-            few = modes._replace(B=modes.B @ mix) if inputs > outputs else modes._replace(C=mix @ modes.C)
-            return vibrating_zeros(few, shift)
+    def matrix(s: complex) -> Complex:
+        mass, damping, stiffness = _between(modes, max(abs(s), shift))
+        return s * s * mass + s * damping + stiffness
 
-        def matrix(s: complex) -> Complex:
-            mass, damping, stiffness = _between(modes, max(abs(s), shift))
-            return s * s * mass + s * damping + stiffness
+    def squared(left: Array, right: Array) -> Complex:
+        return _square_vibrating(modes._replace(B=modes.B @ right, C=left @ modes.C), shift)
 
-        return _common(squared, matrix, (inputs, outputs), shift)
+    # The null spaces of B^T and C leave as many rows and columns fewer as these have rank.
+    rows, columns = (modes.squares.size - each for each in matrix(shift).shape)
+    return _common(squared, matrix, (modes.C.shape[0], modes.B.shape[1]), modes.squares.size - rows - columns, shift)
+
+
+def _square_vibrating(modes: Vibrating, shift: float) -> Complex:
+    """Zeros of a mechanism with as many independent outputs as inputs, whose response is regular."""
     mass, damping, stiffness = _between(modes, shift)
     if not np.any(modes.damping):
         squares = _shifted(-_pencil(stiffness + shift**2 * mass, mass), shift**2)
@@ -88,7 +95,7 @@ def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
 def _between(modes: Vibrating, low: float) -> tuple[Array, Array, Array]:
     """P^T N, P^T damping N and P^T diag(squares) N, scaled by squares + low^2."""
     scale = 1.0 / np.sqrt(np.maximum(modes.squares, 0.0) + low**2)
-    left, right = (scipy.linalg.null_space(unit_rows(rows * scale)) for rows in (modes.B.T, modes.C))
+    left, right = (scipy.linalg.null_space(unit_rows(rows * scale), rcond=_RANK) for rows in (modes.B.T, modes.C))
     parts = (np.eye(scale.size), modes.damping, np.diag(modes.squares))
     mass, damping, stiffness = (left.T @ ((part * scale) * scale[:, None]) @ right for part in parts)
     return mass, damping, stiffness
@@ -104,47 +111,73 @@ def zeros(system: StateSpace, shift: float) -> Complex:
     shift : float
         No zero, positive, of the size of low frequencies [rad/s].
     """
-    outputs, inputs = system.D.shape
     A, B, C, D = system
-    n, columns = len(A), _sizes(B, 0)
-    rows = _sizes(np.hstack([C, D]), 1)
+    n, columns, rows = len(A), _sizes(B, 0), _sizes(np.hstack([C, D]), 1)
 
     def matrix(s: complex) -> Numbers:
-        return np.block([[A - s * np.eye(n), B / columns], [C / rows, D / rows / columns]])
+        whole = np.block([[A - s * np.eye(n), B / columns], [C / rows, D / rows / columns]])
+        size = np.pad(1.0 / np.sqrt(_sizes(A - s * np.eye(n), 1).ravel()), (0, sum(D.shape)), constant_values=1.0)
+        return whole * size[: whole.shape[1]] * size[: len(whole), None]
 
-    if inputs != outputs:
+    def squared(left: Array, right: Array) -> Complex:
+        return _square(StateSpace(A, B @ right, left @ C, left @ D @ right), shift)
 
-        def squared(mix: Array) -> Complex:
-            few = StateSpace(A, B @ mix, C, D @ mix) if inputs > outputs else StateSpace(A, B, mix @ C, mix @ D)
-            return zeros(few, shift)
+    return _common(squared, matrix, D.shape, n, shift)
 
-        def even(s: complex) -> Numbers:
-            size = np.pad(1.0 / np.sqrt(_sizes(A - s * np.eye(n), 1).ravel()), (0, inputs + outputs), constant_values=1)
-            whole = matrix(s)
-            return whole * size[: n + inputs] * size[: n + outputs, None]
 
-        return _common(squared, even, (inputs, outputs), shift)
-    pencil = np.asarray(matrix(shift), dtype=float)
+def _square(system: StateSpace, shift: float) -> Complex:
+    """Zeros of a system with as many outputs as inputs, whose response is regular."""
+    A, B, C, D = system
+    n, columns, rows = len(A), _sizes(B, 0), _sizes(np.hstack([C, D]), 1)
+    pencil = np.block([[A - shift * np.eye(n), B / columns], [C / rows, D / rows / columns]])
     found = _shifted(_pencil(pencil, np.eye(*pencil.shape) * (np.arange(len(pencil)) < n)), shift)
-    return _sorted(found[np.abs(found) < _FURTHEST * np.linalg.norm(system.A, 2)])
+    return _sorted(found[np.abs(found) < _FURTHEST * np.linalg.norm(A, 2)])
 
 
 def _common(
-    squared: Callable[[Array], Complex], matrix: Callable[[complex], Numbers], shape: tuple[int, int], shift: float
+    squared: Callable[[Array, Array], Complex],
+    matrix: Callable[[complex], Numbers],
+    shape: tuple[int, int],
+    more: int,
+    shift: float,
 ) -> Complex:
-    """Common zeros of a system squared by two random matrices at which the matrix that is not square loses rank."""
+    """Zeros of a system from those of square ones.
+
+    Parameters
+    ----------
+    squared : callable
+        Zeros with combinations (rank, outputs) of outputs and (inputs, rank) of inputs.
+    matrix : callable
+        Matrix of all inputs and outputs at s, which loses rank at a zero.
+    shape : (outputs, inputs)
+    more : int
+        Rank of the matrix at almost every s, less that of the response.
+    shift : float
+        See `zeros`.
+    """
+    full = max(_rank(matrix(part * shift)) for part in _ANYWHERE)
+    rank, (outputs, inputs) = full - more, shape
+    if not rank:
+        return np.zeros(0, dtype=complex)
+    if rank == outputs == inputs:
+        return squared(np.eye(rank), np.eye(rank))
     random = np.random.default_rng(0)
-    first, second = (squared(random.standard_normal(shape)) for _ in range(2))
+
+    def mixed() -> Complex:
+        left = np.eye(rank) if rank == outputs else random.standard_normal((rank, outputs))
+        return squared(left, np.eye(rank) if rank == inputs else random.standard_normal((inputs, rank)))
+
+    first, second = mixed(), mixed()
     if not (first.size and second.size):
         return np.zeros(0, dtype=complex)
     apart = np.min(np.abs(first[:, None] - second), axis=1)
     likely = first[apart <= _SAME * np.maximum(np.abs(first), shift)]
-    return np.array([s for s in likely if _least(matrix(complex(s))) < _RANK], dtype=complex)
+    return np.array([s for s in likely if _rank(matrix(complex(s))) < full], dtype=complex)
 
 
-def _least(matrix: Numbers) -> float:
-    """The least singular value; infinite without any."""
-    return float(np.min(scipy.linalg.svdvals(matrix), initial=np.inf)) if matrix.size else np.inf
+def _rank(matrix: Numbers) -> int:
+    """Number of singular values of a matrix with entries of size one that are more than rounding."""
+    return int(np.count_nonzero(scipy.linalg.svdvals(matrix) > _RANK)) if matrix.size else 0
 
 
 def _pencil(whole: Array, mass: Array) -> Complex:
