@@ -190,10 +190,12 @@ class SampledController:
         self._lowest = np.maximum([-np.inf if one is None else one[0] for one in limits], -most)
         self._highest = np.minimum([np.inf if one is None else one[1] for one in limits], most)
         self._most = np.array([np.inf if one is None else one * plant.period for one in rates])
-        self._given: Array = np.zeros(len(plant.outputs))
         if hasattr(self.law, "start"):
             resolution = tuple(self.resolution.tolist())
             self.law.start(replace(plant, resolution=resolution) if any(resolution) else plant)
+        # What the law holds an equilibrium with acts before the first sample.
+        self.holding_torques: Array = np.clip(getattr(self.law, "holding_torques", 0.0), self._lowest, self._highest)
+        self._given: Array = self.holding_torques
 
     @property
     def whole_torque(self) -> bool:

@@ -129,6 +129,11 @@ class DesignedLQG:
         self._law = self.design.law()
         self._law.start(plant)
 
+    @property
+    def holding_torques(self) -> Array:
+        """See `LQGLaw`, once started."""
+        return self._law.holding_torques
+
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`; y are errors of readings."""
         return self._law.step(k, t, y)

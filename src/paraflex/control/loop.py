@@ -163,6 +163,8 @@ class Loop:
         self._next = [0] * len(self.controllers)
         self._due: list[Due] = []
         self._acting = np.zeros((len(self.controllers), len(motors)))
+        for k, each in enumerate(self.controllers):
+            self._acting[k, self._outputs[k]] = getattr(each, "holding_torques", 0.0)
         self.kept: list[Done] = [Done() for _ in self.controllers]
         # Where the compiled time loop runs the controller.
         self.inside: SampledLaw | None = None
@@ -171,6 +173,11 @@ class Loop:
     def alone(self) -> tuple[Controller, Plant] | None:
         """The controller with its plant, where there is but one."""
         return (self.controllers[0], self._plants[0]) if len(self.controllers) == 1 else None
+
+    @property
+    def acting(self) -> Array:
+        """Torques (motors,) of all controllers that act."""
+        return self._acting.sum(axis=0)
 
     @property
     def failure(self) -> LawFailure | None:
@@ -225,7 +232,7 @@ class Loop:
         self._due = [due for due in self._due if (due.tick, due.part) > (tick, part)]
         for due in acting:
             self._acting[due.controller, self._outputs[due.controller]] = due.torques
-        return self._acting.sum(axis=0)
+        return self.acting
 
     def _step(self, k: int, number: int, t: float, y: Array) -> Array:
         name, controller, outputs = self.names[k], self.controllers[k], self._plants[k].outputs

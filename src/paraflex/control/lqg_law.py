@@ -62,12 +62,15 @@ class LQGDesign:
         Outputs that the filter is given, in this order.
     start : (n, measured) array
         The first estimate from the first readings: at rest, displaced in what moves freely.
+    holding_torques : (motors,) array
+        Torques that hold the equilibrium that the model is about [N m, N]; zero of a model about a motion.
     """
 
     regulator: Regulator
     filter: KalmanFilter
     measured: tuple[str, ...]
     start: Array
+    holding_torques: Array
 
     @property
     def K(self) -> Array:
@@ -138,6 +141,7 @@ class LQGDesign:
 class LQGLaw:
     """A `LQGDesign` as a law: torques from errors of readings, with its estimate as its state.
 
+    They include those that hold the equilibrium of the design, unless planned torques act besides.
     `limited` takes note of limits: the estimate goes on with the torques that were given, and integrals stay while any
     torque is limited.
 
@@ -151,6 +155,8 @@ class LQGLaw:
     x : (n,) array
         The estimate after the last reading.
     integrals : (integrated,) array
+    holding_torques : (motors,) array
+        Part of its torques that does not depend on readings [N m, N].
     """
 
     def __init__(self, design: LQGDesign) -> None:
@@ -159,9 +165,10 @@ class LQGLaw:
         self.delay: float = design.delay
         self.inputs: tuple[str, ...] = design.inputs
         self.outputs: tuple[str, ...] = design.outputs
-        self._reset()
+        self._reset(design.holding_torques)
 
-    def _reset(self) -> None:
+    def _reset(self, holding: Array) -> None:
+        self.holding_torques: Array = holding
         self.x: Array | None = None
         self.integrals: Array = np.zeros(len(self.design.regulator.integrated))
         self._wanted: Array = np.zeros(len(self.outputs))
@@ -189,7 +196,7 @@ class LQGLaw:
         if not same_period(plant.period, self.period):
             raise InputError(f"the design is for {self.period:g} s", field="period", value=plant.period,
                              remedy="leave it out, or design for that period")  # fmt: skip
-        self._reset()
+        self._reset(np.zeros_like(self.holding_torques) if plant.feed_forward else self.design.holding_torques)
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """Torques (motors,) that follow from errors y (measured,) at sample k."""
@@ -197,12 +204,12 @@ class LQGLaw:
         if self.x is None:
             before = design.start @ y
         else:
-            before = design.filter.carried_on(self.x, self._given)
+            before = design.filter.carried_on(self.x, self._given - self.holding_torques)
             if np.array_equal(self._given, self._wanted):
                 self.integrals = self.integrals + design._integrals[0] @ self._read
         self.x = design.filter.corrected(before, y)
         self._read = np.array(y, dtype=float)
-        self._wanted = -design.K @ np.concatenate([self.x, self.integrals])
+        self._wanted = self.holding_torques - design.K @ np.concatenate([self.x, self.integrals])
         self._given = self._wanted
         return self._wanted.copy()
 
@@ -213,6 +220,7 @@ class LQGLaw:
         return LinearLaw(
             *states,
             E=np.vstack([-design.filter.B, np.zeros((more, len(self.outputs)))]),
+            holding=self.holding_torques,
             first=np.vstack([design.start, np.zeros((more, len(self.inputs)))]),
             waiting=(np.arange(n + more) >= n).astype(float),
         )

@@ -91,14 +91,16 @@ class TorqueLog:
         Time constants with which they follow what is given; zero where they do at once [s].
     start : float
         Of the run [s].
+    before : (motors,) array
+        Torques before anything is given.
     """
 
-    def __init__(self, lags: Array, start: float) -> None:
+    def __init__(self, lags: Array, start: float, before: Array) -> None:
         self._lags, self._start = lags, start
         self._times: list[float] = []
-        # Before anything is given there are no torques. Those given, and those that acted then.
-        self._given: list[Array] = [np.zeros(lags.size)]
-        self._begun: list[Array] = [np.zeros(lags.size)]
+        # Those given, and those that acted then.
+        self._given: list[Array] = [before]
+        self._begun: list[Array] = [before]
 
     @property
     def begun(self) -> bool:
@@ -123,7 +125,7 @@ class TorqueLog:
 
     def copy(self) -> TorqueLog:
         """The same so far, to go on from apart."""
-        other = TorqueLog(self._lags, self._start)
+        other = TorqueLog(self._lags, self._start, self._given[0])
         other._times, other._given, other._begun = self._times.copy(), self._given.copy(), self._begun.copy()
         return other
 

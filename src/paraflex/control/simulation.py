@@ -301,6 +301,9 @@ class Simulation:
         if loop is not None and loop.whole and self._fed_forward:
             raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
                              remedy="leave feed_forward of the simulation out")  # fmt: skip
+        if loop is not None and np.any(loop.acting):
+            self._torques.begin(self._torques.of_all(loop.acting), self.state)
+            self._integration.start()
         self._use(loop)
 
     def _go_on(self, end: float, on_progress: Callable[[float], None] | None) -> None:
@@ -383,7 +386,7 @@ class Simulation:
         controller, plant = loop.alone
         own = [motor.name for motor in self.mechanism.motors]
         outputs = [own.index(name) for name in plant.outputs]
-        return sampled_law(controller, plant, self._watched, outputs, self._torques.base, len(own), self.end)
+        return sampled_law(controller, plant, self._watched, outputs, self._torques.base, self._torques.held, self.end)
 
     def _plant(self, controller: Controller) -> Plant:
         outputs = tuple(controller.outputs) or self.motors
@@ -391,7 +394,7 @@ class Simulation:
         units = dict(zip(self.sensors_read, self._readings.units, strict=True))
         return Plant(
             self.mechanism, self.mode, self.task, self.state, inputs, tuple(units[name] for name in inputs), outputs,
-            controller.period, controller.delay,
+            controller.period, controller.delay, feed_forward=self._fed_forward,
         )  # fmt: skip
 
     def _read(self, readings: Readings) -> Array:
