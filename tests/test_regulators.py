@@ -235,7 +235,7 @@ def test_the_law_is_one_for_sampled_controllers():
     )
     runs = []
     for _ in range(2):
-        controller.start(plant_of())
+        controller.start(plant_of(delay=0.013))
         runs.append([controller.step(k, PERIOD * k, np.array([0.01 * k, 0.0]))[0] for k in range(20)])
     assert runs[0] == runs[1]
     assert max(runs[0]) == 0.6
@@ -249,9 +249,11 @@ def test_the_law_is_one_for_sampled_controllers():
         ({"inputs": ("y2", "y1")}, "inputs"),
         ({"outputs": ("u2",)}, "outputs"),
         ({"period": 0.02}, "period"),
+        ({"delay": 0.0}, "delay"),
+        ({"delay": 0.0131}, "delay"),
     ):
         with pytest.raises(InputError) as error:
-            design.law().start(plant_of(**changes))
+            design.law().start(plant_of(**{"delay": 0.013, **changes}))
         assert error.value.field == field
 
 

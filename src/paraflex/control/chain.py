@@ -18,7 +18,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.amplifiers import largest_commands
 from paraflex.control.controllers import Plant
-from paraflex.control.discrete import DiscreteModel, discrete_model
+from paraflex.control.discrete import DiscreteModel, discrete_model, is_model
 from paraflex.control.estimators import rounded
 from paraflex.control.filters import transfer_function
 from paraflex.control.references import Reference, references
@@ -81,7 +81,7 @@ class SampledController:
     Parameters
     ----------
     law : object
-        A discrete model of python-control or SciPy, from readings to torques; a function of (k, t, y), with y (inputs,)
+        A discrete state space or transfer function of python-control or SciPy, from readings to torques; a function of (k, t, y), with y (inputs,)
         the readings of sample k at time t, that returns torques (outputs,); or an object with such a method `step`. It
         may have `start(plant)`, which is called first, `limited(torques)`, which is told the torques within the limits,
         any of the attributes below, `whole_torque` if no planned torque is to act besides, and `absolute` if it takes
@@ -267,15 +267,16 @@ def as_law(given: Any) -> Any:
     InputError
         Anything else, or a continuous model.
     """
+    # Models of SciPy have a method "step" as well, their response to one.
+    if is_model(given):
+        return discrete_model(given)
     if callable(getattr(given, "step", None)) and not inspect.isclass(given):
         return given
-    if all(hasattr(given, name) for name in ("A", "B", "C", "D", "dt")):
-        return discrete_model(given)
     if callable(given) and not inspect.isclass(given):
         return _Function(given)
     raise InputError(
         "is no control law", field="law", value=given,
-        remedy="give a function of (k, t, y), an object with a method step, or a discrete model in state space",
+        remedy="give a function of (k, t, y), an object with a method step, or a discrete model",
     )  # fmt: skip
 
 

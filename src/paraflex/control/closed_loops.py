@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.discrete import DiscreteModel, check_discrete, matrices_of
+from paraflex.control.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.control.reach import frequency_of
 from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.errors import InputError, ResultWarning, warn_user
@@ -207,7 +207,7 @@ def law_of(controller: Any) -> StateSpace:
     inner = getattr(controller, "law", None)
     own = controller if inner is None or callable(inner) else inner
     own = getattr(own, "state_space", own)
-    if not all(hasattr(own, name) for name in ("A", "B", "C", "D")):
+    if not is_model(own) and not all(hasattr(own, name) for name in ("A", "B", "C", "D")):
         raise InputError("is no linear law", field="controller", value=controller,
                          remedy="give a design of pf.lqg, or a discrete state space")  # fmt: skip
     if hasattr(own, "dt"):

@@ -100,6 +100,12 @@ def discrete_model(given: Any) -> DiscreteModel:
     return DiscreteModel(*matrices_of(given), None if given.dt is True else float(given.dt), *labels)
 
 
+def is_model(given: Any) -> bool:
+    """Whether an object is a state space or a transfer function of python-control or SciPy."""
+    return hasattr(given, "dt") and any(all(hasattr(given, name) for name in names) for names in
+                                        (("A", "B", "C", "D"), ("num", "den"), ("zeros", "poles", "gain")))  # fmt: skip
+
+
 def side_by_side(laws: Sequence[DiscreteModel]) -> DiscreteModel:
     """Laws with names and one period as one law: torques for one motor add up.
 
@@ -138,11 +144,31 @@ def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
 
 
 def matrices_of(model: Any) -> StateSpace:
-    """Matrices of a model in state space, which may have no states."""
+    """Matrices of a model in state space, which may have no states, or of a transfer function.
+
+    Raises
+    ------
+    InputError
+        A transfer function that is not proper.
+    """
+    if not hasattr(model, "A"):
+        try:
+            model = model.to_ss() if hasattr(model, "to_ss") else _realised(model.num, model.den)
+        except ValueError:
+            raise InputError("is no proper transfer function", field="model", value=model,
+                             remedy="give one whose numerator has no higher degree than its denominator") from None  # fmt: skip
     A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (model.A, model.B, model.C, model.D))
     if A.size == 0:
         A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
     return StateSpace(A, B, C, D)
+
+
+def _realised(num: Any, den: Any) -> DiscreteModel:
+    """Coefficients of transfer functions by output and input, as python-control has them, in state space."""
+    return side_by_side([
+        DiscreteModel(*scipy.signal.tf2ss(num[i][j], den[i][j]), None, (f"u{j}",), (f"y{i}",))
+        for i in range(len(num)) for j in range(len(num[i]))
+    ])  # fmt: skip
 
 
 def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:

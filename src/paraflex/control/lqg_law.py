@@ -13,7 +13,7 @@ from paraflex.control.controllers import Plant
 from paraflex.control.estimators import KalmanFilter
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.sampled import SampledPlant
-from paraflex.control.together import same_period
+from paraflex.control.together import SAME
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 
@@ -186,16 +186,17 @@ class LQGLaw:
         Raises
         ------
         InputError
-            Sensors, motors or a period other than those of the design.
+            Sensors, motors, a period or a delay other than those of the design.
         """
         pairs = (("inputs", self.inputs, plant.inputs), ("outputs", self.outputs, plant.outputs))
         for field, wanted, have in pairs:
             if tuple(have) != wanted:
                 raise InputError("are not those of the design, in its order", field=field, value=", ".join(have),
                                  remedy=f"leave them out, or say {', '.join(wanted)}")  # fmt: skip
-        if not same_period(plant.period, self.period):
-            raise InputError(f"the design is for {self.period:g} s", field="period", value=plant.period,
-                             remedy="leave it out, or design for that period")  # fmt: skip
+        for field, wanted, have in (("period", self.period, plant.period), ("delay", self.delay, plant.delay)):
+            if abs(have - wanted) > SAME * self.period:
+                raise InputError(f"the design is for {wanted:g} s", field=field, value=have,
+                                 remedy=f"leave it out, or design for that {field}")  # fmt: skip
         self._reset(np.zeros_like(self.holding_torques) if plant.feed_forward else self.design.holding_torques)
 
     def step(self, k: int, t: float, y: Array) -> Array:
