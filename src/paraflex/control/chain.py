@@ -24,7 +24,6 @@ from paraflex.control.filters import transfer_function
 from paraflex.control.references import Reference, references
 from paraflex.control.together import by_name, checked_number, is_number
 from paraflex.errors import InputError
-from paraflex.findings import Finding
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import not_negative
 from paraflex.motion import MotionRun
@@ -81,11 +80,11 @@ class SampledController:
     Parameters
     ----------
     law : object
-        A discrete state space or transfer function of python-control or SciPy, from readings to torques; a function of (k, t, y), with y (inputs,)
-        the readings of sample k at time t, that returns torques (outputs,); or an object with such a method `step`. It
-        may have `start(plant)`, which is called first, `limited(torques)`, which is told the torques within the limits,
-        any of the attributes below, `whole_torque` if no planned torque is to act besides, and `absolute` if it takes
-        readings without a reference.
+        A discrete model of python-control or SciPy, from readings to torques, a state space or a transfer function; a
+        function of (k, t, y), with y (inputs,) the readings of sample k at time t, that returns torques (outputs,); or
+        an object with such a method `step`. It may have `start(plant)`, which is called first, `limited(torques)`,
+        which is told the torques within the limits, any of the attributes below, `whole_torque` if no planned torque is
+        to act besides, and `absolute` if it takes readings without a reference.
     period : float, optional
         Of sampling [s].
     delay : float
@@ -201,11 +200,6 @@ class SampledController:
     def whole_torque(self) -> bool:
         """Whether its law gives the whole torque, so that no planned torque acts besides."""
         return bool(getattr(self.law, "whole_torque", False))
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What its law found doubtful as it started."""
-        return tuple(getattr(self.law, "findings", ()))
 
     @property
     def title(self) -> str:

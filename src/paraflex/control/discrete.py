@@ -102,8 +102,7 @@ def discrete_model(given: Any) -> DiscreteModel:
 
 def is_model(given: Any) -> bool:
     """Whether an object is a state space or a transfer function of python-control or SciPy."""
-    return hasattr(given, "dt") and any(all(hasattr(given, name) for name in names) for names in
-                                        (("A", "B", "C", "D"), ("num", "den"), ("zeros", "poles", "gain")))  # fmt: skip
+    return hasattr(given, "dt") and (hasattr(given, "to_ss") or all(hasattr(given, name) for name in "ABCD"))
 
 
 def side_by_side(laws: Sequence[DiscreteModel]) -> DiscreteModel:
@@ -144,31 +143,16 @@ def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
 
 
 def matrices_of(model: Any) -> StateSpace:
-    """Matrices of a model in state space, which may have no states, or of a transfer function.
-
-    Raises
-    ------
-    InputError
-        A transfer function that is not proper.
-    """
-    if not hasattr(model, "A"):
-        try:
-            model = model.to_ss() if hasattr(model, "to_ss") else _realised(model.num, model.den)
-        except ValueError:
-            raise InputError("is no proper transfer function", field="model", value=model,
-                             remedy="give one whose numerator has no higher degree than its denominator") from None  # fmt: skip
+    """Matrices of a model in state space, which may have no states, or of a proper transfer function."""
+    try:
+        model = model if hasattr(model, "A") else model.to_ss()
+    except (ValueError, NotImplementedError) as error:
+        raise InputError(f"has no state space: {error}", field="model", value=model,
+                         remedy="give a proper transfer function, or a state space") from None  # fmt: skip
     A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (model.A, model.B, model.C, model.D))
     if A.size == 0:
         A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
     return StateSpace(A, B, C, D)
-
-
-def _realised(num: Any, den: Any) -> DiscreteModel:
-    """Coefficients of transfer functions by output and input, as python-control has them, in state space."""
-    return side_by_side([
-        DiscreteModel(*scipy.signal.tf2ss(num[i][j], den[i][j]), None, (f"u{j}",), (f"y{i}",))
-        for i in range(len(num)) for j in range(len(num[i]))
-    ])  # fmt: skip
 
 
 def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:

@@ -84,7 +84,6 @@ class HeldTorques:
         # The first coefficients of signals are those of held torques as well.
         self.base: Array = self.signals.coefficients[:, 0].copy()
         self.held: Array = np.zeros(len(own))
-        self._start = start
         self.log: TorqueLog = TorqueLog(lags, start, self.held)
 
     def given(self, torques: Torques) -> Array:
@@ -136,7 +135,7 @@ class HeldTorques:
     def begin(self, torques: Array, state: State) -> None:
         """Let torques (all,) act from before the start on, as far as amplifiers can."""
         self.held = self._within_limits(torques, state)
-        self.log = TorqueLog(self.amplifiers.lags, self._start, self.held)
+        self.log = TorqueLog(self.amplifiers.lags, state.time, self.held)
         self._write()
 
     def note(self, t: float, torques: Array) -> None:

@@ -141,7 +141,6 @@ class LQGDesign:
 class LQGLaw:
     """A `LQGDesign` as a law: torques from errors of readings, with its estimate as its state.
 
-    They include those that hold the equilibrium of the design, unless planned torques act besides.
     `limited` takes note of limits: the estimate goes on with the torques that were given, and integrals stay while any
     torque is limited.
 
@@ -156,7 +155,7 @@ class LQGLaw:
         The estimate after the last reading.
     integrals : (integrated,) array
     holding_torques : (motors,) array
-        Part of its torques that does not depend on readings [N m, N].
+        Those of the design, part of its torques; zero where planned torques act besides [N m, N].
     """
 
     def __init__(self, design: LQGDesign) -> None:

@@ -55,8 +55,8 @@ def lqr(
     delay : float
         From a sample until its torques act [s].
     integrators : mapping of str to float, optional
-        Outputs whose errors are to vanish under constant loads, with the time that may take [s]: the integral's largest
-        deviation is that of the output times this.
+        Outputs whose errors are to vanish under constant loads, with the time constant of that [s], of a loop that is
+        faster: the integral's largest deviation is that of the output times this. Longer where others are tighter.
     state_weights : (n, n) array, optional
         Added to the weights, of the model's own states or of all.
 
@@ -132,9 +132,8 @@ def lqg(
     R = np.diag([given[name] ** 2 for name in measured])
     motors = plant.B[:, places(regulator.motors, plant.inputs, "effort", "input")]
     found = kalman_filter(plant.A, motors, C, process, R)
-    return LQGDesign(
-        regulator, found, measured, _first_estimate(plant, C, np.sqrt(R)), _holding(model, regulator.motors)
-    )
+    start = _first_estimate(plant, C, np.sqrt(R))
+    return LQGDesign(regulator, found, measured, start, _holding(model, regulator.motors))
 
 
 def _holding(model: Any, motors: Sequence[str]) -> Array:

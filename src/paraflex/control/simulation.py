@@ -268,8 +268,7 @@ class Simulation:
         IntegrationError
             It cannot go on; it carries the run so far.
         """
-        if until is not None:
-            finite(until, "until")
+        finite(self.end if until is None else until, "until")
         end = self.end if until is None else min(until, self.end)
         try:
             if controllers is not None:
@@ -302,7 +301,7 @@ class Simulation:
             raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
                              remedy="leave feed_forward of the simulation out")  # fmt: skip
         if loop is not None and np.any(loop.acting):
-            self._torques.begin(self._torques.of_all(loop.acting), self.state)
+            self._torques.begin(self._torques.of_all(loop.acting.sum(axis=0)), self.state)
             self._integration.start()
         self._use(loop)
 

@@ -19,7 +19,6 @@ from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
-from paraflex.limits import solvable
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
@@ -333,7 +332,6 @@ class LinearModel:
         found[: 2 * (int(free.sum()) + (driven if vibrates else 0))] = 0.0
         return found[:count]
 
-    @solvable("zeros")
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
         """Transmission zeros between some inputs and some outputs, by default all, by magnitude [rad/s].
 
@@ -341,13 +339,6 @@ class LinearModel:
         places, angles or derivatives of these, they are found from the second-order equations, else from
         the state space, and up to a tenth of the fastest pole. Where the response has a smaller rank than inputs or
         outputs, as of motors at geared joints, they are the s at which it loses more; a response that is zero has none.
-
-        Raises
-        ------
-        InputError
-            An unknown input or output.
-        ProportionError
-            Some numbers of the model are out of all proportion to others.
         """
         chosen = self.select(inputs, outputs)
         shift = 0.7 * self.low_frequency

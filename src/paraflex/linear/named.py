@@ -58,13 +58,7 @@ def labelled_model(matrices: StateSpace, names: Names, attributes: Mapping[str, 
 
 
 def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> NDArray[np.complex128]:
-    """Points s = i omega of angular frequencies [rad/s]; complex numbers are points s themselves.
-
-    Raises
-    ------
-    InputError
-        A frequency that is not finite.
-    """
+    """Points s = i omega of angular frequencies, which are finite [rad/s]; complex numbers are points s themselves."""
     given = np.atleast_1d(np.asarray(frequencies))
     finite(given.ravel().tolist(), field)
     return np.asarray(given if np.iscomplexobj(given) else 1j * given, dtype=complex)

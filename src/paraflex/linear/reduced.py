@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.limits import solvable
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
@@ -156,7 +155,6 @@ class ReducedModel:
         found = np.asarray(scipy.linalg.eigvals(self.A), dtype=complex)
         return found[np.argsort(np.abs(found), kind="stable")]
 
-    @solvable("zeros")
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
         """Transmission zeros between some inputs and some outputs, by default all: see `LinearModel.zeros`."""
         balance = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)

@@ -20,6 +20,7 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array, Numbers
+from paraflex.limits import solvable
 from paraflex.linear.independent import unit_rows
 
 Complex = NDArray[np.complex128]
@@ -53,6 +54,7 @@ class Vibrating(NamedTuple):
     C: Array
 
 
+@solvable("zeros")
 def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
     """Zeros of a mechanism about a pose at rest.
 
@@ -71,25 +73,20 @@ def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
         return s * s * mass + s * damping + stiffness
 
     def squared(left: Array, right: Array) -> Complex:
-        return _square_vibrating(modes._replace(B=modes.B @ right, C=left @ modes.C), shift)
+        mass, damping, stiffness = _between(modes._replace(B=modes.B @ right, C=left @ modes.C), shift)
+        if not np.any(modes.damping):
+            squares = _shifted(-_pencil(stiffness + shift**2 * mass, mass), shift**2)
+            root = np.sqrt(squares)
+            return _sorted(np.concatenate([root, -root]))
+        whole = stiffness + shift * damping + shift**2 * mass
+        n = len(whole)
+        slopes = scipy.linalg.solve(whole, np.hstack([2.0 * shift * mass + damping, mass])) if n else np.zeros((0, 0))
+        companion = np.vstack([-slopes, np.eye(n, 2 * n)])
+        return _sorted(_shifted(scipy.linalg.eigvals(companion), shift))
 
-    # The null spaces of B^T and C leave as many rows and columns fewer as these have rank.
-    rows, columns = (modes.squares.size - each for each in matrix(shift).shape)
-    return _common(squared, matrix, (modes.C.shape[0], modes.B.shape[1]), modes.squares.size - rows - columns, shift)
-
-
-def _square_vibrating(modes: Vibrating, shift: float) -> Complex:
-    """Zeros of a mechanism with as many independent outputs as inputs, whose response is regular."""
-    mass, damping, stiffness = _between(modes, shift)
-    if not np.any(modes.damping):
-        squares = _shifted(-_pencil(stiffness + shift**2 * mass, mass), shift**2)
-        root = np.sqrt(squares)
-        return _sorted(np.concatenate([root, -root]))
-    whole = stiffness + shift * damping + shift**2 * mass
-    n = len(whole)
-    slopes = scipy.linalg.solve(whole, np.hstack([2.0 * shift * mass + damping, mass])) if n else np.zeros((0, 0))
-    companion = np.vstack([-slopes, np.eye(n, 2 * n)])
-    return _sorted(_shifted(scipy.linalg.eigvals(companion), shift))
+    # Null spaces leave as many rows and columns fewer as B and C have rank.
+    more = sum(matrix(shift).shape) - modes.squares.size
+    return _common(squared, matrix, (modes.C.shape[0], modes.B.shape[1]), more, shift)
 
 
 def _between(modes: Vibrating, low: float) -> tuple[Array, Array, Array]:
@@ -101,6 +98,7 @@ def _between(modes: Vibrating, low: float) -> tuple[Array, Array, Array]:
     return mass, damping, stiffness
 
 
+@solvable("zeros")
 def zeros(system: StateSpace, shift: float) -> Complex:
     """Transmission zeros of any linear system, up to a tenth of its fastest pole.
 
@@ -112,48 +110,31 @@ def zeros(system: StateSpace, shift: float) -> Complex:
         No zero, positive, of the size of low frequencies [rad/s].
     """
     A, B, C, D = system
-    n, columns, rows = len(A), _sizes(B, 0), _sizes(np.hstack([C, D]), 1)
+    n, fastest = len(A), np.linalg.norm(A, 2)
 
-    def matrix(s: complex) -> Numbers:
-        whole = np.block([[A - s * np.eye(n), B / columns], [C / rows, D / rows / columns]])
+    def matrix(s: complex, B: Array = B, C: Array = C, D: Array = D) -> Numbers:
+        columns, rows = _sizes(B, 0), _sizes(np.hstack([C, D]), 1)
+        return np.block([[A - s * np.eye(n), B / columns], [C / rows, D / rows / columns]])
+
+    def even(s: complex) -> Numbers:
         size = np.pad(1.0 / np.sqrt(_sizes(A - s * np.eye(n), 1).ravel()), (0, sum(D.shape)), constant_values=1.0)
+        whole = matrix(s)
         return whole * size[: whole.shape[1]] * size[: len(whole), None]
 
     def squared(left: Array, right: Array) -> Complex:
-        return _square(StateSpace(A, B @ right, left @ C, left @ D @ right), shift)
+        pencil = np.asarray(matrix(shift, B @ right, left @ C, left @ D @ right), dtype=float)
+        found = _shifted(_pencil(pencil, np.eye(*pencil.shape) * (np.arange(len(pencil)) < n)), shift)
+        return _sorted(found[np.abs(found) < _FURTHEST * fastest])
 
-    return _common(squared, matrix, D.shape, n, shift)
-
-
-def _square(system: StateSpace, shift: float) -> Complex:
-    """Zeros of a system with as many outputs as inputs, whose response is regular."""
-    A, B, C, D = system
-    n, columns, rows = len(A), _sizes(B, 0), _sizes(np.hstack([C, D]), 1)
-    pencil = np.block([[A - shift * np.eye(n), B / columns], [C / rows, D / rows / columns]])
-    found = _shifted(_pencil(pencil, np.eye(*pencil.shape) * (np.arange(len(pencil)) < n)), shift)
-    return _sorted(found[np.abs(found) < _FURTHEST * np.linalg.norm(A, 2)])
+    return _common(squared, even, D.shape, n, shift)
 
 
 def _common(
-    squared: Callable[[Array, Array], Complex],
-    matrix: Callable[[complex], Numbers],
-    shape: tuple[int, int],
-    more: int,
-    shift: float,
+    squared: Callable[..., Complex], matrix: Callable[..., Numbers], shape: tuple[int, int], more: int, shift: float
 ) -> Complex:
-    """Zeros of a system from those of square ones.
+    """Zeros of a system of a shape (outputs, inputs), from those of combinations by matrices from left and right.
 
-    Parameters
-    ----------
-    squared : callable
-        Zeros with combinations (rank, outputs) of outputs and (inputs, rank) of inputs.
-    matrix : callable
-        Matrix of all inputs and outputs at s, which loses rank at a zero.
-    shape : (outputs, inputs)
-    more : int
-        Rank of the matrix at almost every s, less that of the response.
-    shift : float
-        See `zeros`.
+    The matrix at s loses rank at zeros; elsewhere it has so many more than the response.
     """
     full = max(_rank(matrix(part * shift)) for part in _ANYWHERE)
     rank, (outputs, inputs) = full - more, shape
