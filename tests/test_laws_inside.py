@@ -4,6 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
+import scipy
 from numba import njit
 
 import paraflex as pf
@@ -88,6 +89,53 @@ def test_a_rotor_does_the_same(law, chain):
     assert a.law == b.law
     if chain == "whole":
         assert a.limited.any()
+
+
+LEAD = ([-80.0, 60.0], [1.0, -0.2])
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        scipy.signal.dlti(*LEAD, dt=T),
+        scipy.signal.dlti(*scipy.signal.tf2zpk(*LEAD), dt=T),
+        scipy.signal.dlti(*scipy.signal.tf2ss(*LEAD), dt=T),
+        scipy.signal.StateSpace(*scipy.signal.tf2ss(*LEAD), dt=T),
+        scipy.signal.TransferFunction(*LEAD, dt=T),
+        lambda control: control.tf(*LEAD, T),
+        lambda control: control.ss(control.tf(*LEAD, T)),
+    ],
+    ids=["TF", "ZPK", "SS", "StateSpace", "TransferFunction", "control.tf", "control.ss"],
+)
+def test_models_of_others_run_as_they_are(model):
+    """u_k = 0.2 u_k-1 - 80 y_k + 60 y_k-1, by itself and in a chain; their own period and loop."""
+    model = model(pytest.importorskip("control")) if callable(model) else model
+    sim = Simulation(rotor(), duration=0.05, samples=2)
+    for controller, reference in ((model, 0.0), (SampledController(model, reference={"hub": 0.5}), 0.5)):
+        (done,) = sim.run(controller, warning=False).controllers
+        y, torques = done.readings[:, 0] - reference, [0.0]
+        for k in range(y.size):
+            torques.append(0.2 * torques[-1] - 80.0 * y[k] + (60.0 * y[k - 1] if k else 0.0))
+        assert done.wanted[:, 0] == pytest.approx(torques[1:], rel=1e-9, abs=1e-9)
+        assert sim._loop.inside is not None
+    assert pf.closed_loop(pf.linearise(rotor()), model, inputs=["hub"]).plant.period == T
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        (scipy.signal.lti(*LEAD), "is a continuous model"),
+        (lambda control: control.tf(*LEAD), "is a continuous model"),
+        (scipy.signal.dlti([1.0, 0.0, 0.0], [1.0, 2.0], dt=T), "has no state space"),
+        (lambda control: control.tf([1.0, 0.0, 0.0], [1.0, 2.0], T), "has no state space"),
+    ],
+)
+def test_models_that_are_no_laws(model, said):
+    model = model(pytest.importorskip("control")) if callable(model) else model
+    with pytest.raises(InputError, match=said):
+        SampledController(model, period=T)
+    with pytest.raises(InputError, match=said):
+        pf.closed_loop(pf.linearise(rotor()), model, inputs=["hub"], period=T)
 
 
 @pytest.mark.parametrize("method", ["tr-bdf2", "esdirk5", "generalised-alpha"])

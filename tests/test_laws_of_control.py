@@ -1,6 +1,8 @@
 """Control laws: PD and PID of joints, their projection, computed torque, feedback of rates."""
 
 import dataclasses
+import re
+import time
 import tomllib
 
 import numpy as np
@@ -248,6 +250,19 @@ def test_an_unstable_loop_is_found():
     late = SampledController(half, name="two", delay=T, **chain)
     assert not unstable(halves[0], late)
     assert not unstable(SampledController(lambda k, t, y: 50.0 * y, **chain))
+
+
+def test_long_delays_are_no_states():
+    """A loop whose torques are 3 s late is unstable, found at once; none acts in a run that is shorter."""
+    begun = time.process_time()
+    late = SampledController(JointPID(40.0, 1.2), period=T, delay=3.0, reference={"hub": 0.1}, name="late")
+    (said,) = unstable(late, duration=9.0)
+    assert re.match(r'controller "late": the sampled loop is unstable about the start: \d+ with \|z\| > 1\.0000', said)
+    assert not unstable(late, duration=2.5)
+    much_later = SampledController(JointPID(40.0, 1.2), period=T, delay=1000.0, reference={"hub": 0.1})
+    assert not unstable(much_later, duration=1.0)
+    # Eigenvalues of 3000 states took minutes.
+    assert time.process_time() - begun < 60.0
 
 
 def test_what_only_drifts_is_not_unstable():

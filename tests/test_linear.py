@@ -10,6 +10,8 @@ import pytest
 
 import paraflex as pf
 import twins
+from paraflex.control import DesignedLQG
+from paraflex.control.discrete import DiscreteModel
 from paraflex.dynamics import State, build_system, inputs_of
 from paraflex.dynamics.projection import second_rates
 from paraflex.dynamics.signals import constant_signals, moment_signals, pack_signals
@@ -18,7 +20,7 @@ from paraflex.errors import InputError
 from paraflex.kernel.ode import accelerations
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kinematics import Line
-from paraflex.linear import linearise
+from paraflex.linear import linearise, states_needed
 from paraflex.linear.coordinates import coordinates_of
 from paraflex.linear.linearise import Ports, linear_model
 from paraflex.linear.zeros import zeros
@@ -285,6 +287,46 @@ def test_more_motors_than_coordinates_have_few_zeros(raparm_at_q):
             assert np.sort_complex(low) == pytest.approx(np.sort_complex(np.array(known, dtype=complex)), rel=1e-6)
 
 
+def geared(start_of=None):
+    """Models of the geared five-bar: each of its two motors drives both cranks."""
+    model = pf.load("geared_five_bar")
+    return model if start_of is None else linearise(model.plan(), at=start_of)
+
+
+def test_motors_at_geared_joints_have_the_zeros_of_one():
+    """A response of rank one has the zeros of each entry, here the frequencies with the cranks held."""
+    full = linearise(geared())
+    # Zeros of a state space are found up to a tenth of the fastest pole.
+    for model, count in ((full, 5), (pf.reduce(full, 12), 2)):
+        for outputs in (["A1", "A2"], ["A1"]):
+            found = upper(model.zeros(outputs=outputs))
+            assert found[:count] == pytest.approx(full.held_frequencies()[:count], rel=1e-6)
+
+
+@pytest.mark.parametrize("at", [0.05, 0.2, 0.4])
+def test_zeros_of_motors_at_geared_joints_in_motion(at):
+    model = geared(at)
+    whole, one = (model.zeros(inputs, ["A1", "A2"]) for inputs in (None, ["left"]))
+    low = one[np.abs(one) < 2000.0]
+    assert low.size >= 4
+    assert whole[: low.size] == pytest.approx(low, rel=1e-6)
+
+
+def test_responses_that_are_zero_have_no_zeros():
+    """Two wheels on fixed pins; one motor turns the other wheel only if they are geared."""
+    wheels = [RigidBody(name, 0.5, 0.02, (0.0, 0.0), {"O": (0.0, 0.0)}) for name in ("one", "two")]
+    joints = [RevoluteJoint(name, PointRef.parse(f"ground.{name}"), PointRef.parse(f"{body}.O"))
+              for name, body in (("A", "one"), ("B", "two"))]  # fmt: skip
+    apart = Mechanism(
+        name="wheels", ground={"A": (0.0, 0.0), "B": (0.3, 0.0)}, bodies=tuple(wheels), joints=tuple(joints),
+        motors=(Motor("a", "A"), Motor("b", "B")), assemblies=(Assembly("start", {"one": 0.3, "two": 0.1}),),
+    )  # fmt: skip
+    model = linearise(apart)
+    assert model.zeros(["a"], ["B"]).size == 0
+    # The other wheel turns freely, unseen.
+    assert np.abs(model.zeros(["a"], ["A"])) == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
 # --- Damping ----------------------------------------------------------------------------------------------------------
 
 
@@ -383,6 +425,33 @@ def test_what_cannot_be_linearised_is_named(raparm_at_q):
     bare = replace(hub_beam(0.1, 0.0, 0.0), motors=())
     with pytest.raises(InputError, match="neither motors nor prescribed"):
         linearise(bare)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+def test_times_and_frequencies_are_finite(wrong):
+    model = pf.load("five_bar")
+    task, linear = model.plan(), linearise(model)
+    few, shaper = pf.reduce(linear, 8), pf.shaper("zv", 3.0)
+    loop = pf.closed_loop(([[0.0]], [[1.0]], [[1.0]], [[0.0]]), DiscreteModel(*np.zeros((4, 1, 1)), 1e-3, (), ()))
+    for field, call in (
+        ("at", lambda: linearise(task, at=wrong)),
+        ("at", lambda: pf.reduce(task, at=wrong)),
+        ("at", lambda: pf.linearise_along(task, times=[0.0, 0.1, 0.2, 0.3, wrong])),
+        ("at", lambda: DesignedLQG({"A1": 0.1}, 1.0, at=wrong)),
+        ("frequencies", lambda: linear.frequency_response([1.0, wrong])),
+        ("frequencies", lambda: few.frequency_response([1.0, wrong])),
+        ("frequencies", lambda: few.error([1.0, wrong])),
+        ("until", lambda: states_needed([linear], wrong)),
+        ("omega", lambda: loop.sensitivity(wrong)),
+        ("omega", lambda: loop.loop([1.0, wrong])),
+        ("delay", lambda: loop.later(wrong)),
+        ("until", lambda: pf.Simulation(task).run([], until=wrong)),
+        ("frequency", lambda: shaper.residual([1.0, wrong])),
+        ("start", lambda: shaper.shaped(np.sin, start=wrong)),
+    ):
+        with pytest.raises(InputError) as caught:
+            call()
+        assert caught.value.field == field
 
 
 def test_state_as_a_start():

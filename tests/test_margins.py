@@ -10,7 +10,7 @@ import scipy
 
 import paraflex as pf
 from paraflex.control.chain import SampledController
-from paraflex.control.closed_loops import damped_frequency
+from paraflex.control.closed_loops import damped_frequency, poles_beyond
 from paraflex.control.discrete import DiscreteModel
 from paraflex.errors import InputError
 from test_regulators import PERIOD, oscillator, quanser, quanser_design
@@ -66,6 +66,37 @@ def test_gains_at_which_a_rotor_becomes_unstable():
     assert limit(40.0, 0.0, 1e-3, 1.0) == pytest.approx(0.5 * 40.0 * T, abs=1e-9)
     with pytest.warns(pf.ResultWarning, match=r"\|z\| = 1\.\d+ at 500 Hz"):
         assert np.isnan(pf.margins(rotor(), gains(40.0, 20.1)).peak)
+
+
+def test_a_loop_that_hardly_grows_is_seen_to_be_unstable():
+    """x_k+1 = x_k + 2.8e-6 x_k: in what is printed, in a row of margins, and by a warning."""
+    plant = np.zeros((1, 1)), np.eye(1), np.eye(1), np.zeros((1, 1))
+    loop = pf.closed_loop(plant, DiscreteModel(*np.zeros((3, 1, 1)), np.array([[2.8e-6]]), 1.0, (), ()))
+    assert repr(loop) == "ClosedLoop(2 states, spectral radius 1.0000028, unstable)"
+    with pytest.warns(pf.ResultWarning, match=r"\|z\| = 1\.0000028 at 0 Hz"):
+        (row,) = pf.margins(loop).to_frame().to_dict("records")
+    assert row.pop("stable") is False
+    assert np.isnan([value for name, value in row.items() if name != "crossover"]).all()
+    with pytest.warns(pf.ResultWarning, match="unstable"):
+        assert np.isnan(loop.delay_margin())
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_poles_beyond_a_radius_without_states_of_delay(seed):
+    """As many as there are eigenvalues, of random plants and laws with delays up to 60 samples and a part."""
+    random = np.random.default_rng(seed)
+    n, motors, sensors = 1 + seed % 5, 1 + seed % 2, 1 + seed // 3 % 2
+    A = 30.0 * random.standard_normal((n, n))
+    A -= np.eye(n) * (np.max(np.linalg.eigvals(A).real) + (0.1, 3.0)[seed % 2])
+    sizes = (n, motors), (sensors, n), (sensors, motors)
+    plant = A, *(random.standard_normal(size) for size in sizes)
+    law = [random.standard_normal(size) for size in ((2, 2), (2, sensors), (motors, 2), (motors, sensors))]
+    law[0] *= 0.4
+    late, part = (0, 3, 20, 60)[seed % 4], (0.0, 0.4)[seed // 2 % 2]
+    for radius in (2.0**0.001, 1.02):
+        now = pf.closed_loop(plant, DiscreteModel(*law, 1e-3, (), ()), delay=part * 1e-3)
+        poles = now.later((late + part) * 1e-3).poles
+        assert poles_beyond(now, late, radius) == np.count_nonzero(np.abs(poles) > radius)
 
 
 def test_natural_frequency_and_damping_of_a_sampled_pole():

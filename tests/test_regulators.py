@@ -201,6 +201,24 @@ def test_integrators_remove_what_constant_loads_do():
     assert abs(ends["without"]) > 1e-3
 
 
+@pytest.mark.parametrize("tighter", [0.0, 1.0, 12.0])
+@pytest.mark.parametrize("decay", [0.2, 1.0])
+def test_integrators_decay_with_their_time(tighter, decay):
+    """A rotor that motors turn fast: exp(-t/tau) of its error; sqrt(1 + r^2) as slow if another is r as tight."""
+    rotor = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [100.0]]), np.eye(2)[[0, 0]], np.zeros((2, 1))
+    deviations = {"y1": 0.02} | ({"y2": 0.02 / tighter} if tighter else {})
+    design = pf.lqg(rotor, 1e-3, measured=["y1"], deviations=deviations, effort=10.0, noise=1e-4,
+                    integrators={"y1": decay})  # fmt: skip
+    slowest = -1e-3 / np.log(np.max(np.abs(design.regulator.poles)))
+    assert slowest == pytest.approx(decay * np.hypot(1.0, tighter), rel=1e-4)
+    if not tighter:
+        plant, law, x, y = pf.discretise(rotor, 1e-3), design.law(), np.zeros(2), []
+        for k in range(round(4.0 * decay / 1e-3)):
+            y.append((plant.C @ x)[0])
+            x = plant.A @ x + plant.B @ law.step(k, 1e-3 * k, plant.C[:1] @ x) + plant.G[:, 0] * 0.3
+        assert y[round(3e3 * decay)] / y[round(2e3 * decay)] == pytest.approx(np.exp(-1.0), rel=0.01)
+
+
 def test_integrals_stay_while_torques_are_limited():
     """Held back at 1 mA for five seconds, the law returns within one; integrals that went on would take longer."""
     design = quanser_design(integrators={"y1": 0.3}, deviations={"y1": 0.1, "y3": 0.1})
@@ -235,7 +253,7 @@ def test_the_law_is_one_for_sampled_controllers():
     )
     runs = []
     for _ in range(2):
-        controller.start(plant_of())
+        controller.start(plant_of(delay=0.013))
         runs.append([controller.step(k, PERIOD * k, np.array([0.01 * k, 0.0]))[0] for k in range(20)])
     assert runs[0] == runs[1]
     assert max(runs[0]) == 0.6
@@ -249,9 +267,11 @@ def test_the_law_is_one_for_sampled_controllers():
         ({"inputs": ("y2", "y1")}, "inputs"),
         ({"outputs": ("u2",)}, "outputs"),
         ({"period": 0.02}, "period"),
+        ({"delay": 0.0}, "delay"),
+        ({"delay": 0.0131}, "delay"),
     ):
         with pytest.raises(InputError) as error:
-            design.law().start(plant_of(**changes))
+            design.law().start(plant_of(**{"delay": 0.013, **changes}))
         assert error.value.field == field
 
 

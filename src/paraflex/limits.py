@@ -37,6 +37,8 @@ ELEMENTS = 64
 SHORTEST = 1e-12
 # Shape functions of a bar: the tenth sine is far above what a motion excites.
 SHAPE_FUNCTIONS = 100
+# States of a sampled plant, torques under way among them: of so many a matrix takes 200 MB, its eigenvalues minutes.
+PLANT_STATES = 5_000
 # Samples of a run: an hour at 250 Hz; of fifty coordinates they take a gigabyte.
 SAMPLES = 1_000_000
 # Instants at which loops are closed along a path, each a millisecond after the one before: of thirty coordinates they

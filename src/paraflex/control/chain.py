@@ -18,13 +18,12 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.amplifiers import largest_commands
 from paraflex.control.controllers import Plant
-from paraflex.control.discrete import DiscreteModel, discrete_model
+from paraflex.control.discrete import DiscreteModel, discrete_model, is_model
 from paraflex.control.estimators import rounded
 from paraflex.control.filters import transfer_function
 from paraflex.control.references import Reference, references
 from paraflex.control.together import by_name, checked_number, is_number
 from paraflex.errors import InputError
-from paraflex.findings import Finding
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import not_negative
 from paraflex.motion import MotionRun
@@ -81,11 +80,11 @@ class SampledController:
     Parameters
     ----------
     law : object
-        A discrete model of python-control or SciPy, from readings to torques; a function of (k, t, y), with y (inputs,)
-        the readings of sample k at time t, that returns torques (outputs,); or an object with such a method `step`. It
-        may have `start(plant)`, which is called first, `limited(torques)`, which is told the torques within the limits,
-        any of the attributes below, `whole_torque` if no planned torque is to act besides, and `absolute` if it takes
-        readings without a reference.
+        A discrete model of python-control or SciPy, from readings to torques, a state space or a transfer function; a
+        function of (k, t, y), with y (inputs,) the readings of sample k at time t, that returns torques (outputs,); or
+        an object with such a method `step`. It may have `start(plant)`, which is called first, `limited(torques)`,
+        which is told the torques within the limits, any of the attributes below, `whole_torque` if no planned torque is
+        to act besides, and `absolute` if it takes readings without a reference.
     period : float, optional
         Of sampling [s].
     delay : float
@@ -190,20 +189,17 @@ class SampledController:
         self._lowest = np.maximum([-np.inf if one is None else one[0] for one in limits], -most)
         self._highest = np.minimum([np.inf if one is None else one[1] for one in limits], most)
         self._most = np.array([np.inf if one is None else one * plant.period for one in rates])
-        self._given: Array = np.zeros(len(plant.outputs))
         if hasattr(self.law, "start"):
             resolution = tuple(self.resolution.tolist())
             self.law.start(replace(plant, resolution=resolution) if any(resolution) else plant)
+        # What the law holds an equilibrium with acts before the first sample.
+        self.holding_torques: Array = np.clip(getattr(self.law, "holding_torques", 0.0), self._lowest, self._highest)
+        self._given: Array = self.holding_torques
 
     @property
     def whole_torque(self) -> bool:
         """Whether its law gives the whole torque, so that no planned torque acts besides."""
         return bool(getattr(self.law, "whole_torque", False))
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What its law found doubtful as it started."""
-        return tuple(getattr(self.law, "findings", ()))
 
     @property
     def title(self) -> str:
@@ -265,15 +261,16 @@ def as_law(given: Any) -> Any:
     InputError
         Anything else, or a continuous model.
     """
+    # Models of SciPy have a method "step" as well, their response to one.
+    if is_model(given):
+        return discrete_model(given)
     if callable(getattr(given, "step", None)) and not inspect.isclass(given):
         return given
-    if all(hasattr(given, name) for name in ("A", "B", "C", "D", "dt")):
-        return discrete_model(given)
     if callable(given) and not inspect.isclass(given):
         return _Function(given)
     raise InputError(
         "is no control law", field="law", value=given,
-        remedy="give a function of (k, t, y), an object with a method step, or a discrete model in state space",
+        remedy="give a function of (k, t, y), an object with a method step, or a discrete model",
     )  # fmt: skip
 
 

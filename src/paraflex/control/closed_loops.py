@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,10 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.discrete import DiscreteModel, check_discrete, matrices_of
+from paraflex.control.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.control.reach import frequency_of
 from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.errors import InputError, ResultWarning, warn_user
+from paraflex.linear.named import places_in_s
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import positive
 
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
 Complex = NDArray[np.complex128]
 # Poles on the unit circle are found that near to it.
 _ON_CIRCLE = 1e-9
+# Angles about those of poles, in distances of these from the circle; others; the largest turn from one to the next, and
+# the least distance, of a pole on the circle.
+_ABOUT, _GRID, _TURN, _NARROW = np.array([-8.0, -3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0, 8.0]), 400, 0.5, 1e-12
 # Delay margins are sought up to so many periods, in steps of this part of one.
 _LATEST, _STEP = 200, 0.25
 
@@ -49,7 +54,8 @@ class ClosedLoop:
     model: Any = None
 
     def __repr__(self) -> str:
-        return f"ClosedLoop({len(self.A)} states, spectral radius {self.spectral_radius:.6g})"
+        unstable = "" if self.stable else ", unstable"
+        return f"ClosedLoop({len(self.A)} states, spectral radius {_magnitude(self.spectral_radius)}{unstable})"
 
     @cached_property
     def A(self) -> Array:
@@ -83,12 +89,7 @@ class ClosedLoop:
 
     @cached_property
     def _triangular(self) -> tuple[Complex, Complex, Complex]:
-        """Schur form of A, and what torques added at the motors lead to, and which torques follow, in its basis."""
-        plant, law = self.plant, self.controller
-        upper, basis = scipy.linalg.schur(self.A.astype(complex), output="complex")
-        added = np.vstack([plant.B, np.zeros((len(law.A), plant.B.shape[1]))])
-        follow = np.hstack([law.D @ plant.C, law.C])
-        return upper, basis.conj().T @ added, follow @ basis
+        return _triangular(self.A, self.plant, self.controller)
 
     def sensitivity(self, omega: ArrayLike) -> Complex:
         """Sensitivity S (k, motors, motors) at the motors: what torques become that are added there.
@@ -100,7 +101,7 @@ class ClosedLoop:
         """
         upper, added, follow = self._triangular
         eye, one = np.eye(len(upper)), np.eye(added.shape[1])
-        z = np.exp(1j * np.atleast_1d(np.asarray(omega, dtype=float)) * self.plant.period)
+        z = np.exp(places_in_s(omega, "omega") * self.plant.period)
         return np.array([one + follow @ scipy.linalg.solve_triangular(at * eye - upper, added) for at in z])
 
     def loop(self, omega: ArrayLike) -> Complex:
@@ -131,8 +132,8 @@ class ClosedLoop:
     def delay_margin(self) -> float:
         """How much later all torques may act before a pole leaves the unit circle [s].
 
-        Exact for any delay, as the plant is sampled anew; nan of a loop that is unstable, inf if it stays
-        stable with 200 periods.
+        Exact for any delay, as the plant is sampled anew; nan of a loop that is unstable, with a warning, inf if it
+        stays stable with 200 periods.
 
         Raises
         ------
@@ -140,6 +141,7 @@ class ClosedLoop:
             The continuous model is not known.
         """
         if not self.stable:
+            warn_if_unstable(self)
             return float("nan")
         period, now = self.plant.period, self.plant.delay
 
@@ -206,7 +208,7 @@ def law_of(controller: Any) -> StateSpace:
     inner = getattr(controller, "law", None)
     own = controller if inner is None or callable(inner) else inner
     own = getattr(own, "state_space", own)
-    if not all(hasattr(own, name) for name in ("A", "B", "C", "D")):
+    if not is_model(own) and not all(hasattr(own, name) for name in ("A", "B", "C", "D")):
         raise InputError("is no linear law", field="controller", value=controller,
                          remedy="give a design of pf.lqg, or a discrete state space")  # fmt: skip
     if hasattr(own, "dt"):
@@ -301,6 +303,44 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
     return pd.DataFrame.from_dict(rows, orient="index").sort_values("spectral_radius", kind="stable")
 
 
+def _triangular(A: Array, plant: SampledPlant, law: StateSpace) -> tuple[Complex, Complex, Complex]:
+    """Schur form of A, and what torques added at the motors lead to, and which torques follow, in its basis."""
+    upper, basis = scipy.linalg.schur(A.astype(complex), output="complex")
+    added = np.vstack([plant.B, np.zeros((len(law.A), plant.B.shape[1]))])
+    return upper, basis.conj().T @ added, np.hstack([law.D @ plant.C, law.C]) @ basis
+
+
+def poles_beyond(loop: ClosedLoop, later: int, radius: float) -> int:
+    """Number of poles with larger magnitudes than a radius above one, of a loop with torques so many samples later.
+
+    With G the open loop without that delay, F = det(1 - z^-later G) has poles where that has, zeros at the poles of the
+    closed loop, and is one at infinity: the number is that of the open loop less the turns of F along the circle.
+    """
+    plant, law = loop.plant, loop.controller
+    A = np.block([[plant.A, np.zeros((len(plant.A), len(law.A)))], [law.B @ plant.C, law.A]])
+    upper, added, follow = _triangular(A, plant, law)
+
+    def F(angles: Array) -> Complex:
+        z = radius * np.exp(1j * angles)
+        G = [follow @ scipy.linalg.solve_triangular(at * np.eye(len(A)) - upper, added) for at in z]
+        return np.linalg.det(np.eye(len(follow)) - z[:, None, None] ** -later * np.array(G))
+
+    poles = np.diag(upper)
+    near = np.abs(np.angle(poles))[:, None] + np.abs(radius - np.abs(poles))[:, None] * _ABOUT
+    angles = np.unique(np.concatenate([np.linspace(0.0, np.pi, _GRID), near[(near > 0.0) & (near < np.pi)]]))
+    values = F(angles)
+    while True:
+        steps, wide = np.angle(values[1:] / values[:-1]), np.diff(angles)
+        large = (np.abs(values - 1.0) > 0.5) * float(later)
+        turn = np.maximum(np.abs(steps), np.maximum(large[1:], large[:-1]) * wide)
+        rough = (turn > _TURN) & (wide > _NARROW)
+        if not np.any(rough):
+            return round(np.count_nonzero(np.abs(poles) > radius) - float(np.sum(steps)) / np.pi)
+        at = np.flatnonzero(rough)
+        between = angles[at] + 0.5 * wide[at]
+        angles, values = np.insert(angles, at + 1, between), np.insert(values, at + 1, F(between))
+
+
 def warn_if_unstable(loop: ClosedLoop, where: str = "") -> None:
     """Issue a `ResultWarning` that names the poles outside the unit circle."""
     if not loop.stable:
@@ -311,9 +351,14 @@ def unstable_poles(loop: ClosedLoop) -> str:
     """The poles outside the unit circle in words: magnitudes and frequencies of the first four."""
     outside = [z for z in loop.poles if abs(z) >= 1.0 - _ON_CIRCLE and z.imag >= 0.0]
     named = ", ".join(
-        f"|z| = {abs(z):.6g} at {frequency_of(complex(z), loop.plant.period):.4g} Hz" for z in outside[:4]
+        f"|z| = {_magnitude(abs(z))} at {frequency_of(complex(z), loop.plant.period):.4g} Hz" for z in outside[:4]
     )
     return named + (f" and {len(outside) - 4} more" if len(outside) > 4 else "")
+
+
+def _magnitude(size: float) -> str:
+    """A pole's magnitude, with two digits of its distance from one, and at least six."""
+    return f"{size:.{max(6, 2 - math.floor(math.log10(max(abs(size - 1.0), _ON_CIRCLE))))}g}"
 
 
 def damped_frequency(z: complex, period: float) -> tuple[float, float]:

@@ -33,6 +33,8 @@ class Plant:
         [s]
     resolution : tuple of float
         Of the readings, to whose multiples they are rounded, zero of those that are not; none if none is.
+    feed_forward : bool
+        Whether planned torques act besides.
     """
 
     mechanism: Mechanism
@@ -45,6 +47,7 @@ class Plant:
     period: float
     delay: float
     resolution: tuple[float, ...] = ()
+    feed_forward: bool = False
 
 
 @runtime_checkable

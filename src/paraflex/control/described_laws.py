@@ -262,7 +262,7 @@ class LQGDescription(CheckedFields):
     disturbance : float or mapping of str to float, optional
         Standard deviations of random efforts at motors [N m, N]; by default a tenth of `effort`.
     integrators : mapping of str to float
-        Sensors whose errors are to vanish under constant loads, with the time that may take [s].
+        Sensors whose errors are to vanish under constant loads, with its time constant: see `lqr` [s].
     coloured : mapping of str to (float, float or numerator and denominator)
         Disturbances that last, by motor or by point and axis, "link.tip.x": standard deviation [N m, N], and the
         filter that makes them of noise.

@@ -8,20 +8,17 @@ from typing import Any
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.closed_loops import closed_loop, unstable_poles
 from paraflex.control.coloured import deviation_and_filter
 from paraflex.control.controllers import Plant
 from paraflex.control.estimators import quantisation_noise
 from paraflex.control.linear_law import LinearLaw
-from paraflex.control.loop_check import CODE
 from paraflex.control.references import OPEN_LOOP
 from paraflex.control.regulators import LQGDesign, lqg
 from paraflex.control.together import by_name, checked_number
 from paraflex.errors import InputError
-from paraflex.findings import Finding
 from paraflex.linear import LinearModel, linearise, reduce
 from paraflex.mechanism import mode_of_motors
-from paraflex.mechanism.quantities import not_negative, positive
+from paraflex.mechanism.quantities import finite, not_negative, positive
 
 Numbers = float | Mapping[str, float]
 
@@ -31,7 +28,6 @@ class DesignedLQG:
 
     It is designed as it starts, for its sensors, motors, period and delay: about the start of the planned motion, or
     about the pose at the start of a run without a path, on a model of few states. Motors of other modes are no inputs.
-    Its loop with the model of all states is checked: `findings` has "loop-unstable" where that is unstable.
 
     Parameters
     ----------
@@ -52,7 +48,6 @@ class DesignedLQG:
     ----------
     design : LQGDesign or None
         Once started.
-    findings : tuple of Finding
 
     Raises
     ------
@@ -90,6 +85,7 @@ class DesignedLQG:
         _check(disturbance, "disturbance", "N m or N", not_negative)
         for name, each in (coloured or {}).items():
             deviation_and_filter(name, each)
+        finite(at or 0.0, "at")
         if states is not None and states < 1:
             raise InputError("no such number of states", field="states", value=states, remedy="say 16, or leave it out")
         self.outputs: tuple[str, ...] = tuple(effort) if isinstance(effort, Mapping) else ()
@@ -98,7 +94,6 @@ class DesignedLQG:
         self._coloured: Mapping[str, Any] = coloured or {}
         self._noise, self._states, self._at = noise, states, at
         self.design: LQGDesign | None = None
-        self.findings: tuple[Finding, ...] = ()
 
     @property
     def title(self) -> str:
@@ -116,16 +111,9 @@ class DesignedLQG:
         integrators = {name: time for name, time in self._integrators.items() if name in plant.inputs}
         self.design = lqg(few, plant.period, delay=plant.delay, measured=plant.inputs, noise=self._noise_of(plant),
                           integrators=integrators, coloured=coloured, **self._weights)  # fmt: skip
-        loop = closed_loop(full, self.design)
-        self.findings = () if loop.stable else (
-            Finding(
-                CODE, "",
-                f"the loop is unstable with the model of all {len(full.states)} states: {unstable_poles(loop)}",
-                "give links damping, or the design larger noise, smaller effort or more states",
-            ),
-        )  # fmt: skip
         self._law = self.design.law()
         self._law.start(plant)
+        self.holding_torques: Array = self._law.holding_torques
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`; y are errors of readings."""

@@ -100,6 +100,11 @@ def discrete_model(given: Any) -> DiscreteModel:
     return DiscreteModel(*matrices_of(given), None if given.dt is True else float(given.dt), *labels)
 
 
+def is_model(given: Any) -> bool:
+    """Whether an object is a state space or a transfer function of python-control or SciPy."""
+    return hasattr(given, "dt") and (hasattr(given, "to_ss") or all(hasattr(given, name) for name in "ABCD"))
+
+
 def side_by_side(laws: Sequence[DiscreteModel]) -> DiscreteModel:
     """Laws with names and one period as one law: torques for one motor add up.
 
@@ -138,7 +143,12 @@ def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
 
 
 def matrices_of(model: Any) -> StateSpace:
-    """Matrices of a model in state space, which may have no states."""
+    """Matrices of a model in state space, which may have no states, or of a proper transfer function."""
+    try:
+        model = model if hasattr(model, "A") else model.to_ss()
+    except (ValueError, NotImplementedError) as error:
+        raise InputError(f"has no state space: {error}", field="model", value=model,
+                         remedy="give a proper transfer function, or a state space") from None  # fmt: skip
     A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (model.A, model.B, model.C, model.D))
     if A.size == 0:
         A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))

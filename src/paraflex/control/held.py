@@ -84,7 +84,7 @@ class HeldTorques:
         # The first coefficients of signals are those of held torques as well.
         self.base: Array = self.signals.coefficients[:, 0].copy()
         self.held: Array = np.zeros(len(own))
-        self.log: TorqueLog = TorqueLog(lags, start)
+        self.log: TorqueLog = TorqueLog(lags, start, self.held)
 
     def given(self, torques: Torques) -> Array:
         """Torques of all motors (all,) from those of `motors`, or of some of them by name.
@@ -131,6 +131,12 @@ class HeldTorques:
         if changed:
             self._write()
         return changed
+
+    def begin(self, torques: Array, state: State) -> None:
+        """Let torques (all,) act from before the start on, as far as amplifiers can."""
+        self.held = self._within_limits(torques, state)
+        self.log = TorqueLog(self.amplifiers.lags, state.time, self.held)
+        self._write()
 
     def note(self, t: float, torques: Array) -> None:
         """Note torques (all,) that act from a time on [s]."""

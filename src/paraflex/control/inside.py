@@ -103,7 +103,7 @@ def _entry(law: Any, inputs: int, states: int, outputs: int) -> Any:
 
 
 def sampled_law(
-    controller: Any, plant: Plant, readings: Readings, outputs: list[int], base: Array, motors: int, end: float
+    controller: Any, plant: Plant, readings: Readings, outputs: list[int], base: Array, held: Array, end: float
 ) -> SampledLaw | None:
     """A controller that has started, for the time loop; None of one that has to stay outside.
 
@@ -117,8 +117,8 @@ def sampled_law(
         Its motors, by their numbers among all of the mechanism.
     base : (breaks,) array
         First coefficients of signals without its torques.
-    motors : int
-        Of the mechanism.
+    held : (motors,) array
+        Torques of all motors that act at the start.
     end : float
         Of the run [s].
     """
@@ -145,7 +145,7 @@ def sampled_law(
         "projector": np.zeros((0, 0, 0)) if projector is None else projector[_rows(count, len(projector))],
         "lowest": lowest, "highest": highest, "most": controller.bounds[1] * period,
         "outputs": np.array(outputs, np.int64), "base": base,
-        "filtered": np.zeros(kept), "x": np.zeros(states), "last": np.zeros(len(outputs)), "held": np.zeros(motors),
+        "filtered": np.zeros(kept), "x": np.zeros(states), "last": controller.holding_torques, "held": held,
         "scratch": np.zeros((2, max(kept, states, inputs, len(outputs)))),
         "t": np.zeros(count), "acted": np.zeros(count), "readings": np.zeros((count, inputs)),
         "wanted": np.zeros((count, len(outputs))), "given": np.zeros((count, len(outputs))),
@@ -187,7 +187,7 @@ def _law_arrays(linear: LinearLaw | None, law: Any, inputs: int, outputs: int) -
     else:
         n = len(linear.A)
     shapes = {"A": (n, n), "B": (n, inputs), "C": (outputs, n), "D": (outputs, inputs), "E": (n, outputs),
-              "first": (n, inputs), "waiting": (n,)}  # fmt: skip
+              "holding": (outputs,), "first": (n, inputs), "waiting": (n,)}  # fmt: skip
     found = {name: getattr(linear, name) for name in shapes}
     return {name: np.reshape(array, shapes[name]).astype(float) if array.size else np.zeros(shapes[name])
             for name, array in found.items()}  # fmt: skip

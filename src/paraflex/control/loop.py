@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +23,6 @@ from paraflex.control.together import (
     whole_and_part,
 )
 from paraflex.errors import InputError
-from paraflex.findings import Finding
 from paraflex.kernel.sampled import ACTED, SAMPLED, SampledLaw
 from paraflex.mechanism.quantities import not_negative
 
@@ -73,8 +72,6 @@ class ControllerRecord:
         Lowest and highest torque [N m, N]; infinite without.
     rates : (outputs,) array
         Largest change of torques in a second [N m/s, N/s]; infinite without.
-    findings : tuple of Finding
-        What its law found doubtful as it started.
     linear : DiscreteModel or None
         Its law from readings to torques, as at the first sample, if that is linear and readings are not filtered.
     """
@@ -93,7 +90,6 @@ class ControllerRecord:
     law: str
     limits: Array
     rates: Array
-    findings: tuple[Finding, ...] = ()
     linear: DiscreteModel | None = None
 
     @property
@@ -162,7 +158,9 @@ class Loop:
         # Number of the next sample of each, torques to come, and those of each that act.
         self._next = [0] * len(self.controllers)
         self._due: list[Due] = []
-        self._acting = np.zeros((len(self.controllers), len(motors)))
+        self.acting: Array = np.zeros((len(self.controllers), len(motors)))
+        for k, each in enumerate(self.controllers):
+            self.acting[k, self._outputs[k]] = getattr(each, "holding_torques", 0.0)
         self.kept: list[Done] = [Done() for _ in self.controllers]
         # Where the compiled time loop runs the controller.
         self.inside: SampledLaw | None = None
@@ -224,8 +222,8 @@ class Loop:
             return None
         self._due = [due for due in self._due if (due.tick, due.part) > (tick, part)]
         for due in acting:
-            self._acting[due.controller, self._outputs[due.controller]] = due.torques
-        return self._acting.sum(axis=0)
+            self.acting[due.controller, self._outputs[due.controller]] = due.torques
+        return self.acting.sum(axis=0)
 
     def _step(self, k: int, number: int, t: float, y: Array) -> Array:
         name, controller, outputs = self.names[k], self.controllers[k], self._plants[k].outputs
@@ -295,17 +293,13 @@ class Loop:
             law=law,
             limits=limits,
             rates=rates,
-            findings=tuple(
-                replace(one, text=f'controller "{self.names[k]}": {one.text}')
-                for one in getattr(controller, "findings", ())
-            ),
             linear=linear_model(controller, plant),
         )
 
     def saved(self) -> Any:
         """State of all controllers and of what is to come."""
         state = [vars(each) for each in self.controllers]
-        own = (self._next, self._due, self._acting, self.kept)
+        own = (self._next, self._due, self.acting, self.kept)
         # Plants, with tasks and mechanisms, stay what they are.
         memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
         inside = None if self.inside is None else [array.copy() for array in self.inside]
@@ -316,7 +310,7 @@ class Loop:
         memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
         outside, inside = saved
         states, own = copy.deepcopy(outside, memo)
-        self._next, self._due, self._acting, self.kept = own
+        self._next, self._due, self.acting, self.kept = own
         for controller, state in zip(self.controllers, states, strict=True):
             vars(controller).clear()
             vars(controller).update(state)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from paraflex.control.closed_loops import closed_loop, unstable_poles
+from paraflex.control.closed_loops import closed_loop, poles_beyond, unstable_poles
 from paraflex.control.discrete import side_by_side
-from paraflex.control.together import same_period
+from paraflex.control.together import same_period, whole_and_part
 from paraflex.errors import ParaflexError
 from paraflex.findings import Finding
 from paraflex.linear import linearise
@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from paraflex.motion import MotionRun
     from paraflex.tracking import TrackingRun
 
-CODE = "loop-unstable"
-# What grows by less in the whole run is not worth a word: motions that no motor holds drift.
-_GROWS = 2.0
+# Growth by less than this factor is not reported, of a run that is taken for at least so many samples: motions that no
+# motor holds drift.
+_GROWS, _SAMPLES = 2.0, 1000
+# Up to so many states, torques under way among them, the poles are eigenvalues; beyond they are counted.
+_STATES = 500
 
 
 def unstable_loop(
@@ -36,21 +38,31 @@ def unstable_loop(
     place : str
         Of the finding.
     """
+    if not records:
+        return ()
     laws = [one.linear for one in records]
     linear = [law for law in laws if law is not None]
     first = records[0]
     together = all(same_period(one.period, first.period) and one.delay == first.delay for one in records)
-    if len(linear) < len(laws) or not together:
+    later, part = whole_and_part(first.delay / first.period)
+    # Torques that are later than the run never act.
+    if len(linear) < len(laws) or not together or later >= len(first.t):
         return ()
+    radius = _GROWS ** (1.0 / max(len(first.t), _SAMPLES))
     try:
         model = linearise(run, at=start)
-        loop = closed_loop(model, side_by_side(linear), period=first.period, delay=first.delay)
+        now = closed_loop(model, side_by_side(linear), period=first.period, delay=part * first.period)
+        if len(now.A) + later * len(now.plant.inputs) > _STATES:
+            growing = f"{count} with |z| > {radius:.8g}" if (count := poles_beyond(now, later, radius)) else ""
+        else:
+            loop = now.later(first.delay)
+            growing = unstable_poles(loop) if loop.spectral_radius >= radius else ""
     except ParaflexError:
         # There is no linear model: at a singular pose, say.
         return ()
-    if loop.spectral_radius ** len(first.t) < _GROWS:
+    if not growing:
         return ()
     several = ", ".join(f'"{one.name}"' for one in records)
-    text = f"the sampled loop is unstable about the start: {unstable_poles(loop)}"
-    remedy = "lower the gains, sample sooner or delay less; give links damping and motors the inertia of their rotors"
-    return (Finding(CODE, place, f"controller {several}: {text}", remedy),)
+    text = f"controller {several}: the sampled loop is unstable about the start: {growing}"
+    remedy = "lower the gains, sample sooner, delay less; give links damping, motors their rotors, designs more noise"
+    return (Finding("loop-unstable", place, text, remedy),)

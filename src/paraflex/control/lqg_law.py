@@ -13,7 +13,7 @@ from paraflex.control.controllers import Plant
 from paraflex.control.estimators import KalmanFilter
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.sampled import SampledPlant
-from paraflex.control.together import same_period
+from paraflex.control.together import SAME
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 
@@ -62,12 +62,15 @@ class LQGDesign:
         Outputs that the filter is given, in this order.
     start : (n, measured) array
         The first estimate from the first readings: at rest, displaced in what moves freely.
+    holding_torques : (motors,) array
+        Torques that hold the equilibrium that the model is about [N m, N]; zero of a model about a motion.
     """
 
     regulator: Regulator
     filter: KalmanFilter
     measured: tuple[str, ...]
     start: Array
+    holding_torques: Array
 
     @property
     def K(self) -> Array:
@@ -151,6 +154,8 @@ class LQGLaw:
     x : (n,) array
         The estimate after the last reading.
     integrals : (integrated,) array
+    holding_torques : (motors,) array
+        Those of the design, part of its torques; zero where planned torques act besides [N m, N].
     """
 
     def __init__(self, design: LQGDesign) -> None:
@@ -159,9 +164,10 @@ class LQGLaw:
         self.delay: float = design.delay
         self.inputs: tuple[str, ...] = design.inputs
         self.outputs: tuple[str, ...] = design.outputs
-        self._reset()
+        self._reset(design.holding_torques)
 
-    def _reset(self) -> None:
+    def _reset(self, holding: Array) -> None:
+        self.holding_torques: Array = holding
         self.x: Array | None = None
         self.integrals: Array = np.zeros(len(self.design.regulator.integrated))
         self._wanted: Array = np.zeros(len(self.outputs))
@@ -179,17 +185,18 @@ class LQGLaw:
         Raises
         ------
         InputError
-            Sensors, motors or a period other than those of the design.
+            Sensors, motors, a period or a delay other than those of the design.
         """
         pairs = (("inputs", self.inputs, plant.inputs), ("outputs", self.outputs, plant.outputs))
         for field, wanted, have in pairs:
             if tuple(have) != wanted:
                 raise InputError("are not those of the design, in its order", field=field, value=", ".join(have),
                                  remedy=f"leave them out, or say {', '.join(wanted)}")  # fmt: skip
-        if not same_period(plant.period, self.period):
-            raise InputError(f"the design is for {self.period:g} s", field="period", value=plant.period,
-                             remedy="leave it out, or design for that period")  # fmt: skip
-        self._reset()
+        for field, wanted, have in (("period", self.period, plant.period), ("delay", self.delay, plant.delay)):
+            if abs(have - wanted) > SAME * self.period:
+                raise InputError(f"the design is for {wanted:g} s", field=field, value=have,
+                                 remedy=f"leave it out, or design for that {field}")  # fmt: skip
+        self._reset(np.zeros_like(self.holding_torques) if plant.feed_forward else self.design.holding_torques)
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """Torques (motors,) that follow from errors y (measured,) at sample k."""
@@ -197,12 +204,12 @@ class LQGLaw:
         if self.x is None:
             before = design.start @ y
         else:
-            before = design.filter.carried_on(self.x, self._given)
+            before = design.filter.carried_on(self.x, self._given - self.holding_torques)
             if np.array_equal(self._given, self._wanted):
                 self.integrals = self.integrals + design._integrals[0] @ self._read
         self.x = design.filter.corrected(before, y)
         self._read = np.array(y, dtype=float)
-        self._wanted = -design.K @ np.concatenate([self.x, self.integrals])
+        self._wanted = self.holding_torques - design.K @ np.concatenate([self.x, self.integrals])
         self._given = self._wanted
         return self._wanted.copy()
 
@@ -213,6 +220,7 @@ class LQGLaw:
         return LinearLaw(
             *states,
             E=np.vstack([-design.filter.B, np.zeros((more, len(self.outputs)))]),
+            holding=self.holding_torques,
             first=np.vstack([design.start, np.zeros((more, len(self.inputs)))]),
             waiting=(np.arange(n + more) >= n).astype(float),
         )

@@ -75,7 +75,7 @@ class Margins:
     peak_frequency: float
 
     def to_frame(self) -> pd.DataFrame:
-        """A row a motor: gains, `phase` [deg], `delay` [ms] and in `samples`, `peak`, highest `crossover` [Hz]."""
+        """A row a motor: gains, `phase` [deg], `delay` [ms], `samples`, `peak`, highest `crossover` [Hz], `stable`."""
         import pandas as pd
 
         period = self.loop.plant.period
@@ -83,7 +83,7 @@ class Margins:
             name: {
                 "gain_up": one.gain_up, "gain_down": one.gain_down, "phase": float(np.rad2deg(one.phase)),
                 "delay": 1e3 * one.delay, "samples": one.delay / period, "peak": one.peak,
-                "crossover": float(np.max(one.crossovers, initial=0.0)) / (2.0 * np.pi),
+                "crossover": float(np.max(one.crossovers, initial=0.0)) / (2.0 * np.pi), "stable": self.loop.stable,
             }
             for name, one in self.motors.items()
         }  # fmt: skip

@@ -19,6 +19,7 @@ from paraflex.control.reach import check_reach
 from paraflex.control.sampled import SampledPlant, as_sampled, places
 from paraflex.control.together import by_name, checked_number
 from paraflex.errors import InputError
+from paraflex.linear import LinearModel
 from paraflex.mechanism.quantities import not_negative, positive
 
 # Random torques by default, as a part of the largest ones.
@@ -54,8 +55,8 @@ def lqr(
     delay : float
         From a sample until its torques act [s].
     integrators : mapping of str to float, optional
-        Outputs whose errors are to vanish under constant loads, with the time that may take [s]: the integral's largest
-        deviation is that of the output times this.
+        Outputs whose errors are to vanish under constant loads, with the time constant of that [s], of a loop that is
+        faster: the integral's largest deviation is that of the output times this. Longer where others are tighter.
     state_weights : (n, n) array, optional
         Added to the weights, of the model's own states or of all.
 
@@ -131,7 +132,17 @@ def lqg(
     R = np.diag([given[name] ** 2 for name in measured])
     motors = plant.B[:, places(regulator.motors, plant.inputs, "effort", "input")]
     found = kalman_filter(plant.A, motors, C, process, R)
-    return LQGDesign(regulator, found, measured, _first_estimate(plant, C, np.sqrt(R)))
+    start = _first_estimate(plant, C, np.sqrt(R))
+    return LQGDesign(regulator, found, measured, start, _holding(model, regulator.motors))
+
+
+def _holding(model: Any, motors: Sequence[str]) -> Array:
+    """Torques (motors,) of the equilibrium that a linear model is about; zero of other models."""
+    full = getattr(model, "full", model)
+    if not isinstance(full, LinearModel) or not full.at_rest:
+        return np.zeros(len(motors))
+    point, own = full.minimal.point, [motor.name for motor in full.minimal.system.mechanism.motors]
+    return np.array([point.torques[own.index(name)] if name in own else 0.0 for name in motors])
 
 
 def _disturbed(model: Any, period: float, delay: float, coloured: Mapping[str, Any] | None) -> DisturbedPlant:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paraflex.arguments import given_as
 from paraflex.arrays import Array
 from paraflex.control.loop import ControllerRecord
-from paraflex.control.loop_check import CODE, unstable_loop
+from paraflex.control.loop_check import unstable_loop
 from paraflex.findings import Finding
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
@@ -41,14 +41,6 @@ class Controlled:
         assert self.acting is not None
         return self.acting
 
-    def _of_controllers(self, start: float, place: str) -> tuple[Finding, ...]:
-        """What laws found doubtful as they started, and whether their loop is stable."""
-        found = tuple(replace(finding, place=place) for one in self.controllers for finding in one.findings)
-        if not self.controllers or any(one.code == CODE for one in found):
-            return found
-        assert isinstance(self, TrackingRun | MotionRun)
-        return (*found, *unstable_loop(self, self.controllers, start, place))
-
 
 @given_as("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
@@ -63,7 +55,7 @@ class ControlledTracking(Controlled, TrackingRun):
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
         """Findings on controllers, on events in the run, and on results that are implausible for the mechanism."""
-        return (*self._of_controllers(self.task.start.time, f"mode {self.mode.name}"), *super().doubts)
+        return (*unstable_loop(self, self.controllers, self.task.start.time, f"mode {self.mode.name}"), *super().doubts)
 
 
 @given_as("a run under controllers", "the run that Simulation.run returns")
@@ -79,7 +71,7 @@ class ControlledMotion(Controlled, MotionRun):
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
         """Findings on controllers, on events in the run, and on implausible results."""
-        return (*self._of_controllers(float(self.solution.t[0]), ""), *super().doubts)
+        return (*unstable_loop(self, self.controllers, float(self.solution.t[0]), ""), *super().doubts)
 
 
 class TorqueLog:
@@ -91,14 +83,16 @@ class TorqueLog:
         Time constants with which they follow what is given; zero where they do at once [s].
     start : float
         Of the run [s].
+    before : (motors,) array
+        Torques before anything is given.
     """
 
-    def __init__(self, lags: Array, start: float) -> None:
+    def __init__(self, lags: Array, start: float, before: Array) -> None:
         self._lags, self._start = lags, start
         self._times: list[float] = []
-        # Before anything is given there are no torques. Those given, and those that acted then.
-        self._given: list[Array] = [np.zeros(lags.size)]
-        self._begun: list[Array] = [np.zeros(lags.size)]
+        # Those given, and those that acted then.
+        self._given: list[Array] = [before]
+        self._begun: list[Array] = [before]
 
     @property
     def begun(self) -> bool:
@@ -123,7 +117,7 @@ class TorqueLog:
 
     def copy(self) -> TorqueLog:
         """The same so far, to go on from apart."""
-        other = TorqueLog(self._lags, self._start)
+        other = TorqueLog(self._lags, self._start, self._given[0])
         other._times, other._given, other._begun = self._times.copy(), self._given.copy(), self._begun.copy()
         return other
 

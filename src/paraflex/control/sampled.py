@@ -15,6 +15,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.together import check_distinct, same_period, whole_and_part
 from paraflex.errors import InputError
+from paraflex.limits import PLANT_STATES, at_most
 from paraflex.linear.model import LinearModel
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import not_negative, positive
@@ -148,6 +149,7 @@ def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
     # Inputs under way: of the samples k - d, ..., k - 1, and that of k - d - 1 where it acts in this period or is read.
     oldest = whole + (1 if part or feeds else 0)
     size = n + m * oldest
+    at_most(size, PLANT_STATES, "delay", "too long for the period: torques under way are too many states")
     A, B, C, G = np.zeros((size, size)), np.zeros((size, m)), np.zeros((p, size)), np.zeros((size, m))
     A[:n, :n] = back @ over[0] @ np.linalg.inv(back) if n else over[0]
     C[:, :n], G[:n] = named.matrices.C, back @ over[1]

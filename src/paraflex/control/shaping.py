@@ -16,7 +16,7 @@ from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
 from paraflex.limits import SHAPER_IMPULSES, at_most
-from paraflex.mechanism.quantities import positive
+from paraflex.mechanism.quantities import finite, positive
 
 # Impulses nearer than this part of the shaper's duration are one: those of two modes of one frequency.
 _SAME_TIME = 1e-12
@@ -162,6 +162,7 @@ class Shaper(CheckedFields):
             Of the shape of the frequencies.
         """
         ratio = self.damping[0] if damping is None else damping
+        finite(np.ravel(frequency).tolist(), "frequency")
         omega = 2.0 * pi * np.asarray(frequency, dtype=float)[..., None]
         return np.abs(_vibration(omega, ratio, self.times, self.amplitudes)[0])
 
@@ -205,6 +206,7 @@ class Shaper(CheckedFields):
         start : float
             [s]
         """
+        finite(start, "start")
         impulses = list(zip(self.times, self.amplitudes, strict=True))
 
         def of_time(t: Any) -> Any:

@@ -28,6 +28,7 @@ from paraflex.kernel.sampled import SampledLaw
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
 from paraflex.mechanism.measured import encoders_of, measured_sensors
+from paraflex.mechanism.quantities import finite
 from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask
 from paraflex.validity import warn, with_blame
@@ -260,13 +261,14 @@ class Simulation:
         Raises
         ------
         InputError
-            Controllers with unknown sensors or motors, or one named twice, or with periods that are no multiples of the
-            shortest; a law that gives the whole torque beside another or beside feed-forward.
+            A time that is not finite; controllers with unknown sensors or motors, one named twice, or with periods that
+            are no multiples of the shortest; a law that gives the whole torque beside another or feed-forward.
         ControllerError
             One raised an error, or returned what cannot be torques; it carries the run so far.
         IntegrationError
             It cannot go on; it carries the run so far.
         """
+        finite(self.end if until is None else until, "until")
         end = self.end if until is None else min(until, self.end)
         try:
             if controllers is not None:
@@ -298,6 +300,9 @@ class Simulation:
         if loop is not None and loop.whole and self._fed_forward:
             raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
                              remedy="leave feed_forward of the simulation out")  # fmt: skip
+        if loop is not None and np.any(loop.acting):
+            self._torques.begin(self._torques.of_all(loop.acting.sum(axis=0)), self.state)
+            self._integration.start()
         self._use(loop)
 
     def _go_on(self, end: float, on_progress: Callable[[float], None] | None) -> None:
@@ -380,7 +385,7 @@ class Simulation:
         controller, plant = loop.alone
         own = [motor.name for motor in self.mechanism.motors]
         outputs = [own.index(name) for name in plant.outputs]
-        return sampled_law(controller, plant, self._watched, outputs, self._torques.base, len(own), self.end)
+        return sampled_law(controller, plant, self._watched, outputs, self._torques.base, self._torques.held, self.end)
 
     def _plant(self, controller: Controller) -> Plant:
         outputs = tuple(controller.outputs) or self.motors
@@ -388,7 +393,7 @@ class Simulation:
         units = dict(zip(self.sensors_read, self._readings.units, strict=True))
         return Plant(
             self.mechanism, self.mode, self.task, self.state, inputs, tuple(units[name] for name in inputs), outputs,
-            controller.period, controller.delay,
+            controller.period, controller.delay, feed_forward=self._fed_forward,
         )  # fmt: skip
 
     def _read(self, readings: Readings) -> Array:

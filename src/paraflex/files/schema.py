@@ -743,7 +743,7 @@ class LQGTable(ControllerTable):
         "tenth of effort",
     )
     integrators: dict[str, Number] = Field(
-        default={}, description="by sensor the time in s within which its error under constant loads vanishes"
+        default={}, description="by sensor the time constant in s with which its error under constant loads decays"
     )
     coloured: dict[str, tuple[Number, Number | list[list[Number]]]] = Field(
         default={},

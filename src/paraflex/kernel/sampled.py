@@ -2,7 +2,7 @@
 
 With readings y, quantised and filtered, errors e = y - r_k and states x the law is
 
-    w = P_k (C x + D e),   g = w within the limits,   x' = A x + B e + E (w - g),
+    w = P_k (h + C x + D e),   g = w within the limits,   x' = A x + B e + E (w - g),
 
 or a compiled function computes w from the errors and changes x. Torques g of sample k act (whole + part) periods later.
 """
@@ -57,6 +57,7 @@ class SampledLaw(NamedTuple):
     C: NDArray[np.float64]  # (outputs, states)
     D: NDArray[np.float64]  # (outputs, inputs)
     E: NDArray[np.float64]  # (states, outputs)
+    holding: NDArray[np.float64]  # (outputs,) h
     first: NDArray[np.float64]  # (states, inputs) of first errors
     waiting: NDArray[np.float64]  # (states,) one for those that stay as they are while a torque is limited
     projector: NDArray[np.float64]  # (samples, outputs, outputs), or none
@@ -81,7 +82,7 @@ def no_law() -> SampledLaw:
     """None, for a run without a controller."""
     none, rows, whole = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
     readings = (whole, none, rows, rows, rows, rows, np.zeros((0, 5), np.int64), rows, none)
-    filters, law = (rows, rows, rows, none, rows), (rows, rows, rows, rows, rows, rows, none, np.zeros((0, 0, 0)))
+    filters, law = (rows, rows, rows, none, rows), (rows, rows, rows, rows, rows, none, rows, none, np.zeros((0, 0, 0)))
     state, done = (none, none, none, none, rows), (none, none, rows, rows, rows)
     return SampledLaw(none, whole, *readings, *filters, rows, *law, none, none, none, whole, none, *state, *done)
 
@@ -181,7 +182,7 @@ def take_sample(law, k, q, v, a):
         if k == 0:
             fill(x, 0.0)
             multiply_add(law.first, errors, x)
-        fill(wanted, 0.0)
+        copy(law.holding, wanted)
         multiply_add(law.C, x, wanted)
         multiply_add(law.D, errors, wanted)
         if law.projector.size > 0:

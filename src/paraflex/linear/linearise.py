@@ -264,7 +264,7 @@ def nearest_sample(times: Array, at: float) -> int:
     """
     sample = int(np.argmin(np.abs(times - at)))
     apart = float(np.max(np.diff(times), initial=0.0))
-    if abs(times[sample] - at) > _NEAR * apart * (1.0 + 1e-9):
+    if not abs(times[sample] - at) <= _NEAR * apart * (1.0 + 1e-9):
         raise InputError(
             "is not a time of the motion", field="at", value=at,
             remedy=f"choose one from {times[0]:.6g} to {times[-1]:.6g} s",

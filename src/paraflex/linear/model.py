@@ -337,7 +337,8 @@ class LinearModel:
 
         Of any number of each: more inputs than outputs, or fewer, mostly have none. At rest, and of outputs that are
         places, angles or derivatives of these, they are found from the second-order equations, else from
-        the state space, and up to a tenth of the fastest pole.
+        the state space, and up to a tenth of the fastest pole. Where the response has a smaller rank than inputs or
+        outputs, as of motors at geared joints, they are the s at which it loses more; a response that is zero has none.
         """
         chosen = self.select(inputs, outputs)
         shift = 0.7 * self.low_frequency

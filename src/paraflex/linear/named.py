@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable, named_axes
 from paraflex.linear.zeros import StateSpace
+from paraflex.mechanism.quantities import finite
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,9 +57,10 @@ def labelled_model(matrices: StateSpace, names: Names, attributes: Mapping[str, 
     return xr.Dataset(data, coords=named_axes(*names), attrs=attributes)
 
 
-def places_in_s(frequencies: ArrayLike) -> NDArray[np.complex128]:
-    """Points s = i omega of angular frequencies [rad/s]; complex numbers are points s themselves."""
+def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> NDArray[np.complex128]:
+    """Points s = i omega of angular frequencies, which are finite [rad/s]; complex numbers are points s themselves."""
     given = np.atleast_1d(np.asarray(frequencies))
+    finite(given.ravel().tolist(), field)
     return np.asarray(given if np.iscomplexobj(given) else 1j * given, dtype=complex)
 
 

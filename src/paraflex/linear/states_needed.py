@@ -60,7 +60,7 @@ def states_needed(
     import xarray as xr
 
     for name, value in (("until", until), ("error", error)):
-        if not value > 0.0:
+        if not 0.0 < value < np.inf:
             raise InputError("is not positive", field=name, value=value, remedy="give a positive one")
     if not models:
         raise InputError("names none", field="models", remedy="give linear models, as linearise makes them")

@@ -4,8 +4,10 @@ Zeros are the s at which [A - s, B; C, D] loses rank (Emami-Naeini and Van Doore
 axial vibrations of links that are a thousand times as fast: they are found as the largest eigenvalues
 theta = 1 / (s - sigma) of a pencil inverted at a shift sigma; zeros at infinity are those where theta is zero.
 
-Systems that are not square are made so by random combinations of inputs or outputs, twice: what is a zero of both, and
-where the matrix that is not square loses rank, is one of the system.
+A response may have a smaller rank than it has inputs or outputs at every s: of two motors at geared joints, say, or of
+a motor and a sensor on parts that move independently. Such systems, and those that are not square, are replaced by
+random combinations of as many inputs and outputs as the rank, twice: a zero of both at which the matrix of all inputs
+and outputs loses rank is one of the system.
 """
 
 from __future__ import annotations
@@ -18,13 +20,16 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array, Numbers
+from paraflex.limits import solvable
 from paraflex.linear.independent import unit_rows
 
 Complex = NDArray[np.complex128]
 # Zeros of two squared systems that agree this well are one.
 _SAME = 1e-6
-# At a zero the least singular value of the matrix, entries of size one, is smaller: rounding leaves 1e-14 of it.
+# Singular values below this are zero in a matrix with entries of size one: rounding leaves 1e-14 of them.
 _RANK = 1e-11
+# The rank at almost every s is the largest at these multiples of the shift, none of which is a likely zero.
+_ANYWHERE = (1.0, 2.718281828, 31.41592654)
 # An eigenvalue theta below this part of the largest is that of a zero at infinity.
 _INFINITE = 1e-12
 # Of a general system such zeros are blurred: those further out than this part of the fastest pole are left out.
@@ -49,6 +54,7 @@ class Vibrating(NamedTuple):
     C: Array
 
 
+@solvable("zeros")
 def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
     """Zeros of a mechanism about a pose at rest.
 
@@ -61,39 +67,38 @@ def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
     shift : float
         Positive, of the size of low frequencies [rad/s].
     """
-    inputs, outputs = modes.B.shape[1], modes.C.shape[0]
-    if inputs != outputs:
 
-        def squared(mix: Array) -> Complex:
-            few = modes._replace(B=modes.B @ mix) if inputs > outputs else modes._replace(C=mix @ modes.C)
-            return vibrating_zeros(few, shift)
+    def matrix(s: complex) -> Complex:
+        mass, damping, stiffness = _between(modes, max(abs(s), shift))
+        return s * s * mass + s * damping + stiffness
 
-        def matrix(s: complex) -> Complex:
-            mass, damping, stiffness = _between(modes, max(abs(s), shift))
-            return s * s * mass + s * damping + stiffness
+    def squared(left: Array, right: Array) -> Complex:
+        mass, damping, stiffness = _between(modes._replace(B=modes.B @ right, C=left @ modes.C), shift)
+        if not np.any(modes.damping):
+            squares = _shifted(-_pencil(stiffness + shift**2 * mass, mass), shift**2)
+            root = np.sqrt(squares)
+            return _sorted(np.concatenate([root, -root]))
+        whole = stiffness + shift * damping + shift**2 * mass
+        n = len(whole)
+        slopes = scipy.linalg.solve(whole, np.hstack([2.0 * shift * mass + damping, mass])) if n else np.zeros((0, 0))
+        companion = np.vstack([-slopes, np.eye(n, 2 * n)])
+        return _sorted(_shifted(scipy.linalg.eigvals(companion), shift))
 
-        return _common(squared, matrix, (inputs, outputs), shift)
-    mass, damping, stiffness = _between(modes, shift)
-    if not np.any(modes.damping):
-        squares = _shifted(-_pencil(stiffness + shift**2 * mass, mass), shift**2)
-        root = np.sqrt(squares)
-        return _sorted(np.concatenate([root, -root]))
-    whole = stiffness + shift * damping + shift**2 * mass
-    n = len(whole)
-    slopes = scipy.linalg.solve(whole, np.hstack([2.0 * shift * mass + damping, mass])) if n else np.zeros((0, 0))
-    companion = np.vstack([-slopes, np.eye(n, 2 * n)])
-    return _sorted(_shifted(scipy.linalg.eigvals(companion), shift))
+    # Null spaces leave as many rows and columns fewer as B and C have rank.
+    more = sum(matrix(shift).shape) - modes.squares.size
+    return _common(squared, matrix, (modes.C.shape[0], modes.B.shape[1]), more, shift)
 
 
 def _between(modes: Vibrating, low: float) -> tuple[Array, Array, Array]:
     """P^T N, P^T damping N and P^T diag(squares) N, scaled by squares + low^2."""
     scale = 1.0 / np.sqrt(np.maximum(modes.squares, 0.0) + low**2)
-    left, right = (scipy.linalg.null_space(unit_rows(rows * scale)) for rows in (modes.B.T, modes.C))
+    left, right = (scipy.linalg.null_space(unit_rows(rows * scale), rcond=_RANK) for rows in (modes.B.T, modes.C))
     parts = (np.eye(scale.size), modes.damping, np.diag(modes.squares))
     mass, damping, stiffness = (left.T @ ((part * scale) * scale[:, None]) @ right for part in parts)
     return mass, damping, stiffness
 
 
+@solvable("zeros")
 def zeros(system: StateSpace, shift: float) -> Complex:
     """Transmission zeros of any linear system, up to a tenth of its fastest pole.
 
@@ -104,47 +109,56 @@ def zeros(system: StateSpace, shift: float) -> Complex:
     shift : float
         No zero, positive, of the size of low frequencies [rad/s].
     """
-    outputs, inputs = system.D.shape
     A, B, C, D = system
-    n, columns = len(A), _sizes(B, 0)
-    rows = _sizes(np.hstack([C, D]), 1)
+    n, fastest = len(A), np.linalg.norm(A, 2)
 
-    def matrix(s: complex) -> Numbers:
+    def matrix(s: complex, B: Array = B, C: Array = C, D: Array = D) -> Numbers:
+        columns, rows = _sizes(B, 0), _sizes(np.hstack([C, D]), 1)
         return np.block([[A - s * np.eye(n), B / columns], [C / rows, D / rows / columns]])
 
-    if inputs != outputs:
+    def even(s: complex) -> Numbers:
+        size = np.pad(1.0 / np.sqrt(_sizes(A - s * np.eye(n), 1).ravel()), (0, sum(D.shape)), constant_values=1.0)
+        whole = matrix(s)
+        return whole * size[: whole.shape[1]] * size[: len(whole), None]
 
-        def squared(mix: Array) -> Complex:
-            few = StateSpace(A, B @ mix, C, D @ mix) if inputs > outputs else StateSpace(A, B, mix @ C, mix @ D)
-            return zeros(few, shift)
+    def squared(left: Array, right: Array) -> Complex:
+        pencil = np.asarray(matrix(shift, B @ right, left @ C, left @ D @ right), dtype=float)
+        found = _shifted(_pencil(pencil, np.eye(*pencil.shape) * (np.arange(len(pencil)) < n)), shift)
+        return _sorted(found[np.abs(found) < _FURTHEST * fastest])
 
-        def even(s: complex) -> Numbers:
-            size = np.pad(1.0 / np.sqrt(_sizes(A - s * np.eye(n), 1).ravel()), (0, inputs + outputs), constant_values=1)
-            whole = matrix(s)
-            return whole * size[: n + inputs] * size[: n + outputs, None]
-
-        return _common(squared, even, (inputs, outputs), shift)
-    pencil = np.asarray(matrix(shift), dtype=float)
-    found = _shifted(_pencil(pencil, np.eye(*pencil.shape) * (np.arange(len(pencil)) < n)), shift)
-    return _sorted(found[np.abs(found) < _FURTHEST * np.linalg.norm(system.A, 2)])
+    return _common(squared, even, D.shape, n, shift)
 
 
 def _common(
-    squared: Callable[[Array], Complex], matrix: Callable[[complex], Numbers], shape: tuple[int, int], shift: float
+    squared: Callable[..., Complex], matrix: Callable[..., Numbers], shape: tuple[int, int], more: int, shift: float
 ) -> Complex:
-    """Common zeros of a system squared by two random matrices at which the matrix that is not square loses rank."""
+    """Zeros of a system of a shape (outputs, inputs), from those of combinations by matrices from left and right.
+
+    The matrix at s loses rank at zeros; elsewhere it has so many more than the response.
+    """
+    full = max(_rank(matrix(part * shift)) for part in _ANYWHERE)
+    rank, (outputs, inputs) = full - more, shape
+    if not rank:
+        return np.zeros(0, dtype=complex)
+    if rank == outputs == inputs:
+        return squared(np.eye(rank), np.eye(rank))
     random = np.random.default_rng(0)
-    first, second = (squared(random.standard_normal(shape)) for _ in range(2))
+
+    def mixed() -> Complex:
+        left = np.eye(rank) if rank == outputs else random.standard_normal((rank, outputs))
+        return squared(left, np.eye(rank) if rank == inputs else random.standard_normal((inputs, rank)))
+
+    first, second = mixed(), mixed()
     if not (first.size and second.size):
         return np.zeros(0, dtype=complex)
     apart = np.min(np.abs(first[:, None] - second), axis=1)
     likely = first[apart <= _SAME * np.maximum(np.abs(first), shift)]
-    return np.array([s for s in likely if _least(matrix(complex(s))) < _RANK], dtype=complex)
+    return np.array([s for s in likely if _rank(matrix(complex(s))) < full], dtype=complex)
 
 
-def _least(matrix: Numbers) -> float:
-    """The least singular value; infinite without any."""
-    return float(np.min(scipy.linalg.svdvals(matrix), initial=np.inf)) if matrix.size else np.inf
+def _rank(matrix: Numbers) -> int:
+    """Number of singular values of a matrix with entries of size one that are more than rounding."""
+    return int(np.count_nonzero(scipy.linalg.svdvals(matrix) > _RANK)) if matrix.size else 0
 
 
 def _pencil(whole: Array, mass: Array) -> Complex:
