@@ -2,10 +2,10 @@
 
     MARGINS=margins.jsonl PYTHONPATH=tests pytest -p margins tests/test_statics.py
 
-A line is `{"test": id, "used": {place: number}, "distance": {place: [numbers]}}`, place being the file and line of the
-assertion. `used` is the largest error over tolerance there of `pytest.approx`, `numpy.testing.assert_allclose` and
-`numpy.allclose`. `distance` is how far the two sides of `<`, `<=`, `>` or `>=` in an `assert` statement are apart, each
-time it was reached, the least of arrays. Comparisons that do not hold are not recorded. See `any_processor.py`.
+A line is `{"test": id, "used": {place: number}, "sides": {place: [[less, more], ...]}}`, place being the file and line
+of the assertion. `used` is the largest error over tolerance there of `pytest.approx`, `numpy.testing.assert_allclose`
+and `numpy.allclose`. `sides` are the two sides of `<`, `<=`, `>` or `>=` in an `assert` statement, each time it was
+reached, of arrays those that are nearest. Comparisons that do not hold are not recorded. See `any_processor.py`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Records:
 
     def __init__(self) -> None:
         self.used: dict[str, float] = {}
-        self.distance: dict[str, list[float]] = defaultdict(list)
+        self.sides: dict[str, list[tuple[float, float]]] = defaultdict(list)
 
     def equal(self, place: str | None, error: Any, tolerance: Any) -> None:
         """Record an equality within a tolerance."""
@@ -47,18 +47,21 @@ class Records:
             self.used[place] = max(self.used.get(place, 0.0), float(np.nanmax(part)))
 
     def ordered(self, place: str, a: Any, b: Any) -> None:
-        """Record the distance of two sides of an inequality, if they are numbers."""
+        """Record the sides of an inequality, if they are numbers."""
         try:
-            distance = np.abs(np.asarray(b, float) - np.asarray(a, float))
+            sides = np.sort(
+                [np.ravel(side) for side in np.broadcast_arrays(np.asarray(a, float), np.asarray(b, float))], 0
+            )
         except (TypeError, ValueError):
             return
-        if distance.size and np.all(np.isfinite(distance)):
-            self.distance[place].append(float(np.min(distance)))
+        if sides.size and np.all(np.isfinite(sides)):
+            less, more = sides[:, np.argmin(sides[1] - sides[0])]
+            self.sides[place].append((float(less), float(more)))
 
     def write(self, test: str, file: str) -> None:
         """Append the records of a test that has ended to a file, and begin anew."""
-        if self.used or self.distance:
-            line = json.dumps({"test": test, "used": self.used, "distance": self.distance})
+        if self.used or self.sides:
+            line = json.dumps({"test": test, "used": self.used, "sides": self.sides})
             # In one piece: workers write to the same file.
             with open(file, "a", encoding="utf-8") as opened:
                 opened.write(line + "\n")

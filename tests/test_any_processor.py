@@ -38,7 +38,7 @@ def test_every_assertion_is_recorded_with_its_line(tmp_path):
     assert record["test"] == "test_made_up.py::test_made_up"
     used = {lines[8]: 0.4, lines[9]: 0.9, lines[10]: 0.2}
     assert record["used"] == pytest.approx(used, rel=1e-9)
-    assert record["distance"] == {lines[7]: pytest.approx([0.2, 0.1]), lines[12]: [3.0, 3.0, 3.0, 2.0]}
+    assert record["sides"] == {lines[7]: [[0.1, 0.3], [0.3, 0.4]], lines[12]: [[0, 3], [0, 3], [0, 3], [1, 3]]}
 
 
 @pytest.mark.parametrize(
@@ -51,18 +51,30 @@ def test_equality_is_reported_if_rounding_moves_it_beyond_a_third(used, reported
 
 
 @pytest.mark.parametrize(
-    ("distances", "reported"),
-    [(([1.0], [1.3]), False), (([1.0], [1.4]), True), (([1.0, 2.0], [1.0]), False), (([5.0, 0.1], [5.0, 0.2]), True)],
+    ("sides", "reported"),
+    [
+        # A limit that rounding leaves alone, one that it moves too far, errors of rounding far from and near their bound.
+        (([(0.94, 1.0)], [(0.945, 1.0)]), False),
+        (([(0.94, 1.0)], [(0.95, 1.0)]), True),
+        (([(1e-14, 1e-12)], [(3e-13, 1e-12)]), False),
+        (([(4e-13, 1e-12)], [(3e-13, 1e-12)]), True),
+        # In a loop, which is longer under one setting; signs.
+        (([(0.9, 1.0), (1.0, 1.01)], [(0.9, 1.0)]), False),
+        (([(0.0, 1.0), (0.9, 1.0)], [(0.0, 1.0), (0.8, 1.0)]), True),
+        (([(-1.0, -0.9)], [(-1.1, -0.9)]), True),
+        (([(-1.0, -0.1)], [(-2.0, -0.1)]), False),
+        (([(-0.1, 0.1)], [(-0.2, 0.1)]), True),
+    ],
 )
-def test_inequality_is_reported_if_its_spread_exceeds_a_third_of_its_distance(distances, reported):
-    found = excesses([Run(distance={("test", "place"): each}) for each in distances])
+def test_inequality_is_reported_if_near_and_its_spread_exceeds_a_tenth_of_its_distance(sides, reported):
+    found = excesses([Run(sides={("test", "place"): each}) for each in sides])
     assert list(found) == ([("test", "place")] if reported else [])
 
 
 def test_outcomes_are_counted_and_named(tmp_path):
     records, results = any_processor.files_of("as it is", tmp_path)
     assert Path(records).parent == tmp_path
-    records.write_text('{"test": "t::a", "used": {"t.py:1": 0.5}, "distance": {"t.py:2": [1.0]}}\n')
+    records.write_text('{"test": "t::a", "used": {"t.py:1": 0.5}, "sides": {"t.py:2": [[0.0, 1.0]]}}\n')
     cases = '<testcase classname="t" name="a"/><testcase classname="t" name="b"><failure/></testcase>'
     results.write_text(f'<testsuite>{cases}<testcase classname="t" name="c"><skipped/></testcase></testsuite>')
     run = any_processor.read_run("as it is", tmp_path)
