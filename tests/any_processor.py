@@ -155,7 +155,7 @@ def setting_of_commit() -> str:
 
 def main() -> int:
     """The exit code: 1 if a test failed or rounding may fail one."""
-    reader = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    reader = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     reader.add_argument("tests", nargs="*", help="files of tests; all by default")
     which = reader.add_mutually_exclusive_group()
     which.add_argument("--setting", action="append", choices=list(SETTINGS), help="one or more; all by default")

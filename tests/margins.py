@@ -17,7 +17,7 @@ import operator
 import os
 import sys
 from collections import defaultdict
-from numbers import Number
+from numbers import Complex
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +101,7 @@ def _place(depth: int, *, direct: bool) -> str | None:
 def _recording_approx(equal: Any) -> Any:
     def recorded(self: ApproxScalar, actual: Any) -> bool:
         holds = equal(self, actual)
-        if holds and isinstance(actual, Number) and isinstance(self.expected, Number):
+        if holds and isinstance(actual, Complex) and isinstance(self.expected, Complex):
             RECORDS.equal(_place(2, direct=False), actual - self.expected, self.tolerance)
         return holds
 
@@ -144,7 +144,7 @@ class _Orders(ast.NodeTransformer):
         if not self.within or any(type(each) not in ORDER for each in node.ops):
             return node
         place = f"{self.file}:{node.lineno}"
-        given = [ast.Constant(value) for value in (place, *(type(each).__name__ for each in node.ops))]
+        given: list[ast.expr] = [ast.Constant(value) for value in (place, *(type(each).__name__ for each in node.ops))]
         call = ast.Call(ast.Name(_NAME, ast.Load()), [ast.Tuple(given, ast.Load()), node.left, *node.comparators], [])
         return ast.fix_missing_locations(ast.copy_location(call, node))
 

@@ -53,7 +53,7 @@ def test_equality_is_reported_if_rounding_moves_it_beyond_a_third(used, reported
 @pytest.mark.parametrize(
     ("sides", "reported"),
     [
-        # A limit that rounding leaves alone, one that it moves too far, errors of rounding far from and near their bound.
+        # A limit that rounding leaves alone, one that it moves too far; errors of rounding far and near.
         (([(0.94, 1.0)], [(0.945, 1.0)]), False),
         (([(0.94, 1.0)], [(0.95, 1.0)]), True),
         (([(1e-14, 1e-12)], [(3e-13, 1e-12)]), False),

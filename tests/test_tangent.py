@@ -167,7 +167,8 @@ def test_jacobian_of_the_rates(case):
     rates_jacobian(case.packed, WEIGHTS, y, a, lam, case.torques, case.ws, make_tangent(case.packed), found)
     columns = np.random.default_rng(1).permutation(2 * system.n)[:60]
     unit = np.eye(y.size)
-    expected = np.stack([differences(lambda x: case.rates(x)[0], y, unit[j], 1e-5) for j in columns], axis=1)
+    # With smaller steps rounding shows (a third of the tolerance at 1e-5), with larger ones curvature (all at 1e-4).
+    expected = np.stack([differences(lambda x: case.rates(x)[0], y, unit[j], 3e-5) for j in columns], axis=1)
     assert_columns_agree(found[:-1, columns], expected[:-1], 1e-6)
 
 
