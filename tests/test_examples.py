@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import paraflex as pf
+from pages import last_digit
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import build_system, consistent_state, natural_frequencies
 from paraflex.studies import load_identification, load_optimisation, load_sensitivities, load_sweep
-from pages import last_digit
 from shell import paraflex
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
