@@ -98,8 +98,9 @@ def test_renewed_static_shapes_keep_rigid_motions_and_stiffness(ends):
                         for each in (True, False))  # fmt: skip
     assert renewed.frequencies[:2] == pytest.approx([0.0, 0.0], abs=1e-6)
     assert carried.frequencies[1] > 0.1
-    slow = [2.0 * np.pi * 0.02]
-    assert renewed.error(slow).max() < 1e-6
+    # Still slower, rounding of the rigid motions grows as the frequency's square falls.
+    slow = [2.0 * np.pi * 0.1]
+    assert renewed.error(slow).max() < 1e-7
     assert renewed.held_frequencies()[:2] == pytest.approx(renewed.full.held_frequencies()[:2], rel=1e-4)
     assert worst(renewed) < 0.1 * worst(carried)
 
