@@ -38,13 +38,14 @@ class Records:
         self.used: dict[str, float] = {}
         self.sides: dict[str, list[tuple[float, float]]] = defaultdict(list)
 
-    def equal(self, place: str | None, error: Any, tolerance: Any) -> None:
-        """Record an equality within a tolerance."""
-        error, tolerance = np.abs(np.asarray(error)), np.asarray(tolerance)
+    def equal(self, place: str | None, actual: Any, expected: Any, tolerance: Any) -> None:
+        """Record an equality within a tolerance; numbers that are not finite are equal."""
         with np.errstate(all="ignore"):
-            part = np.where(error == 0.0, 0.0, error / tolerance)
-        if place and part.size and not np.all(np.isnan(part)):
-            self.used[place] = max(self.used.get(place, 0.0), float(np.nanmax(part)))
+            error = np.abs(np.asarray(actual) - np.asarray(expected))
+            part = np.ravel(np.where(error == 0.0, 0.0, error / np.asarray(tolerance)))
+        part = part[np.isfinite(part)]
+        if place and part.size:
+            self.used[place] = max(self.used.get(place, 0.0), float(np.max(part)))
 
     def ordered(self, place: str, a: Any, b: Any) -> None:
         """Record the sides of an inequality, if they are numbers."""
@@ -101,8 +102,8 @@ def _place(depth: int, *, direct: bool) -> str | None:
 def _recording_approx(equal: Any) -> Any:
     def recorded(self: ApproxScalar, actual: Any) -> bool:
         holds = equal(self, actual)
-        if holds and isinstance(actual, Complex) and isinstance(self.expected, Complex):
-            RECORDS.equal(_place(2, direct=False), actual - self.expected, self.tolerance)
+        if holds and np.all([isinstance(each, Complex) and np.isfinite(each) for each in (actual, self.expected)]):
+            RECORDS.equal(_place(2, direct=False), actual, self.expected, self.tolerance)
         return holds
 
     return recorded
@@ -112,8 +113,7 @@ def _recording_allclose(compare: Any, rtol: float, atol: float) -> Any:
     def recorded(actual: Any, desired: Any, rtol: float = rtol, atol: float = atol, **options: Any) -> Any:
         result = compare(actual, desired, rtol, atol, **options)
         if result in (None, True):
-            actual, desired = np.asarray(actual), np.asarray(desired)
-            RECORDS.equal(_place(2, direct=True), actual - desired, atol + rtol * np.abs(desired))
+            RECORDS.equal(_place(2, direct=True), actual, desired, atol + rtol * np.abs(np.asarray(desired)))
         return result
 
     return recorded

@@ -23,6 +23,8 @@ def test_made_up():
     for k in range(2):
         assert all(each < 3 for each in (0, k))
     assert not 3.0 < 2.0
+    assert_allclose([np.nan, np.inf, 1.0], [np.nan, np.inf, 1.0])
+    assert np.nan == pytest.approx(np.nan, nan_ok=True)
     assert 1.0 != pytest.approx(2.0)
 """
 
@@ -36,7 +38,7 @@ def test_every_assertion_is_recorded_with_its_line(tmp_path):
     (record,) = map(json.loads, (tmp_path / "records").read_text().splitlines())
     lines = {number: f"test_made_up.py:{number}" for number in (7, 8, 9, 10, 12)}
     assert record["test"] == "test_made_up.py::test_made_up"
-    used = {lines[8]: 0.4, lines[9]: 0.9, lines[10]: 0.2}
+    used = {lines[8]: 0.4, lines[9]: 0.9, lines[10]: 0.2, "test_made_up.py:14": 0.0}
     assert record["used"] == pytest.approx(used, rel=1e-9)
     assert record["sides"] == {lines[7]: [[0.1, 0.3], [0.3, 0.4]], lines[12]: [[0, 3], [0, 3], [0, 3], [1, 3]]}
 
