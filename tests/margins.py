@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import cmath
 import json
 import operator
 import os
@@ -99,10 +100,14 @@ def _place(depth: int, *, direct: bool) -> str | None:
     return None
 
 
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, Complex) and cmath.isfinite(complex(value))
+
+
 def _recording_approx(equal: Any) -> Any:
     def recorded(self: ApproxScalar, actual: Any) -> bool:
         holds = equal(self, actual)
-        if holds and np.all([isinstance(each, Complex) and np.isfinite(each) for each in (actual, self.expected)]):
+        if holds and all(_is_finite(each) for each in (actual, self.expected)):
             RECORDS.equal(_place(2, direct=False), actual, self.expected, self.tolerance)
         return holds
 
