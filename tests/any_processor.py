@@ -46,7 +46,15 @@ SETTINGS: dict[str, dict[str, str]] = {
 }
 MOST_USED, MOVED, MOST_SPREAD = 1.0 / 3.0, 0.01, 0.1
 # Files of linear algebra and time integration that take some four minutes on two cores.
-NUMERICAL = ("test_linear",)
+NUMERICAL = tuple(
+    f"test_{name}"
+    for name in (
+        "andrews beam_frames body_terms closure consistency contacts dwell equilibrium events exact_derivatives examples "
+        "following gears integrator krylov laws_compared laws_inside linear linear_reduced linear_simulated linearise "
+        "loads loads_in_time margins methods optimisation reduced_along reduced_runs regulators rows segments "
+        "sensitivities simulation spectra springs statics stress tangent tracking"
+    ).split()
+)
 
 
 @dataclass
