@@ -100,3 +100,8 @@ def test_every_setting_has_its_turn(monkeypatch):
         monkeypatch.setattr(any_processor.subprocess, "run", lambda *_, number=number, **__: Answer(number))
         found.append(any_processor.setting_of_commit())
     assert found == others
+
+
+def test_numerical_files_are_there():
+    files = {file.stem for file in any_processor.TESTS.glob("test_*.py")}
+    assert {f"test_{name}" for name in any_processor.NUMERICAL} <= files
