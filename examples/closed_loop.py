@@ -3,10 +3,11 @@
 The rigid plan's torques leave the flexible mechanism 0.6 mm off its square. Learning on the simulation takes that away:
 the change of torques that a linear model along the motion finds best for the error of the last run, from run to run.
 What learning does not know, here a payload 20 % too heavy, is left to feedback: an LQG controller at 1 kHz that reads
-encoders and strain gauges, quantised, and whose torques act one sample late, within 20 N m. It estimates a slowly
-varying force at the payload. Its model has 44 states: all vibrations up to 1042 Hz, which sampling folds back. With
-undamped links it needs those up to 2.5 kHz as well, 100 states, and a simulation with steps that are fine enough for
-vibrations that only feedback holds.
+encoders and strain gauges, and whose torques act one sample late, within 20 N m. It estimates a slowly varying force
+at the payload. Its model has 44 states: all vibrations up to 1042 Hz, which sampling folds back. With undamped links it
+needs those up to 2.5 kHz as well, 100 states, and a simulation with steps that are fine enough for vibrations that only
+feedback holds. Readings are exact, then quantised: that adds noise, of which every processor gives another sample, as
+rounding decides between two steps of a reading.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import paraflex as pf
 MODE, PERIOD, PAYLOAD = "++++", 1e-3, 0.1
 MOTORS, TIP = ["tau1", "tau2", "tau5", "tau6"], "link4.C"
 ENCODERS, GAUGES = ["A1", "D1", "A2", "D2"], ["root1", "root3", "root5", "root7"]
+RESOLUTION = {**dict.fromkeys(ENCODERS, 2 * np.pi / 40000), **dict.fromkeys(GAUGES, 1e-6)}
 
 
 class Case(NamedTuple):
@@ -125,12 +127,11 @@ def least_margins(task, design):
     return float(np.min(rows["gain_up"].to_numpy())), float(np.min(rows["samples"].to_numpy()))
 
 
-def feedback(design, read):
+def feedback(design, read, quantise=None):
     """The design as a controller about the learned motion, of which sensors read so much."""
     columns = {name: read[:, k] for k, name in enumerate([*ENCODERS, *GAUGES])}
     return pf.SampledController(
-        design.law(), limits=20.0,
-        quantise={**dict.fromkeys(ENCODERS, 2 * np.pi / 40000), **dict.fromkeys(GAUGES, 1e-6)},
+        design.law(), limits=20.0, quantise=quantise or {},
         reference={name: lambda t, one=one: one[min(round(t / PERIOD), len(one) - 1)] for name, one in columns.items()},
         name="lqg",
     )  # fmt: skip
@@ -162,6 +163,7 @@ def compared(case):
         "rigid torques": [],
         "learned torques": [Learned(torques)],
         "learned and LQG": [Learned(torques), feedback(design, read)],
+        "quantised": [Learned(torques), feedback(design, read, RESOLUTION)],
     }
     plants = {
         name: pf.Simulation(one, mode=MODE, feed_forward=True, options=case.options())

@@ -170,14 +170,14 @@ def _same_word(shown: str, printed: str) -> bool:
     if _NUMBER.sub("#", shown) != _NUMBER.sub("#", printed):
         return False
     pairs = zip(_NUMBER.findall(shown), _NUMBER.findall(printed), strict=True)
-    return all(abs(float(a) - float(b)) <= max(_within(a) * abs(float(a)), 1.01 * _last_digit(a)) for a, b in pairs)
+    return all(abs(float(a) - float(b)) <= max(_within(a) * abs(float(a)), 1.01 * last_digit(a)) for a, b in pairs)
 
 
 def _within(number: str) -> float:
     return COUNTS if number.isdigit() and float(number) > MANY else TOLERANCE
 
 
-def _last_digit(number: str) -> float:
+def last_digit(number: str) -> float:
     """What one more in the last digit of a number is worth, zero for an integer."""
     mantissa, _, exponent = number.lower().partition("e")
     decimals = len(mantissa.partition(".")[2])

@@ -85,6 +85,8 @@ def test_an_empty_cache_is_noticed(tmp_path):
     assert python("-c", look, NUMBA_CACHE_DIR=str(tmp_path)) == "False"
     compile_kernels()
     assert are_compiled()
+    # As Numba keeps them apart, so does the stamp.
+    assert python("-c", look, NUMBA_CPU_NAME="nocona") == "False"
 
 
 def test_what_is_loaded_before_changes_no_bit():

@@ -135,7 +135,7 @@ def test_an_engagement_takes_what_is_left_of_the_nearest_motion(mechanism):
 @pytest.mark.parametrize("mode", ["++++", "+-++"])
 def test_held_motors_stand_still_and_energy_is_accounted_for(geometry, mode):
     task = plan_tracking(PAPER.with_geometry(geometry), SIDE, duration=2.0 * SIDE.duration, samples=201)
-    options = IntegrationOptions(method="esdirk5", tolerance=1e-6)
+    options = IntegrationOptions(method="esdirk5", tolerance=2e-7)
     free, held = (task.simulate(mode, options=options, after=after) for after in ("free", "hold"))
     solution = held.solution
     assert solution.status == "complete"
@@ -160,9 +160,9 @@ def test_held_motors_stand_still_and_energy_is_accounted_for(geometry, mode):
     assert np.ptp(solution.work[after]) < 1e-12
     first = int(np.argmax(after))
     assert abs(balance[first] - balance[first - 1]) < 0.1 * solution.brake_energy
-    # The method damps some of the fast vibration that the blow leaves.
-    assert np.ptp(balance) < 0.3 * solution.brake_energy
-    assert np.ptp(balance) <= 2.0 * solution.energy_balance_max + 1e-12
+    # The method damps some of the fast vibration that the blow leaves: with a fifth of the tolerance a quarter of it.
+    assert np.ptp(balance) < 0.25 * solution.brake_energy
+    assert np.ptp(balance) / solution.energy_balance_max <= 2.0
 
 
 @pytest.mark.parametrize("method", [*(name for name, one in METHODS.items() if isinstance(one, NativeMethod)), "radau"])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
+from pages import last_digit
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import build_system, consistent_state, natural_frequencies
@@ -119,25 +120,36 @@ def test_second_order_spin_up(run):
     assert "the motion diverges" in printed
 
 
+def page_of_control():
+    """Cells of the table of the closed loop on the page, by the name of the row."""
+    page = (EXAMPLES.parent / "docs" / "control.md").read_text(encoding="utf-8")
+    _, _, *rows = page[page.index("| | links damped by 1 %") :].split("\n\n")[0].splitlines()
+    return {row.split("|")[1].strip(): [cell.strip() for cell in row.strip("|").split("|")[1:]] for row in rows}
+
+
 def test_closed_loop(run):
     """What feedback is there for: a payload that learning did not know of. Errors and vibrations in mm."""
     example, every, printed = run("closed_loop")
-    # Learned, fed back, with 20 % more payload (0.1 is asked for); vibration: 28 and 29 dB.
-    limits = {0.01: (0.003, 0.006, 0.083, 0.038), 0.0: (0.007, 0.009, 0.083, 0.034)}
-    for damping, (found, radius, _, _) in every.items():
-        exactly, closely, heavily, quietly = limits[damping]
-        rigid, learned, fed_back = (
-            {name: found[law, name] for name in ("as designed", "20 % more payload")}
-            for law in ("rigid torques", "learned torques", "learned and LQG")
+    page = page_of_control()
+    names = ("as designed", "20 % more payload")
+    for column, (damping, (found, radius, _, _)) in enumerate(every.items()):
+        rigid, learned, fed_back, quantised = (
+            [found[law, name] for name in names] for law in dict.fromkeys(law for law, _ in found)
         )
-        assert rigid["as designed"][0] > 0.6
-        assert learned["as designed"][0] < exactly
-        assert learned["20 % more payload"][0] > 1.0
-        assert fed_back["as designed"][0] < closely
-        assert fed_back["20 % more payload"][0] < heavily
-        assert fed_back["20 % more payload"][1] < quietly * rigid["20 % more payload"][1]
-        assert fed_back["as designed"][1] < 0.081 * rigid["as designed"][1]  # 21.8 dB
-        assert f"{fed_back['20 % more payload'][0]:.4f}, {fed_back['20 % more payload'][1]:.4f}" in printed
+        # With readings that are exact nothing in the loop enlarges rounding: the page has all digits.
+        rows = page["rigid feed-forward"], page["learned torques"], page["learned torques and LQG"]
+        for shown, values in zip(rows, (rigid, learned, fed_back), strict=True):
+            shown = [float(number) for cell in shown[2 * column : 2 * column + 2] for number in cell.split(", ")]
+            assert np.ravel(values) == pytest.approx(np.array(shown), abs=0.6e-4)
+        assert fed_back[1][0] < 0.06 * learned[1][0]
+        assert fed_back[1][1] < 0.04 * rigid[1][1]  # 28 dB
+        # Quantised readings add noise of some 0.005 mm, another sample on every processor; 0.1 mm is asked for with
+        # more payload.
+        for (exact, still), (error, vibration) in zip(fed_back, quantised, strict=True):
+            assert error < exact + 0.02
+            assert vibration < still + 0.03
+        assert quantised[1][0] < 0.1
+        assert f"{fed_back[1][0]:.4f}, {fed_back[1][1]:.4f}" in printed
         assert f"{radius:.4f}" in printed
         # Without damping some vibration beyond 1 kHz grows slowly in some poses.
         assert radius < 0.9953 if damping else 1.0 < radius < 1.0009
@@ -185,7 +197,9 @@ def test_the_table_of_laws_on_the_page_is_what_the_command_gives(laws):
             found = laws[name][mode]
             assert (cell == "–") == (found["status"] != "complete"), (name, mode)
             for text, (metric, factor) in zip(cell.split(", ") if cell != "–" else (), CELL.items(), strict=False):
-                assert factor * found[metric] == pytest.approx(float(text), rel=0.01, abs=1e-6), (name, mode, metric)
+                # The last digit that is shown, or 1 %.
+                room = max(0.01 * float(text), last_digit(text), 1e-6)
+                assert factor * found[metric] == pytest.approx(float(text), abs=room), (name, mode, metric)
 
 
 def test_steps_from_sample_to_sample_are_fine_enough_for_the_laws(laws):

@@ -179,7 +179,8 @@ def test_forces_beyond_mass_and_loads_are_doubted_with_what_may_be_to_blame(tmp_
     model = pf.load(slipped(tmp_path, "lift", "coefficient = 200.0", "coefficient = 2e8"))
     with pytest.warns(pf.ResultWarning, match=r"lift takes .* N .* look at damper\.oil"):
         run = simulate_motion(model.mechanism, 1.0, samples=51)
-    (finding,) = run.doubts
+    # So stiff a damper that rounding decides whether energy balances as well.
+    (finding,) = (one for one in run.doubts if one.code != "energy-unbalanced")
     assert finding.code == "force-large"
     # The oil's force is its coefficient times the speed, 0.1 m/s at most.
     force = float(re.search(r"takes (\S+) N", finding.text)[1])

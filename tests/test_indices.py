@@ -161,5 +161,5 @@ def test_command_line(tmp_path):
     again = paraflex(*asked, "--json")
     assert again.returncode == 0, again.stderr
     (row,) = json.loads(again.stdout)["indices"]
-    # One parameter explains all there is.
-    assert row["total"] == pytest.approx(1.0, abs=0.3)
+    # One parameter explains all there is; the standard error of eight samples is some 0.3.
+    assert row["total"] == pytest.approx(1.0, abs=0.5)

@@ -182,11 +182,11 @@ def test_energy_is_work_under_all_loads(geometry):
         ),
     )
     worst = []
-    for tolerance in (1e-3, 1e-4):
+    for tolerance in (1e-3, 1e-5):
         _, solution = run(mechanism, 0.3, tolerance=tolerance)
         worst.append(solution.energy_balance_max / np.max(solution.kinetic_energy + solution.strain_energy))
-    assert worst[1] < 2e-3
-    assert worst[1] < 0.3 * worst[0]
+    assert worst[1] < 1e-5
+    assert worst[1] < 0.1 * worst[0]
 
 
 def test_a_damped_oscillator_follows_the_closed_form():

@@ -203,7 +203,8 @@ def test_a_jump_is_one_in_any_unit_and_rounding_is_none(scale):
 @pytest.mark.parametrize("method", ["esdirk5", "radau"])
 def test_an_oscillator_under_a_ramp_from_a_linear_table_and_the_same_in_pieces(method):
     springs = (TorsionalSpring("k", "rail", K),)
-    options = IntegrationOptions(method=method, tolerance=1e-8)
+    # Two runs, the steps of which need not be the same: each is within a tenth of what they are compared to.
+    options = IntegrationOptions(method=method, tolerance=1e-9)
     table, pieces = (
         simulate_motion(slider(law, springs=springs), 1.0, samples=41, options=options)
         for law in (TabulatedLaw(*RAMP, "linear"), IN_PIECES)

@@ -107,7 +107,8 @@ def test_index_3_keeps_velocities_too_where_steps_vary(method):
     options = IntegrationOptions(method=method, tolerance=1e-4)
     solution = integrate(problem[0], study.smooth_torque(), problem[1], np.array([study.END]), options=options)
     assert solution.constraint_position_max < 1e-12
-    assert solution.constraint_velocity_max < 1e-9
+    # Projection leaves the square of what it corrects: without it, as with fixed steps, velocities are off by 2e-5.
+    assert solution.constraint_velocity_max < 1e-8
 
 
 def test_automatic_gains_hold_constraints_better_the_smaller_the_step():

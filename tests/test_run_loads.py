@@ -56,7 +56,8 @@ def data(crank):
 def test_a_prescribed_motion_has_its_torque_speed_and_power(crank, data):
     moment = data["joint_moment"].sel(joint="O")
     np.testing.assert_allclose(data["drive_torque"].sel(drive="drive"), moment, rtol=1e-12)
-    np.testing.assert_allclose(data["drive_speed"].sel(drive="drive"), 150.0, rtol=1e-9)
+    # Velocities keep constraints to what the tolerance allows, 1e-7 m in 0.02 s or 5e-6 m/s, on a crank of 0.15 m.
+    np.testing.assert_allclose(data["drive_speed"].sel(drive="drive"), 150.0, rtol=2e-7)
     np.testing.assert_allclose(data["drive_power"], data["drive_torque"] * data["drive_speed"])
     assert data["drive_torque"].attrs["units"] == "N m"
     # It does all the work that is stored or damped by the spring.

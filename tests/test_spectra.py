@@ -26,7 +26,8 @@ def test_tr_bdf2_is_its_two_formulas_in_turn():
     weight = 1.0 / (gamma * (2.0 - gamma))
     end = (weight * middle - (1.0 - gamma) ** 2 * weight) / (1.0 - (1.0 - gamma) / (2.0 - gamma) * z)
     found = spectrum("tr-bdf2", FREQUENCIES)
-    assert found.principal == pytest.approx(end, abs=1e-13)
+    # Rounding, as a step's equations have entries up to its square beside one.
+    assert np.all(np.abs(found.principal - end) < 1e-15 * (4.0 + FREQUENCIES))
     assert np.all(found.radius < 1.0 + 1e-14)
     # L-stable: |R| falls like 1/z.
     assert found.radius[-1] < 10.0 / FREQUENCIES[-1]

@@ -190,7 +190,7 @@ def test_study_goes_on_when_a_mode_cannot_drive(task):
 
 def test_failed_run_is_kept_and_marked(task):
     with pytest.raises(IntegrationError) as caught:
-        simulate(task, "++++", options=IntegrationOptions(tolerance=1e-3, max_steps=100))
+        simulate(task, "++++", options=IntegrationOptions(tolerance=1e-3, max_steps=60))
     data = tracking_dataset([caught.value.partial])
     reached = data["end_effector"].notnull().all("axis")[0].values
     assert 0 < reached.sum() < reached.size

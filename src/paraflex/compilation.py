@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from llvmlite import binding
+from numba.core import config
 
 from paraflex.dynamics import State, build_system, constant_signals, pack_signals
 from paraflex.dynamics.state import check_accelerations
@@ -106,7 +107,7 @@ def _shares(geometries: list[Geometry]) -> list[list[str]]:
 def _stamp(geometry: Geometry) -> Path:
     """A file beside the machine code that names Python and processor, as the folder may be shared."""
     processor = (binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
-    here = repr((sys.version, processor, STATE, PLAIN))
+    here = repr((sys.version, processor, vars(config)["CPU_NAME"], vars(config)["CPU_FEATURES"], STATE, PLAIN))
     return Path(march.cache_path) / f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"
 
 
