@@ -148,7 +148,7 @@ def summary(found: dict[str, dict[str, Any]]) -> dict[str, Any]:
         runs = [(r, name) for name, case in found.items() for r in case["runs"] if r["method"] == method]
         run, case = max(runs, key=lambda pair: (pair[0]["error"] or 0.0) / pair[0]["tolerance"])
         worst[method] = {"case": case, "ratio": run["error"] / run["tolerance"]}
-    lines, ours = list(rows(found)), IntegrationOptions()
+    lines, ours = list(rows(found)), IntegrationOptions(tolerance=1e-5)
     return {
         "number": len(found),
         "failed": sum(line["failed"] for line in lines),

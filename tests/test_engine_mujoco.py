@@ -110,7 +110,8 @@ def test_the_run_tells_how_well_it_went(theirs):
 def test_records_of_both_make_datasets_of_one_shape(ours, theirs):
     a, b = tracking_dataset([ours]), tracking_dataset([theirs])
     assert dict(a.sizes) == dict(b.sizes)
-    assert set(a.data_vars) == set(b.data_vars)
+    # How far forces may be off is known of our own error control alone.
+    assert set(a.data_vars) - {"joint_force_error", "joint_moment_error"} == set(b.data_vars)
     assert b.attrs["method"].startswith("MuJoCo")
     assert np.isnan(b["joint_force"]).all()
     assert float(b["tracking_rms"][0]) == pytest.approx(float(a["tracking_rms"][0]), rel=1e-3)

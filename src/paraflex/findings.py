@@ -14,6 +14,8 @@ from paraflex.errors import ModelWarning, ParaflexWarning, printable, warn_user
 
 # How a run ends that did what was asked.
 DONE_STATUSES = ("complete", "stopped")
+# Forces with larger errors, as a part of their largest values, are not resolved.
+RESOLVED = 0.01
 
 __all__ = ["CODES", "DONE_STATUSES", "Code", "Finding", "Level", "Verdict", "warn_of"]
 

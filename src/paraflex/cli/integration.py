@@ -19,7 +19,6 @@ from paraflex.integrators import (
     IntegrationOptions,
     JointLimit,
     SingularDistance,
-    TolerancePer,
     Treatment,
     check_events,
 )
@@ -176,7 +175,7 @@ def integration_parameters(options: IntegrationOptions, stop_at: Sequence[str]) 
     """How a run was integrated, for provenance."""
     return {
         "tolerance": options.tolerance,
-        "tolerance_per": None if options.tolerance_per is TolerancePer.CYCLE else options.tolerance_per.value,
+        "tolerance_per": options.tolerance_per and options.tolerance_per.value,
         "control": options.control and options.control.value,
         "alpha": options.alpha,
         "beta": options.beta,

@@ -17,7 +17,7 @@ from paraflex.mechanism import AngleLaw, Mechanism, TabulatedLaw
 # Breaks of a prescribed law: its quintic Hermite pieces are this short, as a fraction of the run, and are halved as
 # often as it takes, within these numbers, until their middles are as near to the law, relative to its largest value.
 _LAW_PIECES, _MOST_PIECES, _HALVINGS = 2000, 500_000, 20
-_NEAR_LAW = 1e-10
+_NEAR_LAW, _NEARLY_LAW, _FALLING = 1e-10, 1e-3, 0.25
 _SHORTEST_PIECE = 1e-6
 _DEGREE = 5
 
@@ -133,6 +133,7 @@ def _refined(place: str, law: AngleLaw, t: Array) -> InputSignals:
     a, b = t[0], t[-1]
     # At the ends of a stretch values and derivatives are those within it.
     low, high = max(a + 1e-12 * (b - a), np.nextafter(a, b)), min(b - 1e-12 * (b - a), np.nextafter(b, a))
+    last = np.inf
     for _ in range(_HALVINGS):
         value, rate, acceleration = _evaluate(place, law, np.clip(t, low, high))
         outside = t - np.clip(t, low, high)
@@ -141,9 +142,12 @@ def _refined(place: str, law: AngleLaw, t: Array) -> InputSignals:
         value = _evaluate(place, law, t[:-1] + half)[0]
         powers = half[:, None] ** np.arange(_DEGREE + 1)
         off = np.abs(np.sum(powers * pieces.coefficients, axis=1) - value)
-        coarse = off > _NEAR_LAW * np.max(np.abs(value))
-        if not coarse.any():
+        size, worst = np.max(np.abs(value)), np.max(off)
+        coarse = off > _NEAR_LAW * size
+        # Rounding, and kinks, do not fall with the length of pieces.
+        if worst <= _NEAR_LAW * size or (worst <= _NEARLY_LAW * size and worst > _FALLING * last):
             return pieces
+        last = worst
         t = np.sort(np.append(t, t[:-1][coarse] + half[coarse]))
         if t.size > _MOST_PIECES:
             break

@@ -13,11 +13,11 @@ from paraflex.kernel.packed import Signals
 
 # Below this part of the largest value, or of its derivative by the shortest piece, changes are rounding.
 _SMALL, _ROUNDING = 1e-6, 1e-11
-# Limits are rounded down to powers of this, and one is kept where many pieces have the same.
+# StepLimits are rounded down to powers of this, and one is kept where many pieces have the same.
 _GRADES = 2.0**0.5
 
 
-class Limits(NamedTuple):
+class StepLimits(NamedTuple):
     """Longest steps [s] from some times on; empty where nothing is given that limits them.
 
     Attributes
@@ -32,26 +32,26 @@ class Limits(NamedTuple):
     steps: Array
 
 
-def step_limits(signals: Signals, inputs: Inputs) -> Limits:
-    """Limits of steps by all signals: a radian of them as if they were sines, h^2 |g''| <= max |g| in each piece.
+def step_limits(signals: Signals, inputs: Inputs) -> StepLimits:
+    """StepLimits of steps by all signals: a radian of them as if they were sines, h^2 |g''| <= max |g| in each piece.
 
     g is the signal itself, or of a prescribed motion its acceleration, without what is constant in it.
     """
     looked_at = [(k, 0) for k in (*inputs.motors, *inputs.loads)] + [(k, 2) for k in inputs.prescribed]
     own = [limits for k, order in looked_at if (limits := _limits_of(signals, k, order)).times.size]
     if not own:
-        return Limits(np.zeros(0), np.zeros(0))
+        return StepLimits(np.zeros(0), np.zeros(0))
     times = np.unique(np.concatenate([limits.times for limits in own]))
     steps = np.min([limits.steps[_piece(limits.times, times)] for limits in own], axis=0)
     first = np.append(True, steps[1:] != steps[:-1])
-    return Limits(np.ascontiguousarray(times[first]), np.ascontiguousarray(steps[first]))
+    return StepLimits(np.ascontiguousarray(times[first]), np.ascontiguousarray(steps[first]))
 
 
 def _piece(starts: Array, times: Array) -> NDArray[np.intp]:
     return np.clip(np.searchsorted(starts, times, side="right") - 1, 0, None)
 
 
-def _limits_of(signals: Signals, k: int, order: int) -> Limits:
+def _limits_of(signals: Signals, k: int, order: int) -> StepLimits:
     first, last = int(signals.start[k]), int(signals.start[k + 1]) - 1
     starts, coefficients = signals.breaks[first:last], signals.coefficients[first:last]
     lengths = np.diff(signals.breaks[first : last + 1])
@@ -64,11 +64,11 @@ def _limits_of(signals: Signals, k: int, order: int) -> Limits:
     noise = rounding / shortest ** (order + 2)
     bending = np.maximum(np.max(np.abs(curvature), axis=1) - noise, 0.0)
     if scale == 0.0 or not bending.any():
-        return Limits(np.zeros(0), np.zeros(0))
+        return StepLimits(np.zeros(0), np.zeros(0))
     with np.errstate(divide="ignore"):
         steps = np.sqrt(scale / bending)
         steps = _GRADES ** np.floor(np.log(steps) / np.log(_GRADES))
-    return Limits(starts, steps)
+    return StepLimits(starts, steps)
 
 
 def _derivative(coefficients: Array, order: int, x: Array) -> Array:

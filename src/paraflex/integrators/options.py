@@ -59,14 +59,15 @@ class IntegrationOptions(CheckedFields):
         What local errors within a cycle, or the whole run, may add up to [m] (root mean square over the mass); by
         default 4e-5 of the mechanism's size, or 4e-6 where no body is flexible. With a fixed step it only says how
         exactly Newton's iteration solves.
-    tolerance_per : TolerancePer
+    tolerance_per : TolerancePer, optional
         "cycle" (own methods): the time in which the fastest body so far turns once, or travels 2 pi times the size of
         the mechanism, and no longer than the run. Errors of driven or damped motions then stay as they are, and those
         of undamped ones grow with the number of cycles; the cost grows with the duration alone. "run": the whole run.
+        By default "cycle" with the default tolerance, and "run" with one that is given.
     control : Control, optional
-        "forces": steps are so short that local errors within a cycle change no force of a joint or drive by more than
-        0.25 % of its largest value. "positions": by positions alone. By default "forces" where no body is flexible, as
-        vibrations of undamped beams would then be resolved down to the fastest that bears on a force.
+        "positions", the default: their errors choose the steps. "forces": local errors within a cycle change no force of
+        a joint or drive by more than 0.25 % of its largest value either (ESDIRK methods, steps not fixed). Vibrations
+        of undamped beams and stiff springs are then resolved, down to the fastest that bears on a force.
     method : Method or str
         An object such as `paraflex.methods.GeneralisedAlpha(spectral_radius=0.8)`, or a name in `paraflex.METHODS`,
         which stands for the method with its default parameters.
@@ -109,7 +110,7 @@ class IntegrationOptions(CheckedFields):
     automatic_gains: bool = False
     events: tuple[Event, ...] = ()
     control: Control | None = None
-    tolerance_per: TolerancePer = TolerancePer.CYCLE
+    tolerance_per: TolerancePer | None = None
 
     def __post_init__(self, parameters: Any) -> None:
         super().__post_init__()
@@ -139,12 +140,19 @@ class IntegrationOptions(CheckedFields):
 
     def for_system(self, system: System) -> IntegrationOptions:
         """The same options with the tolerance that they have for a system."""
-        return replace(self, tolerance=self.tolerance_for(system))
+        return replace(self, tolerance=self.tolerance_for(system), tolerance_per=self.per)
+
+    @property
+    def per(self) -> TolerancePer:
+        """Time in which errors may add up to the tolerance: by default a cycle, or the run for one that is given."""
+        if self.tolerance_per is not None:
+            return self.tolerance_per
+        return TolerancePer.CYCLE if self.tolerance is None else TolerancePer.RUN
 
     def force_part(self, system: System) -> float:
-        """Error allowed in forces, as a part of the largest; zero where positions alone choose the steps."""
-        by_forces = self.control is Control.FORCES or (self.control is None and not system.n_flexible)
-        return FORCE_PART if by_forces and self.estimates_forces else 0.0
+        """Error allowed in forces, as a part of the largest; zero where they are not looked at as a step is solved."""
+        looked_at = self.control is Control.FORCES or not system.n_flexible
+        return FORCE_PART if looked_at and self.estimates_forces else 0.0
 
     @property
     def estimates_forces(self) -> bool:
@@ -162,7 +170,7 @@ class IntegrationOptions(CheckedFields):
             "integration_method": self.method.name,
             "method_parameters": json.dumps(self.method.values),
             "constraints_treatment": self.treatment.value,
-            "tolerance_per": self.tolerance_per.value,
+            "tolerance_per": self.per.value,
             "steps": "chosen by their errors" if self.step is None else f"fixed, {self.step:g} s",
             "stop_at": ", ".join(str(event) for event in self.events),
         }

@@ -12,7 +12,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics import State, System, inputs_of
 from paraflex.errors import InputError
 from paraflex.integrators.jumps import hidden_from, jump_times
-from paraflex.integrators.limits import Limits, step_limits
+from paraflex.integrators.limits import StepLimits, step_limits
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import Samples
@@ -39,7 +39,7 @@ class Problem:
         At which steps end; the last is the end of the run [s].
     jumps : (j,) array
         Those of them at which something given jumps: no step may see what follows.
-    limits : Limits
+    limits : StepLimits
         Longest steps that resolve what is given in time.
     asked : (k,) array of bool
         Samples that are kept; others serve to find the largest loads.
@@ -51,7 +51,7 @@ class Problem:
     times: Array
     stops: Array
     jumps: Array
-    limits: Limits
+    limits: StepLimits
     asked: NDArray[np.bool_]
 
     @property

@@ -110,7 +110,7 @@ def filtered_error(system, g, gains, march, work, slow):
 @routine
 def force_error(controls, h, march):
     """What the step's error makes of the multipliers over what is allowed; zero where forces are not controlled."""
-    if controls.force_part == 0.0 or march.counts[NEAR] > 0 or largest(march.forces[PEAK]) == 0.0:
+    if controls.force_control == 0 or march.counts[NEAR] > 0 or largest(march.forces[PEAK]) == 0.0:
         return 0.0
     return largest_part(march.forces[LOCAL], march.forces[PEAK]) / allowed_part(controls, h, march)
 

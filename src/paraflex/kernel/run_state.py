@@ -89,7 +89,9 @@ class Controls(NamedTuple):
     tolerance: float  # [m]
     span: float  # duration of the run [s]
     by_cycle: int  # whether the cycle is that of the motion where that is shorter than the run
-    force_part: float  # error allowed in forces within a cycle, as a part of the largest; zero for no such control
+    force_part: float  # error allowed in forces within a cycle, as a part of the largest; zero where none are looked at
+    force_control: int  # whether steps are chosen by that, too
+    no_change: float  # a change of forces at a sample that is none, as a part of the largest until then
     newton_fraction: float  # of the error allowed in a step, the part left to Newton
     alpha: float
     beta: float

@@ -14,8 +14,19 @@ from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.run_state import SAMPLE, SAMPLE_CHANGE, STAGE_B, STAGE_G, WEIGHT_0, WORK
-from paraflex.kernel.stage import ROUNDING, WORST_CONTRACTION, note_torques, place, residuals
+from paraflex.kernel.run_state import (
+    BAUMGARTE,
+    PEAK,
+    SAMPLE,
+    SAMPLE_CHANGE,
+    STAGE_B,
+    STAGE_G,
+    TRIED,
+    WEIGHT_0,
+    WORK,
+)
+from paraflex.kernel.stage import ROUNDING, WORST_CONTRACTION, largest_part, note_torques, place, residuals
+from paraflex.kernel.step import constraint_weights
 
 # A sample this part of a step before its end is its end.
 SAME_TIME = 1e-9
@@ -85,12 +96,14 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
 def solve_sample(system, signals, controls, i, march, work, out, aside):
     """Solve one sample with the factor of the step, or with a factor made there where that one does not serve."""
     q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
-    g, b = march.clock[STAGE_G], march.clock[STAGE_B]
+    g, b, weights = march.clock[STAGE_G], march.clock[STAGE_B], INDEX_1
+    if controls.treatment == BAUMGARTE:
+        weights, _ = constraint_weights(controls, march.clock[TRIED])
     for j in range(q.size):
         march.qs[j], march.vs[j] = q[j] - b * a[j], v[j] - g * a[j]
         march.eq[j] = a[j]
     copy(lam, march.guess_lam)
-    solved = solve_at(system, signals, out.times[i], g, b, march, work, a, lam, march.torques)
+    solved = solve_at(system, signals, out.times[i], weights, g, b, march, work, a, lam, march.torques)
     if not solved:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
@@ -99,27 +112,30 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
         note_all_axial_forces(system, q, v, a, lam, aside, aside.geometric)
         factor_bodies(system, b, q, aside)
         orient(system, q, aside, controls.dependent_part)
-        solved = solve_at(system, signals, out.times[i], g, b, march, aside, a, lam, march.torques)
+        solved = solve_at(system, signals, out.times[i], weights, g, b, march, aside, a, lam, march.torques)
     if not solved:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
-    change, size = 0.0, 0.0
     for r in range(lam.size):
-        change, size = max(change, abs(lam[r] - march.guess_lam[r])), max(size, abs(lam[r]))
-    march.clock[SAMPLE_CHANGE] = change / size if size > 0.0 else 0.0
+        work.mu[r] = lam[r] - march.guess_lam[r]
+    march.clock[SAMPLE_CHANGE] = largest_part(work.mu, march.forces[PEAK]) if largest(march.forces[PEAK]) > 0.0 else 1.0
+    if march.clock[SAMPLE_CHANGE] <= controls.no_change:
+        copy(march.eq, a)
+        copy(march.guess_lam, lam)
     for j in range(q.size):
         q[j], v[j] = march.qs[j] + b * a[j], march.vs[j] + g * a[j]
 
 
 @routine
-def solve_at(system, signals, t, g, b, march, work, a, lam, torques):
+def solve_at(system, signals, t, weights, g, b, march, work, a, lam, torques):
     """Newton's iteration at a sample, until forces are right to FORCES of the largest; whether it gets there."""
     previous, contraction = 0.0, WORST_CONTRACTION
+    scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     note_torques(signals, t, torques)
     for _ in range(MOST):
         place(march.qs, march.vs, g, b, a, march.shift[:0], work)
-        residuals(system, signals, t, INDEX_1, work.q, work.v, a, lam, torques, work)
-        right_hand_side(system, work, 1.0)
+        residuals(system, signals, t, weights, work.q, work.v, a, lam, torques, work)
+        right_hand_side(system, work, scale)
         solve_system(system, work, work.x, work.mu)
         add(work.x, a)
         add(work.mu, lam)

@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.findings import RESOLVED
 from paraflex.results.numbers import finite_or_none, largest
 from paraflex.units import STRESS, speed_text
-from paraflex.validity.plausibility import RESOLVED
 
 Figures = dict[str, float | str | None]
 # Of the rate of a joint that a torque or a force drives.

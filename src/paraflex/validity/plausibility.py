@@ -14,7 +14,7 @@ from paraflex.dynamics import System, joint_coordinate, missed_turns
 from paraflex.dynamics.joint_loads import drive_torques, load_errors
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
-from paraflex.findings import Finding
+from paraflex.findings import RESOLVED, Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_poses, grouped
@@ -26,9 +26,8 @@ from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, doubtful_numbers, 
 # Energy that is missing or too much, over the largest: the library's runs have up to 3e-4 with the default tolerance.
 # An energy below the second part of weight times size is none.
 UNBALANCED, NO_ENERGY = 1e-3, 1e-9
-# Errors of forces over the largest value of each; loads below the second part of all weight, or of that times the size,
-# or of the largest load, do not matter.
-RESOLVED, _NO_FORCE = 0.01, 1e-3
+# Loads below this part of all weight, or of that times the size, or of the largest load, do not matter.
+_NO_FORCE = 1e-3
 _NAMED = 3
 # Slope of a link in its frame beyond which it is a spring rather than a link [rad].
 STEEP = 0.7
@@ -222,7 +221,7 @@ def _turned_over(system: System, solution: Solution) -> float:
     return float(np.trapezoid(power, solution.t)) if rates else 0.0
 
 
-class _Load(NamedTuple):
+class _UncertainLoad(NamedTuple):
     """A load of a joint or drive: its name, its unit, how far it may be off, and its largest value."""
 
     name: str
@@ -233,7 +232,10 @@ class _Load(NamedTuple):
 
 def _unresolved(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
     """Forces that errors of integration leave uncertain, as of vibrations that are faster than the steps follow."""
-    loads = [] if solution.multiplier_errors is None else list(_loads(system, solution, solution.multiplier_errors))
+    # Where beams vibrate faster than the steps follow, tables have the errors beside the numbers.
+    if solution.multiplier_errors is None or system.n_flexible:
+        return
+    loads = list(_uncertain_loads(system, solution, solution.multiplier_errors))
     weight = system.total_mass * STANDARD_GRAVITY
     least = {
         unit: _NO_FORCE * max([weight * arm, *(one.peak for one in loads if one.unit == unit)])
@@ -246,24 +248,20 @@ def _unresolved(where: _Where, system: System, solution: Solution) -> Iterator[F
     listed = "; ".join(f"the {one.name} by {one.error:.1g} of {one.peak:.3g} {one.unit}" for one in worst)
     text = f"forces may be off by errors of integration: {listed}"
     text += f" and {len(off) - len(worst)} more" if len(off) > len(worst) else ""
-    remedy = "give a smaller tolerance"
-    if system.n_flexible:
-        text += "; vibrations faster than the steps are left out, of stresses too"
-        remedy = f'give beams damping, say damping = {{ ratios = [0.01] }}, choose control = "forces", or {remedy}'
-    yield Finding("forces-unresolved", where.place, text, remedy)
+    yield Finding("forces-unresolved", where.place, text, 'give a smaller tolerance, or control = "forces"')
 
 
-def _loads(system: System, solution: Solution, errors: Array) -> Iterator[_Load]:
+def _uncertain_loads(system: System, solution: Solution, errors: Array) -> Iterator[_UncertainLoad]:
     """Forces and moments of the joints and of the prescribed motions."""
     mechanism, largest = system.mechanism, np.nanmax(np.abs(solution.multipliers), axis=0, initial=0.0)
     names = [joint.name for joint in mechanism.joints]
     off, peak = (load_errors(system, names, each) for each in (errors, largest))
     for k, name in enumerate(names):
-        yield _Load(f"force in {name}", "N", float(off.force[k]), float(peak.force[k]))
-        yield _Load(f"moment in {name}", "N m", float(off.moment[k]), float(peak.moment[k]))
+        yield _UncertainLoad(f"force in {name}", "N", float(off.force[k]), float(peak.force[k]))
+        yield _UncertainLoad(f"moment in {name}", "N m", float(off.moment[k]), float(peak.moment[k]))
     for k, one in enumerate(mechanism.prescribed):
         what, unit = ("force", "N") if mechanism.slides(one.joint) else ("torque", "N m")
-        yield _Load(f"{what} of prescribed.{one.name}", unit, float(off.drive[k]), float(peak.drive[k]))
+        yield _UncertainLoad(f"{what} of prescribed.{one.name}", unit, float(off.drive[k]), float(peak.drive[k]))
 
 
 def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
