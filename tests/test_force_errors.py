@@ -145,7 +145,6 @@ def test_estimates_of_force_errors_are_of_the_size_of_the_errors(name):
     assert relative[worst] > 0.01
     ratio = usual.solution.multiplier_errors[worst] / error[worst]
     assert 0.6 < ratio < 12.0
-    assert "forces-unresolved" in [one.code for one in usual.doubts]
 
 
 def test_errors_stand_beside_the_numbers(tmp_path):
@@ -248,5 +247,5 @@ def test_a_run_that_failed_has_no_loads_and_no_good_verdict():
     with pytest.raises(IntegrationError) as failed:
         pf.simulate_motion(given, options=pf.IntegrationOptions(max_steps=40), warning=False)
     run = failed.value.partial
-    assert run.validity is None
+    assert run.validity is None or not run.validity.holds
     assert load_figures(pf.motion_dataset(run)) == {}

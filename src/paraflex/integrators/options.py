@@ -8,6 +8,8 @@ from dataclasses import InitVar, dataclass, replace
 from enum import Enum
 from typing import Any
 
+import numpy as np
+
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.dynamics import System
 from paraflex.errors import InputError, as_enum
@@ -65,8 +67,8 @@ class IntegrationOptions(CheckedFields):
         of undamped ones grow with the number of cycles; the cost grows with the duration alone. "run": the whole run.
         By default "cycle" with the default tolerance, and "run" with one that is given.
     control : Control, optional
-        "positions", the default: their errors choose the steps. "forces": local errors within a cycle change no force of
-        a joint or drive by more than 0.25 % of its largest value either (ESDIRK methods, steps not fixed). Vibrations
+        "positions", the default: their errors choose the steps. "forces": local errors within a cycle change no force
+        of a joint or drive by more than 0.25 % of its largest value either (ESDIRK methods, steps not fixed). Vibrations
         of undamped beams and stiff springs are then resolved, down to the fastest that bears on a force.
     method : Method or str
         An object such as `paraflex.methods.GeneralisedAlpha(spectral_radius=0.8)`, or a name in `paraflex.METHODS`,
@@ -136,7 +138,7 @@ class IntegrationOptions(CheckedFields):
         """The tolerance [m], by default relative to the size of a system."""
         if self.tolerance is not None:
             return self.tolerance
-        return system.size * (RELATIVE_TOLERANCE if system.n_flexible else RELATIVE_TOLERANCE_RIGID)
+        return _whole_size(system) * (RELATIVE_TOLERANCE if system.n_flexible else RELATIVE_TOLERANCE_RIGID)
 
     def for_system(self, system: System) -> IntegrationOptions:
         """The same options with the tolerance that they have for a system."""
@@ -200,6 +202,16 @@ class IntegrationOptions(CheckedFields):
                 f"{self.treatment.value} has no Baumgarte coefficients", field="automatic_gains", value=True,
                 remedy="choose constraints = baumgarte",
             )  # fmt: skip
+
+
+def _whole_size(system: System) -> float:
+    """Size of a system [m], of beams in several frames with their whole lengths."""
+    if system.described is system.mechanism:
+        return system.size
+    parts = [[system.body(part).mesh for part in system.parts(body.name)] for body in system.described.bodies]
+    lengths = [sum(float(np.real(one.nodes[-1] - one.nodes[0])) for one in each if one is not None) for each in parts]
+    longest = max(lengths, default=0.0)
+    return max(system.size, 2.0 ** round(math.log2(longest))) if longest > 0.0 else system.size
 
 
 def loose_tolerance(tolerance: float, size: float) -> Finding | None:
