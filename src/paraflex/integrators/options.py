@@ -68,8 +68,8 @@ class IntegrationOptions(CheckedFields):
         By default "cycle" with the default tolerance, and "run" with one that is given.
     control : Control, optional
         "positions", the default: their errors choose the steps. "forces": local errors within a cycle change no force
-        of a joint or drive by more than 0.25 % of its largest value either (ESDIRK methods, steps not fixed). Vibrations
-        of undamped beams and stiff springs are then resolved, down to the fastest that bears on a force.
+        of a joint or drive by more than 0.25 % of its largest value either (ESDIRK methods, steps not fixed).
+        Vibrations of undamped beams and stiff springs are then resolved, down to the fastest that bears on a force.
     method : Method or str
         An object such as `paraflex.methods.GeneralisedAlpha(spectral_radius=0.8)`, or a name in `paraflex.METHODS`,
         which stands for the method with its default parameters.

@@ -31,7 +31,7 @@ from paraflex.kernel.step import constraint_weights
 # A sample this part of a step before its end is its end.
 SAME_TIME = 1e-9
 # Forces at a sample are solved to this part of the largest, in so many iterations at most.
-FORCES, MOST = 1e-4, 8
+FORCES, MOST = 1e-6, 12
 # And between samples that are kept, interpolated ones may be off by this part.
 FORCES_BETWEEN = 2e-2
 
