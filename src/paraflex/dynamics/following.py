@@ -52,7 +52,9 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> tuple
         Limit of reach that bars the way; empty for none.
     """
     away, limit = _away(system, signals, t, q), ""
-    if system.gap(away) <= _NEAR:
+    joints = [one.joint for one in system.mechanism.prescribed]
+    # Motions of one joint that disagree are at no pose.
+    if system.gap(away) <= _NEAR or len(set(joints)) < len(joints):
         return q, limit
     for begun in (_turned(system, signals, t, q, away), q):
         found, limit = _follow(system, signals, t, begun)

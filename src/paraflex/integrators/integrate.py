@@ -44,7 +44,7 @@ _SLICE = 200
 _WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
 # Rows this close to depending on each other when a run breaks down are the cause.
 _NEARLY_DEPENDENT = 1e-4
-# And this close where steps become too small at a drive's limit of reach.
+# And this close at a drive's limit of reach.
 _NEAR = 2e-3
 _PASSING_METHODS = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
 _AROUND = "start or drive the mechanism so that it does not get there"
@@ -302,8 +302,8 @@ class Integration:
         now = run.now()
         # Near a singular position it may be Newton or the error test that gives up first.
         stopped = code != PAUSED and self._broken is None
-        lost = dependence(system, now.q, _NEARLY_DEPENDENT if stopped else _NEAR)
-        drives = "" if self._drifts or lost.dropped.size <= run.dependent_rows else barred_drives(system, now.q, lost)
+        lost, near = (dependence(system, now.q, part) for part in (_NEARLY_DEPENDENT, _NEAR))
+        drives = "" if self._drifts or near.dropped.size <= run.dependent_rows else barred_drives(system, now.q, near)
         error = ConstraintDriftError if self._drifts else IntegrationError
         if drives:
             error, cause = SingularPositionError, f"the constraints lose rank at the limit of reach, {drives},"

@@ -157,7 +157,7 @@ def _efforts(efforts: Mapping[str, Mapping[str, Any]]) -> str:
 
 def _joints(figures: Mapping[str, Any]) -> str:
     """A table of the joints that turn and one of those that slide: angles and travels are not in one column."""
-    joints = figures["joints"]
+    joints = figures.get("joints", {})
     wide = {key: max((one[key] or 0.0 for one in joints.values()), default=0.0) for key in ("force_max", "moment_max")}
     out = ""
     for unit, what in (("rad", "Joints that turn"), ("m", "Joints that slide")):

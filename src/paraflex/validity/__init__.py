@@ -92,7 +92,7 @@ def assess(system: System, solution: Solution, following: Following | None = Non
     bodies = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
     linear, second = [one for one in bodies if one.linear], [one for one in bodies if not one.linear]
     indicators = [*of_linear(linear, solution, following), *of_second_order(second, solution)]
-    if not solution.method:
+    if not (solution.method or solution.resting):
         # Kineto-elastodynamics is linear in the displacements whatever the geometry.
         indicators = [replace(one, remedy="run it without --ked, in second-order geometry") for one in indicators]
     found = Validity(tuple(indicators)) if indicators else None
