@@ -110,7 +110,8 @@ def test_stiff_axial_mode_does_not_dictate_the_step():
         )
         return run(system, state, 0.1, tolerance=1e-5).steps
 
-    assert steps(1000.0) < 1.1 * steps(1.0)
+    # If it did, steps would be thirty times as many.
+    assert steps(1000.0) < 2.0 * steps(1.0)
 
 
 def test_free_pendulum_keeps_its_energy():
