@@ -10,7 +10,7 @@ from rich.console import Console
 
 from paraflex.cli.tables import plain_table, print_titled
 from paraflex.results.statics_data import statics_summary
-from paraflex.results.statics_rows import buckling_words, four_digits, is_stressed, last_rows, step_table
+from paraflex.results.statics_rows import buckling_words, four_digits, is_stressed, last_rows, no_buckling, step_table
 from paraflex.units import STRESS
 
 
@@ -40,6 +40,8 @@ def _lines(data: xr.Dataset, summary: dict) -> list[str]:
         lines.append("frequencies: " + ", ".join(map(four_digits, frequencies)) + " Hz, what is held and moved kept")
     if words := buckling_words(data):
         lines.append(f"buckling at {words}")
+    elif words := no_buckling(data):
+        lines.append(words)
     if is_stressed(data):
         body = int(np.nanargmax(data["stress_max"].values))
         one = data.isel(body=body)

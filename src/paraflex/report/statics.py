@@ -28,6 +28,7 @@ from paraflex.results.statics_rows import (
     given_coordinates,
     is_stressed,
     last_rows,
+    no_buckling,
     quantity_word,
     shown_unit,
     step_table,
@@ -71,7 +72,7 @@ def statics_page(data: xr.Dataset) -> Page:
             *([] if summary["status"] == "complete" else [f"{summary['status']}: {summary['message']}"]),
             *doubt_lines(verdict_of(data)),
         ],
-        remarks=list(filter(None, [validity_line({"": summary["validity"]})])),
+        remarks=list(filter(None, [validity_line({"": summary["validity"]}), no_buckling(data)])),
     )
 
 

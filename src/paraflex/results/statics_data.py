@@ -46,6 +46,7 @@ UNITS = {
     "compliance": ("displacement by a unit force at a named coordinate", ""),
     "natural_frequency": ("undamped natural frequency about the equilibrium", "Hz"),
     "buckling_factor": ("fraction of all that is given at which the mechanism buckles", "1"),
+    "buckling_note": ("why a step has no factor of buckling; empty where it has one, or nothing buckles", "1"),
     "buckling_shape": ("displacement of drawn points as it buckles, the largest is 1", "1"),
     "stress_step": ("step at which a beam's stress is largest", "1"),
 }
@@ -58,7 +59,8 @@ _COMMENTS = {
     "effort": "on the mechanism along the coordinate: of a joint on its second body",
     "stiffness": "others are held and moved as they are, the coordinate itself set free; infinite where it cannot move",
     "natural_frequency": "zero of a motion that grows; what is held and moved stays",
-    "buckling_factor": "from the stiffness about the equilibrium and its change along the branch; NaN where none is",
+    "buckling_factor": "that of the limit point to which stable steps lead, else a linear estimate from the stiffness "
+    "and its change along the branch; NaN where none is, see buckling_note",
 }
 
 
@@ -138,6 +140,7 @@ def _of_steps(found: Statics) -> dict[str, Any]:
         "compliance": (*along, compliance),
         "natural_frequency": (("step", "frequency_number"), found.frequencies[:, :_FREQUENCIES] / (2.0 * np.pi)),
         "buckling_factor": (("step", "buckling_number"), found.buckling),
+        "buckling_note": ("step", [one.buckling.reason for one in found.equilibria]),
         **_buckling_shapes(found),
         **_given_travel(found),
         **_motors(found),

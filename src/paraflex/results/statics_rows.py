@@ -21,6 +21,8 @@ GIVEN = ("moved", "loaded")
 _NO_STRESS = 1.0
 # Stiffnesses that differ by more are drawn on a logarithmic axis.
 _SPREAD = 30.0
+# Factors of buckling that differ by less are the same.
+_SAME = 0.01
 # Quantities of a coordinate, and the word of each in a table.
 _LAST = ("travel", "effort", "stiffness", "compliance")
 
@@ -75,7 +77,15 @@ def buckling_words(data: xr.Dataset) -> str:
     seen = [f"{factors[0, 0]:.4g} of what is given, as seen from the start"]
     if data.sizes["step"] > 1 and np.isfinite(factors[-1, 0]):
         seen.append(f"{factors[-1, 0]:.4g} as seen from the last step")
+        if abs(factors[-1, 0] / factors[0, 0] - 1.0) > _SAME:
+            seen[-1] += ": linear estimates, which change along the branch"
     return ", ".join(seen)
+
+
+def no_buckling(data: xr.Dataset) -> str:
+    """Why no factor of buckling is known at the start, in words; empty if one is, or nothing buckles."""
+    reason = str(data["buckling_note"].values[0]) if "buckling_note" in data else ""
+    return f"no factor of buckling: {reason}" if reason and (data["role"] == "loaded").any() else ""
 
 
 def is_stressed(data: xr.Dataset) -> bool:
