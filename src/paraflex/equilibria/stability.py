@@ -20,14 +20,14 @@ from paraflex.equilibria.given import Coordinate
 _MOVE, _FRACTION = 1e-4, 1e-2
 # Of an eigenvalue that belongs to no buckling: load stiffness as a part of the stiffness.
 _NOTHING = 1e-9
-# The imaginary part of a real eigenvalue, as a part of it.
-_COMPLEX = 1e-6
 # Shapes beside those asked for, of buckling and of vibrations, and what is left of one that follows from others.
 _MORE, _ALIKE = 3, 1e-12
 # Places and turns of links give way before links bend or stretch: what they cost, as a part of typical energies.
 _RIGID_FIRST = 1e-6
 # Links turn by no more until the fraction at which something buckles by a linear estimate [rad].
 _MOST_TURN = 2.0 * np.pi
+# Of more coordinates dense matrices take minutes.
+_MOST_COORDINATES = 2000
 
 
 class Vibrations(NamedTuple):
@@ -90,96 +90,43 @@ def vibrations(equations: Equations, found: Matrices) -> Vibrations:
     return Vibrations(squares, basis @ shapes, True)
 
 
-def _eigenpairs(a: Array, b: Array) -> tuple[Array, Array]:
-    """Real eigenvalues (k,), descending, and vectors (m, k) of a x = value b x with symmetric matrices."""
-    try:
-        values, vectors = scipy.linalg.eigh(a, b)
-    except np.linalg.LinAlgError:  # b is not positive definite: something moves freely
-        found, vectors = (np.asarray(part, dtype=complex) for part in scipy.linalg.eig(a, b))
-        real = np.isfinite(found) & (np.abs(found.imag) <= _COMPLEX * np.abs(found))
-        values, vectors = found.real[real], vectors.real[:, real]
-    order = np.argsort(-values)
-    return values[order], vectors[:, order]
-
-
-def _symmetric(matrix: csr_matrix) -> csr_matrix:
-    return csr_matrix(0.5 * (matrix + matrix.T))
-
-
 def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vibrations, count: int) -> Buckling:
     """Factors of buckling about an equilibrium: fractions s' with a singular K + (s' - s) dK/ds.
 
-    The derivative is along the branch, of the stiffness in displacements that follow the deflection with the least
-    change of elastic energy. It is taken among soft displacements alone: where links turn, those that stretch them
-    couple to those that bend them by their full stiffness. To first order that looks like a loss of stiffness, and
-    terms of second order cancel it.
+    The derivative is along the branch, in displacements that follow the deflection with the least change of elastic
+    energy, and among soft ones alone. Where links turn, displacements that stretch them couple to those that bend them
+    by the full stiffness: to first order a loss of stiffness, which terms of second order cancel.
     """
-    n = equations.system.n
-    factors, shapes = np.full(count, np.nan), np.full((n, count), np.nan)
-    none = Buckling(factors, shapes, "")
-    if not count or not vibration.squares.size:
-        return none
-    if point.limit or abs(point.tangent.s) < _NOTHING:
+    factors, shapes = np.full(count, np.nan), np.full((equations.system.n, count), np.nan)
+    along, squares = point.tangent, vibration.squares
+    if not count or not squares.size:
+        return Buckling(factors, shapes, "")
+    if point.limit or abs(along.s) < _NOTHING:
         factors[0], shapes[:, 0] = point.at.s, _largest_one(equations, vibration.shapes[:, :1])[:, 0]
-        return none
-    if not vibration.stable:
-        return none._replace(reason="the equilibrium is unstable")
-    soft = _soft(equations, point, found, vibration, count)
-    along = point.tangent
+        return Buckling(factors, shapes, "")
+    if squares[0] <= 0.0 or equations.system.n > _MOST_COORDINATES:
+        reason = f"more than {_MOST_COORDINATES} coordinates" if squares[0] > 0.0 else "the equilibrium is not stable"
+        return Buckling(factors, shapes, reason)
+    soft = _soft(equations, point, found, vibration, count + _MORE)
     reach = float(np.max(np.abs(along.q / equations.scale)))
     step = min(_FRACTION / abs(along.s), _MOVE / max(reach, 1e-300)) * np.sign(along.s)
     ahead, behind = (_reduced(equations, point.at.plus(along, side * step), soft) for side in (1.0, -1.0))
-    change = (ahead - behind) / (2.0 * step * along.s)
-    inverse, vectors = _eigenpairs(-0.5 * (change + change.T), soft.T @ (_symmetric(found.stiffness) @ soft))
-    known = inverse > _NOTHING * max(1.0, float(np.max(np.abs(inverse), initial=0.0)))
-    near = known & (_turn(equations, along) < _MOST_TURN * inverse)
-    which = np.flatnonzero(near)[:count]
+    inverse, vectors = _softened((ahead - behind) / (2.0 * step * along.s), soft.T @ (found.stiffness @ soft))
+    q = along.q / along.s
+    turn = max(abs(q[body.angle]) for body in equations.system.bodies)
+    turn += float(np.max(np.abs(equations.system.slope_rows @ q), initial=0.0))
+    known = inverse > _NOTHING * max(1.0, *np.abs(inverse))
+    which = np.flatnonzero(known & (_MOST_TURN * inverse > turn))[:count]
     factors[: which.size] = point.at.s + 1.0 / inverse[which]
     shapes[:, : which.size] = _largest_one(equations, soft @ vectors[:, which])
-    far = "links would turn by more than a full turn before anything buckles by this estimate"
-    return none._replace(reason=far if known.any() and not which.size else "")
+    far = "links would turn by more than a full turn before anything buckles by the linear estimate"
+    return Buckling(factors, shapes, far if known.any() and not which.size else "")
 
 
-def checked(found: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> list[Buckling]:
-    """So many factors of equilibria in the order of their branch, less what the branch itself contradicts.
-
-    Where stable equilibria lead to a limit point the first factor is that of the limit point.
-    """
-    return [_checked(found[k:], count) for k in range(len(found))]
-
-
-def _checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> Buckling:
-    """The factors of the first of some equilibria along the branch; see `checked`."""
-    (point, vibration, own), none = ahead[0], np.full(count, np.nan)
-    first = own._replace(factors=own.factors[:count], shapes=own.shapes[:, :count])
-    if not count or point.limit or not vibration.stable:
-        return first
-    reached, lost = point.at.s, np.inf
-    for there, moving, that in ahead[1:]:
-        if there.at.s <= reached:
-            break
-        # One square is zero at a limit point; where another is negative the branch has lost its stability before.
-        if there.limit and np.all(moving.squares[1:2] > abs(moving.squares[0])):
-            return Buckling(np.append(there.at.s, none[1:]), that.shapes[:, :count], "")
-        if there.limit or not moving.stable:
-            lost = there.at.s
-            break
-        reached = there.at.s
-    kept = np.flatnonzero(own.factors > reached)[:count]
-    if np.isfinite(lost) and not np.any(own.factors[kept[:1]] <= lost):
-        reason = f"stability is lost between {reached:.4g} and {lost:.4g} of what is given: more steps tell where"
-        return Buckling(none, np.full_like(first.shapes, np.nan), reason)
-    factors, shapes = none, np.full_like(first.shapes, np.nan)
-    factors[: kept.size], shapes[:, : kept.size] = own.factors[kept], own.shapes[:, kept]
-    passed = f"the branch is stable up to {reached:.4g} of what is given, beyond the linear estimate"
-    return Buckling(factors, shapes, passed if not kept.size and np.isfinite(own.factors[:1]).any() else own.reason)
-
-
-def _turn(equations: Equations, along: Unknowns) -> float:
-    """The largest rate at which a link turns or bends as the fraction of what is given grows [rad]."""
-    system, q = equations.system, along.q / along.s
-    turns = [abs(q[body.angle]) for body in system.bodies]
-    return float(max(turns, default=0.0) + np.max(np.abs(system.slope_rows @ q), initial=0.0))
+def _softened(change: Array, stiffness: Array) -> tuple[Array, Array]:
+    """Loss of stiffness over stiffness (m,), descending, and shapes (m, m)."""
+    values, vectors = scipy.linalg.eigh(-0.5 * (change + change.T), 0.5 * (stiffness + stiffness.T))
+    return values[::-1], vectors[:, ::-1]
 
 
 def _soft(equations: Equations, point: Point, found: Matrices, vibration: Vibrations, count: int) -> Array:
@@ -188,35 +135,18 @@ def _soft(equations: Equations, point: Point, found: Matrices, vibration: Vibrat
     Shapes in which it buckles by the change of forces alone, all places kept; the way along the branch, in which it
     does at a limit point; and shapes of its slowest vibrations.
     """
-    along, K, more = point.tangent, _symmetric(found.stiffness), count + _MORE
+    along, K = point.tangent, found.stiffness
     forces = Unknowns(np.zeros_like(along.q), along.mu / along.s, 1.0)
-    change = _symmetric(csr_matrix(equations.matrices(point.at.plus(forces)).stiffness - found.stiffness))
-    if vibration.complete:
-        basis = vibration.shapes
-        inverse, vectors = _eigenpairs(-basis.T @ (change @ basis), np.diag(vibration.squares))
-        vectors = basis @ vectors
-    else:
-        inverse, vectors = _largest_pairs(-change, K, found.rows, more)
-    kept = np.flatnonzero(inverse > _NOTHING)[:more]
-    shapes = np.column_stack([vectors[:, kept], along.q, vibration.shapes[:, :more]]) / equations.scale[:, None]
+    change = equations.matrices(point.at.plus(forces)).stiffness - K
+    elastic = equations.elastic
+    basis = vibration.shapes if vibration.complete else admissible(found.rows, elastic, vibration.squares[0])
+    inverse, vectors = _softened(basis.T @ (change @ basis), basis.T @ (K @ basis))
+    stressed = basis @ vectors[:, np.flatnonzero(inverse > _NOTHING)[:count]]
+    shapes = np.column_stack([stressed, along.q, vibration.shapes[:, :count]]) / equations.scale[:, None]
     sizes = np.linalg.norm(shapes, axis=0)
     shapes = shapes[:, sizes > 0.0] / sizes[sizes > 0.0]
     size, directions = np.linalg.eigh(shapes.T @ shapes)
     return equations.scale[:, None] * (shapes @ directions[:, size > _ALIKE])
-
-
-def _largest_pairs(a: csr_matrix, b: csr_matrix, rows: csr_matrix, count: int) -> tuple[Array, Array]:
-    """The largest eigenvalues, descending, and vectors (n, k) of a x = value b x where rows (m, n) allow x."""
-    n, solver = a.shape[0], Saddle(b, rows)
-    inverse = scipy.sparse.linalg.LinearOperator((n, n), lambda x: solver.solve(x.ravel())[0], dtype=np.dtype(float))
-    start = inverse.matvec(a @ np.random.default_rng(0).standard_normal(n))
-    if not np.any(start):
-        return np.zeros(0), np.zeros((n, 0))
-    try:
-        values, vectors = scipy.sparse.linalg.eigsh(a, k=count, M=b, Minv=inverse, which="LA", v0=start)
-    except scipy.sparse.linalg.ArpackNoConvergence as error:
-        values, vectors = error.eigenvalues, error.eigenvectors
-    return values[::-1], vectors[:, ::-1]
 
 
 def _reduced(equations: Equations, at: Unknowns, shapes: Array) -> Array:
@@ -230,6 +160,32 @@ def _reduced(equations: Equations, at: Unknowns, shapes: Array) -> Array:
     nearest = Saddle(csr_matrix(scipy.sparse.diags(weight)), found.rows)
     moved = shapes - np.column_stack([nearest.solve(0.0, found.rows @ shape)[0] for shape in shapes.T])
     return moved.T @ (found.stiffness @ moved)
+
+
+def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> Buckling:
+    """Factors of the first of some equilibria along their branch, less what the others contradict.
+
+    Where stable equilibria lead to a limit point it is that of the limit point.
+    """
+    point, vibration, own = ahead[0]
+    reached, lost = point.at.s, np.inf
+    for there, moving, that in ahead[1:] if vibration.stable and not point.limit else ():
+        if there.at.s <= reached:
+            break
+        # One square is zero at a limit point; where another is negative the branch has lost its stability before.
+        if there.limit and np.all(moving.squares[1:2] > abs(moving.squares[0])):
+            return Buckling(that.factors[:count], that.shapes[:, :count], "")
+        if there.limit or not moving.stable:
+            lost = there.at.s
+            break
+        reached = there.at.s
+    kept = [k for k, factor in enumerate(own.factors) if factor > reached or reached == point.at.s]
+    reason = own.reason
+    if np.isfinite(own.factors[:1]).any() and not np.any(own.factors[kept[:1]] <= lost):
+        kept, reason = [], f"the branch contradicts the linear estimate: stable up to {reached:.4g} of what is given"
+    parts = (np.append(own.factors[kept], np.full(count, np.nan)), np.pad(own.shapes[:, kept], ((0, 0), (0, count)),
+                                                                        constant_values=np.nan))  # fmt: skip
+    return Buckling(parts[0][:count], parts[1][:, :count], reason)
 
 
 def _largest_one(equations: Equations, shapes: Array) -> Array:

@@ -139,8 +139,8 @@ def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibri
 
 def _checked(found: list[Equilibrium], beyond: list[Equilibrium], asked: StaticsDefaults) -> tuple[Equilibrium, ...]:
     """The equilibria with factors of buckling that the branch does not contradict, there and beyond."""
-    seen = checked([(one.point, one.vibrations, one.buckling) for one in (*found, *beyond)], asked.buckling)
-    return tuple(replace(one, buckling=own) for one, own in zip(found, seen, strict=False))
+    seen = [(one.point, one.vibrations, one.buckling) for one in (*found, *beyond)]
+    return tuple(replace(one, buckling=checked(seen[k:], asked.buckling)) for k, one in enumerate(found))
 
 
 def _limit_beyond(branch: Branch, last: Equilibrium, asked: StaticsDefaults) -> list[Equilibrium]:
