@@ -32,7 +32,8 @@ class Equilibrium:
     Attributes
     ----------
     point : Point
-    vibrations : Vibrations
+    vibrations, free : Vibrations
+        What is held and moved kept; what is moved let go under the force that moves it.
     buckling : Buckling
     stiffness : (directions,) array
         [N/m, N m/rad]
@@ -40,6 +41,7 @@ class Equilibrium:
 
     point: Point
     vibrations: Vibrations
+    free: Vibrations
     buckling: Buckling
     stiffness: Array
 
@@ -108,8 +110,16 @@ class Statics(Shown):
 
     @property
     def frequencies(self) -> Array:
-        """Natural frequencies (k, f), zero of motions that grow, NaN where there are fewer [rad/s]."""
+        """Natural frequencies (k, f), zero of motions that grow, NaN where there are fewer [rad/s].
+
+        What is held and moved stays; see `free_frequencies`.
+        """
         return self.within_rows([np.sqrt(np.maximum(one.vibrations.squares, 0.0)) for one in self.equilibria])
+
+    @property
+    def free_frequencies(self) -> Array:
+        """The same (k, f) with what is moved let go, under the force that moved it there [rad/s]."""
+        return self.within_rows([np.sqrt(np.maximum(one.free.squares, 0.0)) for one in self.equilibria])
 
     @staticmethod
     def within_rows(rows: Sequence[Array]) -> Array:

@@ -130,9 +130,11 @@ def _followed(
 
 def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibrium:
     found = equations.matrices(point.at)
-    vibration = vibrations(equations, found)
+    vibration, moved = vibrations(equations, found), len(equations.given.moved)
+    # Rows of what is moved are the last.
+    free = vibrations(equations, found._replace(rows=found.rows[: found.rows.shape[0] - moved])) if moved else vibration
     return Equilibrium(
-        point, vibration, buckling_about(equations, point, found, vibration, buckling and buckling + _SPARE),
+        point, vibration, free, buckling_about(equations, point, found, vibration, buckling and buckling + _SPARE),
         stiffness_at(equations, point.at, found, equations.given.measured),
     )  # fmt: skip
 

@@ -28,6 +28,7 @@ from paraflex.results.statics_rows import (
     given_coordinates,
     is_stressed,
     last_rows,
+    lowest_frequencies,
     no_buckling,
     quantity_word,
     shown_unit,
@@ -134,10 +135,10 @@ def _tiles(data: xr.Dataset, summary: dict[str, Any]) -> list[tuple[str, str, st
         one = data.isel(named=k)
         before = f"{_shown(one, 'stiffness', 0)} at the start" if data.sizes["step"] > 1 else ""
         tiles.append((f"stiffness of {text_symbol(str(one['named'].item()))}", _shown(one, "stiffness", -1), before))
-    frequencies = data["natural_frequency"].values
-    if frequencies.size and np.isfinite(frequencies[-1, 0]):
-        before = f"{frequencies[0, 0]:.4g} Hz at the start" if len(frequencies) > 1 else ""
-        tiles.append(("lowest frequency", f"{frequencies[-1, 0]:.4g} Hz", before))
+    for name, word in lowest_frequencies(data).items():
+        lowest = data[name].values[:, 0]
+        before = f"{lowest[0]:.4g} Hz at the start" if len(lowest) > 1 else ""
+        tiles.append((f"{'lowest' if word == 'lowest' else f'lowest {word}'} frequency", f"{lowest[-1]:.4g} Hz", before))
     if words := buckling_words(data):
         factor, _, rest = words.partition(" of what")
         tiles.append(("buckling", f"{factor} ×", f"of what{rest}"))
@@ -181,7 +182,7 @@ def _step_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
     found = step_table(data)
     heads = [("", ""), *((name, f"[{unit}]" if unit else "") for name, unit in found.heads)]
     rows = [(kind, [cell.replace("nan", NO_VALUE).replace("-", "−") for cell in cells]) for kind, *cells in found.rows]
-    note = "Frequencies are those of small vibrations about each equilibrium, what is held and moved kept."
+    note = "Frequencies are those of small vibrations about each equilibrium, what is held and moved kept; free: what is moved let go."
     yield found.title, table(heads, rows, caption="Steps", note=note)
 
 

@@ -338,6 +338,8 @@ _ALL = (
                 lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, judged=True),
     _of_statics("frequency", "lowest natural frequency at the last step, what is held and moved kept", "Hz",
                 lambda x: x.frequency[-1], "lowest natural frequency at the last step"),
+    _of_statics("frequency_free", "lowest natural frequency at the last step, what is moved let go", "Hz",
+                lambda x: x.free_frequency[-1], "lowest free frequency at the last step"),
     _of_statics("frequency_min", "lowest natural frequency of all steps; zero where a motion grows", "Hz",
                 lambda x: np.min(x.frequency), "lowest natural frequency"),
     _of_statics("buckling_factor", "fraction of what is given at which it buckles, seen from the start; NaN for none",

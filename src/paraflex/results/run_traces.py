@@ -216,7 +216,15 @@ class StaticsTraces(SolutionTraces[Statics]):
     @property
     def frequency(self) -> Trace:
         """Lowest natural frequency (k,) [Hz]; NaN where nothing can move."""
-        found = self.run.frequencies
+        return self._lowest(self.run.frequencies)
+
+    @property
+    def free_frequency(self) -> Trace:
+        """The same (k,) with what is moved let go [Hz]."""
+        return self._lowest(self.run.free_frequencies)
+
+    @staticmethod
+    def _lowest(found: Trace) -> Trace:
         return found[:, 0] / (2.0 * np.pi) if found.shape[1] else np.full(len(found), np.nan)
 
     @property

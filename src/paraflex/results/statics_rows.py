@@ -51,14 +51,21 @@ def step_table(data: xr.Dataset) -> StepTable:
                 name = str(one["named"].item()) if quantity == "travel" else quantity_word(one, quantity)
                 heads.append((name, shown.name))
                 columns.append([four_digits(shown.factor * x) for x in values])
-    if data.sizes["frequency_number"]:
-        heads.append(("lowest", "Hz"))
-        columns.append([four_digits(x) for x in data["natural_frequency"].values[:, 0]])
+    for name, word in lowest_frequencies(data).items():
+        heads.append((word, "Hz"))
+        columns.append([four_digits(x) for x in data[name].values[:, 0]])
     kinds = step_kinds(data)
     steps = range(data.sizes["step"])
     every = math.ceil(len(steps) / _ROWS)
     kept = [k for k in steps if k % every == 0 or k == steps[-1] or kinds[k] == "limit point"]
     return StepTable(heads, [[kinds[k], *(column[k] for column in columns)] for k in kept], len(steps))
+
+
+def lowest_frequencies(data: xr.Dataset) -> dict[str, str]:
+    """Variables of natural frequencies and what tells them apart: "held" and "free" where something is moved."""
+    words = {"natural_frequency": "held", "free_frequency": "free"}
+    words = words if (data["role"] == "moved").any() else {"natural_frequency": "lowest"}
+    return {name: word for name, word in words.items() if np.isfinite(data[name].values[:, :1]).any()}
 
 
 def last_rows(data: xr.Dataset) -> Iterator[list[str]]:
