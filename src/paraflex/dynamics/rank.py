@@ -21,7 +21,7 @@ _DEPENDENT_SQUARED = 1e-12
 # Up to so many rows a dense factorisation with pivots is as fast as a sparse one, and finer.
 DENSE_ROWS = 400
 # Rows with less than this part in a dependence have none in it.
-_NO_PART = 1e-6
+NO_PART = 1e-6
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Dependence:
     def sources(self, k: int) -> NDArray[np.int64]:
         """Row numbers from which the k-th dropped row follows."""
         part = np.abs(self.coefficients[:, k])
-        return self.kept[part > _NO_PART * max(1.0, part.max(initial=0.0))]
+        return self.kept[part > NO_PART * max(1.0, part.max(initial=0.0))]
 
     def conflict(self, residual: Array) -> Array:
         """Residual of each dropped row less that implied by the rows it follows from; residual (m,)."""

@@ -13,6 +13,8 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import System
+from paraflex.dynamics.joint_loads import self_stresses
+from paraflex.dynamics.rank import NO_PART
 from paraflex.equilibria.branch import Point
 from paraflex.equilibria.equations import Equations
 from paraflex.equilibria.given import Coordinate
@@ -22,7 +24,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, doubtful_stresses
+from paraflex.validity import Validity, assess, doubtful_stresses, shared_loads
 
 
 @dataclass(frozen=True)
@@ -151,9 +153,19 @@ class Statics(Shown):
 
     @checked_arguments()
     def effort(self, name: str) -> Array:
-        """Force or torque (k,) at a named coordinate: given, or what holds or moves it [N, N m]."""
+        """Force or torque (k,) at a named coordinate: given, or what holds or moves it [N, N m].
+
+        NaN where the rows that hold the mechanism depend on one another and share it in any way.
+        """
         number = self.equations.number(self._named(name))
-        return -self.multipliers[:, number]
+        return np.where(self._undetermined[:, number], np.nan, -self.multipliers[:, number])
+
+    @cached_property
+    def _undetermined(self) -> NDArray[np.bool_]:
+        """Which multipliers (k, m) do not follow from equilibrium."""
+        equations = self.equations
+        free = [self_stresses(equations.extended, q, equations.holding) for q in self.q]
+        return np.array([np.any(np.abs(one * equations.extended.row_units) > NO_PART, axis=0) for one in free])
 
     @checked_arguments()
     def stiffness(self, name: str) -> Array:
@@ -173,7 +185,10 @@ class Statics(Shown):
     @cached_property
     def solution(self) -> Solution:
         """The equilibria as samples at rest of `equations.extended`, numbered in place of times."""
-        return resting_solution(self.equations.extended, self.q, self.multipliers, self.status, self.message)
+        equations = self.equations
+        return resting_solution(
+            equations.extended, self.q, self.multipliers, equations.holding, self.status, self.message
+        )
 
     @cached_property
     def validity(self) -> Validity | None:
@@ -183,7 +198,8 @@ class Statics(Shown):
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
         """Findings: unstable equilibria with the motion that grows, stresses beyond the strength."""
-        stresses = tuple(doubtful_stresses(self.equations.extended, self.solution))
+        of_loads = (doubtful_stresses, shared_loads)
+        stresses = tuple(one for of in of_loads for one in of(self.equations.extended, self.solution))
         unstable = np.flatnonzero(~self.stable & ~self.limit)
         if not unstable.size:
             return stresses

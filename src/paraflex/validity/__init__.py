@@ -31,6 +31,7 @@ from paraflex.validity.plausibility import (
     Driven as Driven,
     doubtful_results as doubtful_results,
     doubtful_stresses as doubtful_stresses,
+    shared_loads as shared_loads,
     stiff_modes as stiff_modes,
 )
 
