@@ -29,6 +29,7 @@ from paraflex.results.metrics import (
     VALIDITY,
     Members,
     Metric,
+    metric_name,
     sliding,
 )
 from paraflex.results.run_traces import MotionTraces, RunTraces, StaticsTraces, run_traces
@@ -48,7 +49,7 @@ SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)
 
 def metric_of(column: str) -> Metric:
     """The metric of a column."""
-    return METRICS[column.partition(".")[0]]
+    return METRICS[metric_name(column)]
 
 
 def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tuple(METRICS)) -> None:
@@ -59,9 +60,10 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
     InputError
         There is none; it proposes one of those known.
     """
-    name = column.partition(".")[0]
+    name = metric_name(column)
     if name not in METRICS:
         raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(known)))
+    metric_of(column)
 
 
 def members_of(mechanism: Mechanism, given: Conditions | None = None) -> Members:

@@ -150,7 +150,8 @@ def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) 
     for field, column in columns.items():
         check_metric(column, field)
     counting = [metric_of(column).name for column in columns.values()]
-    metrics = list(dict.fromkeys([*table.metrics, *counting])) if table.metrics else []
+    own = [name for name in counting if "(" in name]
+    metrics = list(dict.fromkeys([*table.metrics, *counting])) if table.metrics or own else []
     sampling = SamplingTable(kind=RANDOM, number=1)
     base = make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
     for field, column in columns.items():
