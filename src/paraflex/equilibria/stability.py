@@ -111,7 +111,10 @@ def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vib
     reach = float(np.max(np.abs(along.q / equations.scale)))
     step = min(_FRACTION / abs(along.s), _MOVE / max(reach, 1e-300)) * np.sign(along.s)
     ahead, behind = (_reduced(equations, point.at.plus(along, side * step), soft) for side in (1.0, -1.0))
-    inverse, vectors = _softened((ahead - behind) / (2.0 * step * along.s), soft.T @ (found.stiffness @ soft))
+    try:
+        inverse, vectors = _softened((ahead - behind) / (2.0 * step * along.s), soft.T @ (found.stiffness @ soft))
+    except np.linalg.LinAlgError:
+        return Buckling(factors, shapes, "the stiffness is singular to rounding")
     q = along.q / along.s
     turn = max(abs(q[body.angle]) for body in equations.system.bodies)
     turn += float(np.max(np.abs(equations.system.slope_rows @ q), initial=0.0))
@@ -138,11 +141,16 @@ def _soft(equations: Equations, point: Point, found: Matrices, vibration: Vibrat
     along, K = point.tangent, found.stiffness
     forces = Unknowns(np.zeros_like(along.q), along.mu / along.s, 1.0)
     change = equations.matrices(point.at.plus(forces)).stiffness - K
-    elastic = equations.elastic
-    basis = vibration.shapes if vibration.complete else admissible(found.rows, elastic, vibration.squares[0])
-    inverse, vectors = _softened(basis.T @ (change @ basis), basis.T @ (K @ basis))
+    if vibration.complete:
+        basis, stiffness = vibration.shapes, np.diag(vibration.squares)
+    else:
+        basis = admissible(found.rows, equations.elastic, vibration.squares[0])
+        stiffness = basis.T @ (K @ basis)
+    inverse, vectors = _softened(basis.T @ (change @ basis), stiffness)
     stressed = basis @ vectors[:, np.flatnonzero(inverse > _NOTHING)[:count]]
-    shapes = np.column_stack([stressed, along.q, vibration.shapes[:, :count]]) / equations.scale[:, None]
+    # Where something is moved the rows do not allow the way along the branch.
+    way = along.q[:, None] * (not np.any(equations.change))
+    shapes = np.hstack([stressed, way, vibration.shapes[:, :count]]) / equations.scale[:, None]
     sizes = np.linalg.norm(shapes, axis=0)
     shapes = shapes[:, sizes > 0.0] / sizes[sizes > 0.0]
     size, directions = np.linalg.eigh(shapes.T @ shapes)
