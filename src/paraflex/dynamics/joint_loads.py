@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
@@ -20,9 +19,9 @@ from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_coordinates import axis_angle, marker_place
 from paraflex.dynamics.points import point_motion
-from paraflex.dynamics.rank import DEPENDENT, NO_PART, constraint_jacobian
+from paraflex.dynamics.rank import NO_PART, dependence
 from paraflex.dynamics.system import System
-from paraflex.kernel.packed import ANGLE, CONSTRAINT, POINT
+from paraflex.kernel.packed import ANGLE, POINT
 from paraflex.mechanism import Joint
 
 
@@ -117,31 +116,17 @@ def load_in(
     return force, moment
 
 
-def self_stresses(system: System, q: Array, acting: NDArray[np.int64] | None = None) -> Array:
-    """Independent multipliers (d, m) that exert no force at a pose (n,), of rows that act, all by default.
-
-    Phi_q^T mu = 0: what redundant rows carry is determined up to these. Times `row_units` they are of size one.
-    """
-    rows = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0] if acting is None else acting
-    units = system.row_units[rows]
-    jacobian = constraint_jacobian(system, q)[rows].toarray() * system.units / units[:, None]
-    free = scipy.linalg.null_space(jacobian.T, rcond=DEPENDENT) if rows.size else np.zeros((0, 0))
-    out = np.zeros((free.shape[1], system.m))
-    out[:, rows] = free.T / units
-    return out
-
-
 def undetermined_loads(
     system: System, names: Sequence[str], q: Array, acting: NDArray[np.int64] | None = None
 ) -> JointLoads:
-    """Which components of the forces (k, joints, 2) and moments (k, joints) in joints redundant rows share in any way.
+    """Components of forces (k, joints, 2) and moments (k, joints) that redundant rows, of those acting, share anyhow.
 
     Rows are redundant in all poses (k, n) or in none that is looked at: the first one shows it.
     """
     force, moment = np.zeros((len(q), len(names), 2), dtype=bool), np.zeros((len(q), len(names)), dtype=bool)
     for k, pose in enumerate(q):
-        free = self_stresses(system, pose, acting)
-        if not k and not len(free):
+        free = dependence(system, pose, acting=acting).self_stresses(system.row_units)
+        if not len(free):
             break
         still = np.zeros((len(free), len(system.mechanism.motors)))
         loads = joint_loads(system, names, np.repeat(pose[None], len(free), axis=0), free, still)

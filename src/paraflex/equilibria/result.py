@@ -13,8 +13,7 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import System
-from paraflex.dynamics.joint_loads import self_stresses
-from paraflex.dynamics.rank import NO_PART
+from paraflex.dynamics.rank import NO_PART, Dependence, dependence
 from paraflex.equilibria.branch import Point
 from paraflex.equilibria.equations import Equations
 from paraflex.equilibria.given import Coordinate
@@ -107,8 +106,13 @@ class Statics(Shown):
     @cached_property
     def multipliers(self) -> Array:
         """Multipliers (k, m) of all rows of `equations.extended`."""
-        found = [self.equations.least_multipliers(one.point.at) for one in self.equilibria]
-        return np.array([self.equations.multipliers(at) for at in found])
+        found = [self.equations.multipliers(one.point.at) for one in self.equilibria]
+        return np.array([one.least_norm(mu) for one, mu in zip(self._dependence, found, strict=True)])
+
+    @cached_property
+    def _dependence(self) -> list[Dependence]:
+        """Redundant rows of each equilibrium, of those that hold the mechanism."""
+        return [dependence(self.equations.extended, q, acting=self.equations.holding) for q in self.q]
 
     @property
     def frequencies(self) -> Array:
@@ -157,15 +161,10 @@ class Statics(Shown):
 
         NaN where the rows that hold the mechanism depend on one another and share it in any way.
         """
-        number = self.equations.number(self._named(name))
-        return np.where(self._undetermined[:, number], np.nan, -self.multipliers[:, number])
-
-    @cached_property
-    def _undetermined(self) -> NDArray[np.bool_]:
-        """Which multipliers (k, m) do not follow from equilibrium."""
-        equations = self.equations
-        free = [self_stresses(equations.extended, q, equations.holding) for q in self.q]
-        return np.array([np.any(np.abs(one * equations.extended.row_units) > NO_PART, axis=0) for one in free])
+        number, units = self.equations.number(self._named(name)), self.equations.extended.row_units
+        free = [one.self_stresses(units)[:, number] * units[number] for one in self._dependence]
+        shared = [np.any(np.abs(one) > NO_PART) for one in free]
+        return np.where(shared, np.nan, -self.multipliers[:, number])
 
     @checked_arguments()
     def stiffness(self, name: str) -> Array:
