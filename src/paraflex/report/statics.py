@@ -182,7 +182,7 @@ def _step_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
     found = step_table(data)
     heads = [("", ""), *((name, f"[{unit}]" if unit else "") for name, unit in found.heads)]
     rows = [(kind, [cell.replace("nan", NO_VALUE).replace("-", "−") for cell in cells]) for kind, *cells in found.rows]
-    note = "Frequencies are those of small vibrations about each equilibrium, what is held and moved kept; free: what is moved let go."
+    note = "Frequencies are those of small vibrations about each equilibrium, what is held and moved kept."
     yield found.title, table(heads, rows, caption="Steps", note=note)
 
 

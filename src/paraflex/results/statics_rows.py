@@ -51,9 +51,9 @@ def step_table(data: xr.Dataset) -> StepTable:
                 name = str(one["named"].item()) if quantity == "travel" else quantity_word(one, quantity)
                 heads.append((name, shown.name))
                 columns.append([four_digits(shown.factor * x) for x in values])
-    for name, word in lowest_frequencies(data).items():
-        heads.append((word, "Hz"))
-        columns.append([four_digits(x) for x in data[name].values[:, 0]])
+    if data.sizes["frequency_number"]:
+        heads.append((next(iter(lowest_frequencies(data).values()), "lowest"), "Hz"))
+        columns.append([four_digits(x) for x in data["natural_frequency"].values[:, 0]])
     kinds = step_kinds(data)
     steps = range(data.sizes["step"])
     every = math.ceil(len(steps) / _ROWS)
