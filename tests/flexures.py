@@ -158,9 +158,7 @@ def lee_frame(frames: int) -> tuple[pf.Mechanism, float]:
     """
     length, section, steel = 1.2, pf.Section.rectangle(0.03, 0.02), pf.Material(7.2e10, 2700.0)
     points = {"column": {"A": 0.0, "B": length}, "beam": {"A": 0.0, "P": 0.2 * length, "B": length}}
-    parts = tuple(
-        pf.FlexibleBeam(name, length, section, steel, at, 1, frames=frames) for name, at in points.items()
-    )
+    parts = tuple(pf.FlexibleBeam(name, length, section, steel, at, 1, frames=frames) for name, at in points.items())
     joints = (
         pf.RevoluteJoint("foot", pf.PointRef("ground", "O"), pf.PointRef("column", "A")),
         pf.WeldJoint("corner", pf.PointRef("column", "B"), pf.PointRef("beam", "A"), -0.5 * math.pi),
@@ -174,7 +172,7 @@ def lee_frame(frames: int) -> tuple[pf.Mechanism, float]:
 
 
 def wedge() -> pf.Mechanism:
-    """Two wedges on three slides in a loop: the angles are held once more than needed. 50 N push the first to the left."""
+    """Two wedges on three slides in a loop: angles are held once more than needed. 50 N push the first to the left."""
     parts = (
         pf.RigidBody("first", 2.0, 0.1, (0.0, 0.0), {"P": (0.0, 0.0), "S": (1.0, 0.0)}),
         pf.RigidBody("second", 3.0, 0.1, (0.0, 0.0), {"P": (0.0, 0.0)}),

@@ -191,7 +191,9 @@ def test_expressions_take_coordinates_in_all_steps_and_have_their_units():
     ],
 )
 def test_expressions_that_make_no_sense_are_refused(tmp_path, metric, message):
-    ran = paraflex("sweep", written(tmp_path, f'metrics = ["{metric}"]\n', BASE, VARIED, GIVEN), "--output", tmp_path / "o")
+    ran = paraflex(
+        "sweep", written(tmp_path, f'metrics = ["{metric}"]\n', BASE, VARIED, GIVEN), "--output", tmp_path / "o"
+    )
     assert ran.returncode == 2
     assert message in ran.stderr
 

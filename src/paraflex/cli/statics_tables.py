@@ -10,7 +10,15 @@ from rich.console import Console
 
 from paraflex.cli.tables import plain_table, print_titled
 from paraflex.results.statics_data import statics_summary
-from paraflex.results.statics_rows import buckling_words, four_digits, is_stressed, last_rows, lowest_frequencies, no_buckling, step_table
+from paraflex.results.statics_rows import (
+    buckling_words,
+    four_digits,
+    is_stressed,
+    last_rows,
+    lowest_frequencies,
+    no_buckling,
+    step_table,
+)
 from paraflex.units import STRESS
 
 

@@ -138,7 +138,9 @@ def _tiles(data: xr.Dataset, summary: dict[str, Any]) -> list[tuple[str, str, st
     for name, word in lowest_frequencies(data).items():
         lowest = data[name].values[:, 0]
         before = f"{lowest[0]:.4g} Hz at the start" if len(lowest) > 1 else ""
-        tiles.append((f"{'lowest' if word == 'lowest' else f'lowest {word}'} frequency", f"{lowest[-1]:.4g} Hz", before))
+        tiles.append(
+            (f"{'lowest' if word == 'lowest' else f'lowest {word}'} frequency", f"{lowest[-1]:.4g} Hz", before)
+        )
     if words := buckling_words(data):
         factor, _, rest = words.partition(" of what")
         tiles.append(("buckling", f"{factor} ×", f"of what{rest}"))

@@ -51,8 +51,8 @@ def step_table(data: xr.Dataset) -> StepTable:
                 name = str(one["named"].item()) if quantity == "travel" else quantity_word(one, quantity)
                 heads.append((name, shown.name))
                 columns.append([four_digits(shown.factor * x) for x in values])
-    if data.sizes["frequency_number"]:
-        heads.append((next(iter(lowest_frequencies(data).values()), "lowest"), "Hz"))
+    if word := lowest_frequencies(data).get("natural_frequency"):
+        heads.append((word, "Hz"))
         columns.append([four_digits(x) for x in data["natural_frequency"].values[:, 0]])
     kinds = step_kinds(data)
     steps = range(data.sizes["step"])
@@ -65,7 +65,7 @@ def lowest_frequencies(data: xr.Dataset) -> dict[str, str]:
     """Variables of natural frequencies and what tells them apart: "held" and "free" where something is moved."""
     words = {"natural_frequency": "held", "free_frequency": "free"}
     words = words if (data["role"] == "moved").any() else {"natural_frequency": "lowest"}
-    return {name: word for name, word in words.items() if np.isfinite(data[name].values[:, :1]).any()}
+    return {name: word for name, word in words.items() if name in data and np.isfinite(data[name].values[:, :1]).any()}
 
 
 def last_rows(data: xr.Dataset) -> Iterator[list[str]]:
