@@ -83,7 +83,9 @@ def vibrations(equations: Equations, found: Matrices) -> Vibrations:
         freedoms = equations.system.n - equations.independent(C)[0].size
         low = slowest(symmetric, M, C, typical, min(LOWEST, freedoms), freedoms)
         return Vibrations(low.squares, low.shapes, False)
-    basis = admissible(C, elastic, typical)
+    # Places and turns by the root of their mass, as elastic coordinates are, whatever the size of the mechanism.
+    sizes = scipy.sparse.diags(1.0 / np.sqrt(np.asarray(M.diagonal())))
+    basis = sizes @ admissible(csr_matrix(C @ sizes), elastic, typical)
     if not basis.shape[1]:
         return Vibrations(np.zeros(0), np.zeros((elastic.size, 0)), True)
     squares, shapes = undamped_modes(basis.T @ (M @ basis), basis.T @ (symmetric @ basis), typical)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.dynamics import State, build_system, pose_at_rest
@@ -130,9 +131,11 @@ def _followed(
 
 def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibrium:
     found = equations.matrices(point.at)
-    vibration, moved = vibrations(equations, found), len(equations.given.moved)
-    # Rows of what is moved are the last.
-    free = vibrations(equations, found._replace(rows=found.rows[: found.rows.shape[0] - moved])) if moved else vibration
+    vibration = free = vibrations(equations, found)
+    if equations.given.moved:
+        moved = [equations.number(one) for one in equations.given.moved]
+        kept = np.flatnonzero(~np.isin(equations.holding, moved))
+        free = vibrations(equations, found._replace(rows=csr_matrix(found.rows[kept])))
     return Equilibrium(
         point, vibration, free, buckling_about(equations, point, found, vibration, buckling and buckling + _SPARE),
         stiffness_at(equations, point.at, found, equations.given.measured),
