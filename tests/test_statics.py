@@ -99,6 +99,22 @@ def test_the_factor_of_a_frame_is_that_of_its_limit_point(frames: int, load: flo
     assert load * found.buckling[:until, 0] == pytest.approx([18.55] * until, rel=1e-3)
 
 
+@pytest.mark.filterwarnings("ignore::paraflex.ModelWarning")
+@pytest.mark.parametrize("scale", [1e-4, 1e2])
+def test_factors_and_frequencies_do_not_depend_on_the_size(scale: float) -> None:
+    """Stresses alike: forces grow with the square of the size, frequencies fall with it."""
+    changes = {
+        "parameters.length": 0.1 * scale, "parameters.apart": 0.05 * scale, "section.leaf.width": WIDTH * scale,
+        "section.leaf.thickness": THICKNESS * scale, "body.stage.mass": 0.2 * scale**3,
+        "body.stage.inertia": 1e-4 * scale**5, "body.left.frames": 4, "body.right.frames": 4,
+    }  # fmt: skip
+    small = pf.statics(pf.load("leaf_spring_guide", set=changes), loads={"stage.T.x": 10.5 * scale**2}, steps=1)
+    frames = {name: 4 for name in changes if name.endswith("frames")}
+    own = pf.statics(pf.load("leaf_spring_guide", set=frames), loads={"stage.T.x": 10.5}, steps=1)
+    assert small.buckling == pytest.approx(own.buckling, rel=1e-4)
+    assert scale * small.frequencies[:, :5] == pytest.approx(own.frequencies[:, :5], rel=1e-4)
+
+
 def test_many_frames_and_several_factors_of_a_column() -> None:
     """More coordinates than have all their vibrations computed."""
     beams, welds = chain("column", 100)
@@ -360,7 +376,7 @@ def test_moments_of_three_slides_in_a_loop_are_not_determined_and_their_forces_a
     normal = 50.0 * np.array([-1.0, math.sqrt(3.0)])
     assert data["joint_force"].sel(joint="slope").values == pytest.approx(normal, rel=1e-9)
     assert data["joint_force"].sel(joint="flat").values == pytest.approx([0.0, 2.0 * 9.81 + normal[1]], abs=1e-8)
-    assert found.effort("upright")[-1] == pytest.approx(3.0 * 9.81 - normal[1], rel=1e-9)
+    assert found.known_effort("upright")[-1] == pytest.approx(3.0 * 9.81 - normal[1], rel=1e-9)
 
 
 def test_three_cranks_share_forces_along_them_in_any_way() -> None:
@@ -369,14 +385,16 @@ def test_three_cranks_share_forces_along_them_in_any_way() -> None:
     assert np.isnan(data["joint_force"].values).all()
     assert data["joint_moment"].values[1:] == pytest.approx(np.zeros(5), abs=1e-9)
     torque = 9.81 * (3.0 * 0.25 + 2.0 * 0.5) * math.cos(1.0)
-    assert slanted.effort("A0")[-1] == pytest.approx(torque, rel=1e-9)
+    assert slanted.known_effort("A0")[-1] == pytest.approx(torque, rel=1e-9)
     assert data["frame_force"].values == pytest.approx([0.0, -5.0 * 9.81], abs=1e-8)
     # Upright cranks push upwards alone; two that are held share the torque.
     upright = pf.statics_dataset(pf.statics(cranks(math.pi / 2), held=["A0"], warning=False))["joint_force"].values[-1]
     assert upright[:, 0] == pytest.approx(np.zeros(6), abs=1e-9)
     assert np.isnan(upright[:, 1]).all()
     both = pf.statics(cranks(1.0), held=["A0", "A1"], warning=False)
-    assert np.isnan([both.effort("A0")[-1], both.effort("A1")[-1]]).all()
+    assert np.isnan([both.known_effort("A0")[-1], both.known_effort("A1")[-1]]).all()
+    assert both.effort("A0")[-1] + both.effort("A1")[-1] == pytest.approx(torque, rel=1e-9)
+    assert np.isnan(pf.statics_dataset(both)["effort"].values).all()
 
 
 def test_a_run_marks_what_redundant_constraints_share() -> None:

@@ -255,6 +255,15 @@ class Equations:
         phi = self.residual(at)[1]
         return float(np.max(np.abs(phi) / self.extended.row_units[self.holding], initial=0.0))
 
+    def least_multipliers(self, at: Unknowns) -> Unknowns:
+        """The same equilibrium with those multipliers of dependent rows whose sum of squares is least."""
+        rows = self.matrices(at).rows
+        if self.independent(rows)[0].size == self.holding.size:
+            return at
+        transposed = rows.T.toarray() * self.scale[:, None]
+        mu = np.linalg.lstsq(transposed, transposed @ at.mu, rcond=1e-10)[0]
+        return at._replace(mu=mu)
+
 
 def _pin(point: PointRef) -> str:
     return f"coordinates of {point.body} {point.point}"

@@ -106,8 +106,8 @@ class Statics(Shown):
     @cached_property
     def multipliers(self) -> Array:
         """Multipliers (k, m) of all rows of `equations.extended`."""
-        found = [self.equations.multipliers(one.point.at) for one in self.equilibria]
-        return np.array([one.least_norm(mu) for one, mu in zip(self._dependence, found, strict=True)])
+        found = [self.equations.least_multipliers(one.point.at) for one in self.equilibria]
+        return np.array([self.equations.multipliers(at) for at in found])
 
     @cached_property
     def _dependence(self) -> list[Dependence]:
@@ -159,12 +159,16 @@ class Statics(Shown):
     def effort(self, name: str) -> Array:
         """Force or torque (k,) at a named coordinate: given, or what holds or moves it [N, N m].
 
-        NaN where the rows that hold the mechanism depend on one another and share it in any way.
+        Of least norm where it is not determined; see `known_effort`.
         """
+        return -self.multipliers[:, self.equations.number(self._named(name))]
+
+    @checked_arguments()
+    def known_effort(self, name: str) -> Array:
+        """The same (k,), NaN where redundant rows share it in any way: two drives that hold one motion."""
         number, units = self.equations.number(self._named(name)), self.equations.extended.row_units
         free = [one.self_stresses(units)[:, number] * units[number] for one in self._dependence]
-        shared = [np.any(np.abs(one) > NO_PART) for one in free]
-        return np.where(shared, np.nan, -self.multipliers[:, number])
+        return np.where([np.any(np.abs(one) > NO_PART) for one in free], np.nan, self.effort(name))
 
     @checked_arguments()
     def stiffness(self, name: str) -> Array:

@@ -183,7 +183,7 @@ def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> 
         if there.at.s <= reached:
             break
         # One square is zero at a limit point; where another is negative the branch has lost its stability before.
-        if there.limit and np.all(moving.squares[1:2] > abs(moving.squares[0])):
+        if there.limit and np.all(moving.squares[1:2] > np.abs(moving.squares[:1])):
             return Buckling(that.factors[:count], that.shapes[:, :count], "")
         if there.limit or not moving.stable:
             lost = there.at.s

@@ -203,7 +203,7 @@ class StaticsTraces(SolutionTraces[Statics]):
     @cached_property
     def effort(self) -> Trace:
         """Force or torque (k, coordinates) at every named coordinate [N, N m]."""
-        return self._columns(self.run.effort, self.run.coordinates)
+        return self._columns(self.run.known_effort, self.run.coordinates)
 
     @cached_property
     def stiffness(self) -> Trace:

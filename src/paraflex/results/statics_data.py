@@ -137,7 +137,7 @@ def _of_steps(found: Statics) -> dict[str, Any]:
         "stable": ("step", found.stable),
         "place": (*along, _columns(found, found.place)),
         "travel": (*along, _columns(found, found.travel)),
-        "effort": (*along, _columns(found, found.effort)),
+        "effort": (*along, _columns(found, found.known_effort)),
         "stiffness": (*along, stiffness),
         "compliance": (*along, compliance),
         "natural_frequency": (("step", "frequency_number"), _hertz(found.frequencies, found)),
@@ -196,7 +196,7 @@ def _motors(found: Statics) -> dict[str, Any]:
     torque = np.zeros((len(found.equilibria), len(at)))
     for k, joint in enumerate(at):
         if joint in names:
-            torque[:, k] = found.effort(joint) / at.count(joint)
+            torque[:, k] = found.known_effort(joint) / at.count(joint)
     units = list(dict.fromkeys(mechanism.motor_units()))
     return {"torque": (("step", "motor"), torque, {"long_name": "motor torque or force", "units": ", ".join(units)})}
 
