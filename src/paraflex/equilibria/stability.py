@@ -20,10 +20,10 @@ from paraflex.equilibria.given import Coordinate
 _MOVE, _FRACTION = 1e-4, 1e-2
 # Of an eigenvalue that belongs to no buckling: load stiffness as a part of the stiffness.
 _NOTHING = 1e-9
-# Shapes beside those asked for, of buckling and of vibrations, and what is left of one that follows from others.
-_MORE, _ALIKE = 3, 1e-12
 # Places and turns of links give way before links bend or stretch: what they cost, as a part of typical energies.
 _RIGID_FIRST = 1e-6
+# Typical energies are those of so many slowest vibrations.
+_SLOWEST = 5
 # Links turn by no more until the fraction at which something buckles by a linear estimate [rad].
 _MOST_TURN = 2.0 * np.pi
 # Of more coordinates dense matrices take minutes.
@@ -96,8 +96,8 @@ def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vib
     """Factors of buckling about an equilibrium: fractions s' with a singular K + (s' - s) dK/ds.
 
     The derivative is along the branch, in displacements that follow the deflection with the least change of elastic
-    energy, and among soft ones alone. Where links turn, displacements that stretch them couple to those that bend them
-    by the full stiffness: to first order a loss of stiffness, which terms of second order cancel.
+    energy. Where links turn, displacements that do not follow stretch them: to first order that couples what stretches
+    links to what bends them, a loss of stiffness that terms of second order cancel.
     """
     factors, shapes = np.full(count, np.nan), np.full((equations.system.n, count), np.nan)
     along, squares = point.tangent, vibration.squares
@@ -109,12 +109,18 @@ def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vib
     if squares[0] <= 0.0 or equations.system.n > _MOST_COORDINATES:
         reason = f"more than {_MOST_COORDINATES} coordinates" if squares[0] > 0.0 else "the equilibrium is not stable"
         return Buckling(factors, shapes, reason)
-    soft = _soft(equations, point, found, vibration, count + _MORE)
+    basis, stiffness = vibration.shapes, np.diag(squares)
+    if not vibration.complete:
+        basis = admissible(found.rows, equations.elastic, squares[0])
+        stiffness = basis.T @ (found.stiffness @ basis)
+    slow = vibration.shapes[:, :_SLOWEST] / equations.scale[:, None]
+    typical = float(np.median(squares[:_SLOWEST] / np.sum(slow**2, axis=0)))
     reach = float(np.max(np.abs(along.q / equations.scale)))
     step = min(_FRACTION / abs(along.s), _MOVE / max(reach, 1e-300)) * np.sign(along.s)
-    ahead, behind = (_reduced(equations, point.at.plus(along, side * step), soft) for side in (1.0, -1.0))
+    ahead, behind = (_reduced(equations, point.at.plus(along, side * step), basis, typical) for side in (1.0, -1.0))
+    change = (behind - ahead) / (2.0 * step * along.s)
     try:
-        inverse, vectors = _softened((ahead - behind) / (2.0 * step * along.s), soft.T @ (found.stiffness @ soft))
+        inverse, vectors = (part[..., ::-1] for part in scipy.linalg.eigh(change + change.T, stiffness + stiffness.T))
     except np.linalg.LinAlgError:
         return Buckling(factors, shapes, "the stiffness is singular to rounding")
     q = along.q / along.s
@@ -123,49 +129,18 @@ def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vib
     known = inverse > _NOTHING * max(1.0, *np.abs(inverse))
     which = np.flatnonzero(known & (_MOST_TURN * inverse > turn))[:count]
     factors[: which.size] = point.at.s + 1.0 / inverse[which]
-    shapes[:, : which.size] = _largest_one(equations, soft @ vectors[:, which])
+    shapes[:, : which.size] = _largest_one(equations, basis @ vectors[:, which])
     far = "links would turn by more than a full turn before anything buckles by the linear estimate"
     return Buckling(factors, shapes, far if known.any() and not which.size else "")
 
 
-def _softened(change: Array, stiffness: Array) -> tuple[Array, Array]:
-    """Loss of stiffness over stiffness (m,), descending, and shapes (m, m)."""
-    values, vectors = scipy.linalg.eigh(-0.5 * (change + change.T), 0.5 * (stiffness + stiffness.T))
-    return values[::-1], vectors[:, ::-1]
+def _reduced(equations: Equations, at: Unknowns, shapes: Array, typical: float) -> Array:
+    """Stiffness (f, f) at a point near by, in displacements that the rows allow there.
 
-
-def _soft(equations: Equations, point: Point, found: Matrices, vibration: Vibrations, count: int) -> Array:
-    """Independent displacements (n, m) among which an equilibrium buckles.
-
-    Shapes in which it buckles by the change of forces alone, all places kept; the way along the branch, in which it
-    does at a limit point; and shapes of its slowest vibrations.
-    """
-    along, K = point.tangent, found.stiffness
-    forces = Unknowns(np.zeros_like(along.q), along.mu / along.s, 1.0)
-    change = equations.matrices(point.at.plus(forces)).stiffness - K
-    if vibration.complete:
-        basis, stiffness = vibration.shapes, np.diag(vibration.squares)
-    else:
-        basis = admissible(found.rows, equations.elastic, vibration.squares[0])
-        stiffness = basis.T @ (K @ basis)
-    inverse, vectors = _softened(basis.T @ (change @ basis), stiffness)
-    stressed = basis @ vectors[:, np.flatnonzero(inverse > _NOTHING)[:count]]
-    # Where something is moved the rows do not allow the way along the branch.
-    way = along.q[:, None] * (not np.any(equations.change))
-    shapes = np.hstack([stressed, way, vibration.shapes[:, :count]]) / equations.scale[:, None]
-    sizes = np.linalg.norm(shapes, axis=0)
-    shapes = shapes[:, sizes > 0.0] / sizes[sizes > 0.0]
-    size, directions = np.linalg.eigh(shapes.T @ shapes)
-    return equations.scale[:, None] * (shapes @ directions[:, size > _ALIKE])
-
-
-def _reduced(equations: Equations, at: Unknowns, shapes: Array) -> Array:
-    """Stiffness (m, m) at a point near by, in displacements that the rows allow there.
-
-    They differ from shapes by as little elastic energy as can be, and within that by least places and turns.
+    They differ from shapes by as little elastic energy as can be, and within that by least places and turns. Typical
+    is the energy of displacements by sizes of the mechanism.
     """
     found, elastic = equations.matrices(at), equations.elastic
-    typical = float(np.median(np.abs(np.sum(shapes * (found.stiffness @ shapes), axis=0)))) or 1.0
     weight = np.where(elastic > 0.0, elastic / (_RIGID_FIRST * typical), equations.scale**-2.0)
     nearest = Saddle(csr_matrix(scipy.sparse.diags(weight)), found.rows)
     moved = shapes - np.column_stack([nearest.solve(0.0, found.rows @ shape)[0] for shape in shapes.T])
