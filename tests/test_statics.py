@@ -28,6 +28,7 @@ from flexures import (
     truss,
     wedge,
 )
+from paraflex.designs.measure import coarseness, measure
 from paraflex.errors import EquilibriumError, LimitPointError, ValidityWarning
 from paraflex.results import load_results, save_results, statics_summary
 
@@ -391,6 +392,9 @@ def test_three_cranks_share_forces_along_them_in_any_way() -> None:
     upright = pf.statics_dataset(pf.statics(cranks(math.pi / 2), held=["A0"], warning=False))["joint_force"].values[-1]
     assert upright[:, 0] == pytest.approx(np.zeros(6), abs=1e-9)
     assert np.isnan(upright[:, 1]).all()
+    assert math.isnan(measure(slanted, ["joint_force_max"])["joint_force_max"])
+    assert "forces in A0, B0" in coarseness(slanted, ["joint_force_max"])
+    assert coarseness(slanted, ["strain_energy_max"]) == ""
     both = pf.statics(cranks(1.0), held=["A0", "A1"], warning=False)
     assert np.isnan([both.known_effort("A0")[-1], both.known_effort("A1")[-1]]).all()
     assert both.effort("A0")[-1] + both.effort("A1")[-1] == pytest.approx(torque, rel=1e-9)

@@ -79,7 +79,7 @@ class SolutionTraces(Generic[R]):
 
     @cached_property
     def joint_force(self) -> Trace:
-        """Magnitude of the force in every joint (k, joints) [N]; zero where it is not known or not determined."""
+        """Magnitude of the force in every joint (k, joints) [N]; zero near poles, NaN where not determined."""
         system, solution = self.system, self.solution
         multipliers = np.where(np.isnan(solution.multipliers), 0.0, solution.multipliers)
         forces = [
@@ -89,7 +89,7 @@ class SolutionTraces(Generic[R]):
         names = [joint.name for joint in system.described.joints]
         shared = undetermined_loads(system, names, solution.q.real, solution.acting).force.any(axis=2)
         known = np.stack([length(each) for each in forces], axis=1) if forces else np.zeros((len(solution.q), 0))
-        return np.where(shared, 0.0, known)
+        return np.where(shared, np.nan, known)
 
     @cached_property
     def joint_speed(self) -> Trace:
