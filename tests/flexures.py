@@ -151,6 +151,65 @@ def toggle(stiffness: float = 1000.0, bar: float = 0.5, angle: float = 0.4) -> p
     )
 
 
+def lee_frame(frames: int) -> tuple[pf.Mechanism, float]:
+    """Two beams of length L at a right angle, hinged at both far ends, and EI / L^2; its load is at L / 5 on the beam.
+
+    Lee, Manuel and Rossow (1968): the branch turns back at 18.55 EI / L^2.
+    """
+    length, section, steel = 1.2, pf.Section.rectangle(0.03, 0.02), pf.Material(7.2e10, 2700.0)
+    points = {"column": {"A": 0.0, "B": length}, "beam": {"A": 0.0, "P": 0.2 * length, "B": length}}
+    parts = tuple(pf.FlexibleBeam(name, length, section, steel, at, 1, frames=frames) for name, at in points.items())
+    joints = (
+        pf.RevoluteJoint("foot", pf.PointRef("ground", "O"), pf.PointRef("column", "A")),
+        pf.WeldJoint("corner", pf.PointRef("column", "B"), pf.PointRef("beam", "A"), -0.5 * math.pi),
+        pf.RevoluteJoint("end", pf.PointRef("beam", "B"), pf.PointRef("ground", "C")),
+    )
+    frame = pf.Mechanism(
+        name="Lee's frame", ground={"O": (0.0, 0.0), "C": (length, length)}, bodies=parts, joints=joints,
+        assemblies=(pf.Assembly("up", {"column": 0.5 * math.pi, "beam": 0.0}),), gravity=(0.0, 0.0),
+    )  # fmt: skip
+    return frame.with_geometry("second-order"), 7.2e10 * 0.03 * 0.02**3 / 12.0 / length**2
+
+
+def wedge() -> pf.Mechanism:
+    """Two wedges on three slides in a loop: angles are held once more than needed. 50 N push the first to the left."""
+    parts = (
+        pf.RigidBody("first", 2.0, 0.1, (0.0, 0.0), {"P": (0.0, 0.0), "S": (1.0, 0.0)}),
+        pf.RigidBody("second", 3.0, 0.1, (0.0, 0.0), {"P": (0.0, 0.0)}),
+    )
+    joints = (
+        pf.PrismaticJoint("flat", pf.PointRef("ground", "O"), pf.PointRef("first", "P")),
+        pf.PrismaticJoint("slope", pf.PointRef("first", "S"), pf.PointRef("second", "P"), direction=math.pi / 6),
+        pf.PrismaticJoint("upright", pf.PointRef("ground", "V"), pf.PointRef("second", "P"), direction=math.pi / 2),
+    )
+    return pf.Mechanism(
+        name="wedge", ground={"O": (0.0, 0.0), "V": (1.0, 0.0)}, bodies=parts, joints=joints,
+        loads=(pf.PointForce("push", pf.PointRef("first", "P"), (-50.0, 0.0)),),
+        assemblies=(pf.Assembly("home", {"first": 0.0, "second": 0.0}),), gravity=(0.0, -9.81),
+    )  # fmt: skip
+
+
+def cranks(angle: float) -> pf.Mechanism:
+    """A platform of 2 kg on three parallel cranks of 1 kg and 0.5 m: one holds it once more than needed."""
+    rods = tuple(
+        pf.RigidBody(f"crank{k}", 1.0, 0.01, (0.25, 0.0), {"A": (0.0, 0.0), "B": (0.5, 0.0)}) for k in range(3)
+    )
+    platform = pf.RigidBody("platform", 2.0, 0.1, (0.5, 0.0), {f"B{k}": (0.5 * k, 0.0) for k in range(3)})
+    joints = [
+        pf.RevoluteJoint(f"{name}{k}", a, b)
+        for k in range(3)
+        for name, a, b in (
+            ("A", pf.PointRef("ground", f"O{k}"), pf.PointRef(f"crank{k}", "A")),
+            ("B", pf.PointRef(f"crank{k}", "B"), pf.PointRef("platform", f"B{k}")),
+        )
+    ]
+    return pf.Mechanism(
+        name="cranks", ground={f"O{k}": (0.5 * k, 0.0) for k in range(3)}, bodies=(*rods, platform),
+        joints=tuple(joints), gravity=(0.0, -9.81),
+        assemblies=(pf.Assembly("up", {f"crank{k}": angle for k in range(3)} | {"platform": 0.0}),),
+    )  # fmt: skip
+
+
 def exact_guide(sideways: float, upwards: float, apart: float = 0.05) -> tuple[float, float, float]:
     """Travel of T along x and y [m] and turn of the stage [rad] of `guide` as extensible elastica, by shooting.
 

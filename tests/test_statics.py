@@ -19,12 +19,16 @@ from flexures import (
     E,
     chain,
     column,
+    cranks,
     exact_guide,
     guide,
+    lee_frame,
     pivot,
     toggle,
     truss,
+    wedge,
 )
+from paraflex.designs.measure import coarseness, measure
 from paraflex.errors import EquilibriumError, LimitPointError, ValidityWarning
 from paraflex.results import load_results, save_results, statics_summary
 
@@ -65,6 +69,67 @@ def test_buckling_shapes_are_those_of_euler() -> None:
     assert found.buckling[0] * EI**-1 * LENGTH**2 / math.pi**2 == pytest.approx([1.0, 4.0, 9.0], rel=1e-4)
 
 
+def test_a_guide_pushed_sideways_buckles_in_a_leaf_whatever_the_frames() -> None:
+    """The push presses one leaf with P L / (2 apart); both its ends are clamped: 4 pi^2 EI / L^2."""
+    wanted = 4.0 * math.pi**2 * EI / LENGTH**2 / (10.5 * LENGTH / (2.0 * 0.05))
+    found = [pf.statics(guide(frames, elements=2), loads={"stage.T.x": 10.5}, steps=2) for frames in (1, 4, 8)]
+    assert [one.buckling[0, 0] for one in found] == pytest.approx([wanted] * 3, rel=1e-3)
+    assert found[1].buckling[-1, 0] == pytest.approx(found[2].buckling[-1, 0], rel=3e-3)
+    assert all((one.buckling > one.fraction[:, None]).all() for one in found)
+
+
+@pytest.mark.parametrize("frames", [1, 4, 16])
+def test_a_cantilever_under_a_load_across_does_not_buckle(frames: int) -> None:
+    beams, welds = chain("bar", frames)
+    root = pf.WeldJoint("root", pf.PointRef("ground", "O"), pf.PointRef("bar1", "A"))
+    bar = pf.Mechanism(
+        name="cantilever", ground={"O": (0.0, 0.0)}, bodies=tuple(beams), joints=(root, *welds),
+        assemblies=(pf.Assembly("flat", {beam.name: 0.0 for beam in beams}),), gravity=(0.0, 0.0),
+    )  # fmt: skip
+    found = pf.statics(bar, loads={f"bar{frames}.B.y": 2.0 * EI / LENGTH**2}, steps=4, warning=False)
+    assert np.isnan(found.buckling).all()
+    assert "full turn" in found.equilibria[0].buckling.reason
+
+
+@pytest.mark.parametrize(("frames", "load"), [(4, 18.0), (20, 18.0), (4, 20.0)])
+def test_the_factor_of_a_frame_is_that_of_its_limit_point(frames: int, load: float) -> None:
+    """On the branch or a little beyond what is given, where linear estimates are off by up to a factor of four."""
+    frame, unit = lee_frame(frames)
+    found = pf.statics(frame, loads={"beam.P.y": -load * unit}, steps=6, warning=False)
+    until = int(np.flatnonzero(~found.stable)[0]) if load > 18.55 else len(found.fraction)
+    assert load * found.buckling[:until, 0] == pytest.approx([18.55] * until, rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore::paraflex.ModelWarning")
+@pytest.mark.parametrize("scale", [1e-4, 1e2])
+def test_factors_and_frequencies_do_not_depend_on_the_size(scale: float) -> None:
+    """Stresses alike: forces grow with the square of the size, frequencies fall with it."""
+    changes = {
+        "parameters.length": 0.1 * scale, "parameters.apart": 0.05 * scale, "section.leaf.width": WIDTH * scale,
+        "section.leaf.thickness": THICKNESS * scale, "body.stage.mass": 0.2 * scale**3,
+        "body.stage.inertia": 1e-4 * scale**5, "body.left.frames": 4, "body.right.frames": 4,
+    }  # fmt: skip
+    small = pf.statics(pf.load("leaf_spring_guide", set=changes), loads={"stage.T.x": 10.5 * scale**2}, steps=1)
+    frames = {name: 4 for name in changes if name.endswith("frames")}
+    own = pf.statics(pf.load("leaf_spring_guide", set=frames), loads={"stage.T.x": 10.5}, steps=1)
+    assert small.buckling == pytest.approx(own.buckling, rel=1e-4)
+    assert scale * small.frequencies[:, :5] == pytest.approx(own.frequencies[:, :5], rel=1e-4)
+
+
+def test_many_frames_and_several_factors_of_a_column() -> None:
+    """More coordinates than have all their vibrations computed."""
+    beams, welds = chain("column", 100)
+    root = pf.WeldJoint("root", pf.PointRef("ground", "O"), pf.PointRef("column1", "A"))
+    column = pf.Mechanism(
+        name="column", ground={"O": (0.0, 0.0)}, bodies=tuple(beams), joints=(root, *welds),
+        assemblies=(pf.Assembly("flat", {beam.name: 0.0 for beam in beams}),), gravity=(0.0, 0.0),
+    )  # fmt: skip
+    found = pf.statics(column, loads={"column100.B.x": -0.1}, steps=1, buckling=2)
+    assert not found.equilibria[0].vibrations.complete
+    euler = 0.25 * math.pi**2 * EI / LENGTH**2 / 0.1
+    assert found.buckling == pytest.approx(np.array([[euler, 9.0 * euler]] * 2), rel=1e-3)
+
+
 # A truss that snaps
 
 
@@ -84,6 +149,7 @@ def test_a_truss_snaps_at_the_load_of_its_closed_form_and_both_branches_are_foun
     found = pf.statics(truss(), loads={"apex.T.y": -1.5 * limit}, held=["apex.T.angle"], steps=10, warning=False)
     assert 1.5 * found.fraction[found.limit] == pytest.approx([1.0, -1.0], rel=1e-9)
     assert found.place("apex.T.y")[found.limit] == pytest.approx([snap_height(), -snap_height()], rel=1e-6)
+    assert 1.5 * found.buckling[:3, 0] == pytest.approx([1.0] * 3, rel=1e-9)
     heights, forces = found.place("apex.T.y"), -found.effort("apex.T.y")
     assert forces == pytest.approx([truss_force(y) for y in heights], abs=1e-9 * limit)
     # Above, between the limit points, below.
@@ -285,6 +351,65 @@ def test_an_own_weight_acts_in_full_from_the_start() -> None:
     assert found.fraction.tolist() == [0.0]
     change = found.stiffness("stage.T.x")[0] - light.stiffness("stage.T.x")[0]
     assert change == pytest.approx(-1.2 * weight / LENGTH, rel=0.01)
+
+
+def test_free_frequencies_are_those_under_the_force_that_moves_it() -> None:
+    moved = pf.statics(guide(1), moved={"stage.T.x": 0.01}, steps=1)
+    loaded = pf.statics(guide(1), loads={"stage.T.x": moved.effort("stage.T.x")[-1]}, steps=1)
+    assert moved.free_frequencies[-1, :5] == pytest.approx(loaded.frequencies[-1, :5], rel=1e-5)
+    # 13/35 of the leaves' mass moves with the stage.
+    mass = 0.2 + 2.0 * 13.0 / 35.0 * 7850.0 * WIDTH * THICKNESS * LENGTH
+    assert moved.free_frequencies[0, 0] == pytest.approx(math.sqrt(24.0 * EI / LENGTH**3 / mass), rel=2e-3)
+    assert moved.frequencies[0, 0] > 10.0 * moved.free_frequencies[0, 0]
+    data = pf.statics_dataset(moved)
+    assert data["free_frequency"].values[:, 0] == pytest.approx(moved.free_frequencies[:, 0] / (2.0 * math.pi))
+
+
+# Redundant constraints
+
+
+def test_moments_of_three_slides_in_a_loop_are_not_determined_and_their_forces_are() -> None:
+    with pytest.warns(pf.ResultWarning, match="moments in flat, slope, upright are not determined"):
+        found = pf.statics(wedge(), held=["upright"])
+    data = pf.statics_dataset(found).isel(step=-1)
+    assert np.isnan(data["joint_moment"].values).all()
+    # The slope takes 50 N sideways, and as its normal says; weights of 2 and 3 kg come to the others.
+    normal = 50.0 * np.array([-1.0, math.sqrt(3.0)])
+    assert data["joint_force"].sel(joint="slope").values == pytest.approx(normal, rel=1e-9)
+    assert data["joint_force"].sel(joint="flat").values == pytest.approx([0.0, 2.0 * 9.81 + normal[1]], abs=1e-8)
+    assert found.known_effort("upright")[-1] == pytest.approx(3.0 * 9.81 - normal[1], rel=1e-9)
+
+
+def test_three_cranks_share_forces_along_them_in_any_way() -> None:
+    slanted = pf.statics(cranks(1.0), held=["A0"], warning=False)
+    data = pf.statics_dataset(slanted).isel(step=-1)
+    assert np.isnan(data["joint_force"].values).all()
+    assert data["joint_moment"].values[1:] == pytest.approx(np.zeros(5), abs=1e-9)
+    torque = 9.81 * (3.0 * 0.25 + 2.0 * 0.5) * math.cos(1.0)
+    assert slanted.known_effort("A0")[-1] == pytest.approx(torque, rel=1e-9)
+    assert data["frame_force"].values == pytest.approx([0.0, -5.0 * 9.81], abs=1e-8)
+    # Upright cranks push upwards alone; two that are held share the torque.
+    upright = pf.statics_dataset(pf.statics(cranks(math.pi / 2), held=["A0"], warning=False))["joint_force"].values[-1]
+    assert upright[:, 0] == pytest.approx(np.zeros(6), abs=1e-9)
+    assert np.isnan(upright[:, 1]).all()
+    assert math.isnan(measure(slanted, ["joint_force_max"])["joint_force_max"])
+    assert "forces in A0, B0" in coarseness(slanted, ["joint_force_max"])
+    assert coarseness(slanted, ["strain_energy_max"]) == ""
+    both = pf.statics(cranks(1.0), held=["A0", "A1"], warning=False)
+    assert np.isnan([both.known_effort("A0")[-1], both.known_effort("A1")[-1]]).all()
+    assert both.effort("A0")[-1] + both.effort("A1")[-1] == pytest.approx(torque, rel=1e-9)
+    assert np.isnan(pf.statics_dataset(both)["effort"].values).all()
+
+
+def test_a_run_marks_what_redundant_constraints_share() -> None:
+    with pytest.warns(pf.ResultWarning, match="loads-undetermined"):
+        run = pf.simulate_motion(wedge(), 0.1, samples=5)
+    data = pf.motion_dataset(run)
+    assert np.isnan(data["joint_moment"].values).all()
+    # 2 x'' = -50 + N / 2, 3 y'' = N sqrt(3) / 2 - 3 g, y'' = -x'' / sqrt(3).
+    force = 3.0 * (9.81 + 25.0 / math.sqrt(3.0)) / (0.5 * math.sqrt(3.0) + 0.75 / math.sqrt(3.0))
+    wanted = force * np.array([-0.5, 0.5 * math.sqrt(3.0)])
+    assert data["joint_force"].sel(joint="slope").values == pytest.approx(np.array([wanted] * 5), rel=1e-8)
 
 
 # Errors

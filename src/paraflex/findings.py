@@ -111,6 +111,7 @@ _DOUBTFUL = {
     "frequency-low": "A link vibrates on its own far slower than links do.",
     "torque-large": "Torques or forces are far beyond what mass, size and speed make plausible.",
     "force-large": "Forces of joints or drives are far beyond what mass, acceleration and loads make plausible.",
+    "loads-undetermined": "Redundant constraints share forces or moments of joints in any way: none of them is known.",
     "stress-over-strength": "The stress in a beam exceeds the strength of its material: the safety factor is below 1.",
     "deflection-large": "A link bends so far that it is more a spring than a link.",
     "energy-unbalanced": "Energy and work of a run do not balance: it is not accurate, or unstable.",

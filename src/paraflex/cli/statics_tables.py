@@ -10,7 +10,15 @@ from rich.console import Console
 
 from paraflex.cli.tables import plain_table, print_titled
 from paraflex.results.statics_data import statics_summary
-from paraflex.results.statics_rows import buckling_words, four_digits, is_stressed, last_rows, step_table
+from paraflex.results.statics_rows import (
+    buckling_words,
+    four_digits,
+    is_stressed,
+    last_rows,
+    lowest_frequencies,
+    no_buckling,
+    step_table,
+)
 from paraflex.units import STRESS
 
 
@@ -35,11 +43,14 @@ def print_statics(out: Console, data: xr.Dataset) -> None:
 def _lines(data: xr.Dataset, summary: dict) -> list[str]:
     lines = []
     last = data.isel(step=-1)
-    frequencies = [x for x in last["natural_frequency"].values if np.isfinite(x)]
-    if frequencies:
-        lines.append("frequencies: " + ", ".join(map(four_digits, frequencies)) + " Hz, what is held and moved kept")
+    for name, word in lowest_frequencies(data).items():
+        kept = "what is moved let go" if word == "free" else "what is held and moved kept"
+        known = ", ".join(four_digits(x) for x in last[name].values if np.isfinite(x))
+        lines.append(f"{'free ' if word == 'free' else ''}frequencies: {known} Hz, {kept}")
     if words := buckling_words(data):
         lines.append(f"buckling at {words}")
+    elif words := no_buckling(data):
+        lines.append(words)
     if is_stressed(data):
         body = int(np.nanargmax(data["stress_max"].values))
         one = data.isel(body=body)

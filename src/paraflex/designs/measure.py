@@ -29,10 +29,12 @@ from paraflex.results.metrics import (
     VALIDITY,
     Members,
     Metric,
+    metric_name,
     sliding,
 )
 from paraflex.results.run_traces import MotionTraces, RunTraces, StaticsTraces, run_traces
 from paraflex.tracking import TrackingRun
+from paraflex.validity import shared_loads
 
 Runs = TrackingRun | MotionRun | Statics
 RunsTraces = RunTraces | MotionTraces | StaticsTraces
@@ -48,7 +50,7 @@ SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)
 
 def metric_of(column: str) -> Metric:
     """The metric of a column."""
-    return METRICS[column.partition(".")[0]]
+    return METRICS[metric_name(column)]
 
 
 def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tuple(METRICS)) -> None:
@@ -59,9 +61,10 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
     InputError
         There is none; it proposes one of those known.
     """
-    name = column.partition(".")[0]
+    name = metric_name(column)
     if name not in METRICS:
         raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(known)))
+    metric_of(column)
 
 
 def members_of(mechanism: Mechanism, given: Conditions | None = None) -> Members:
@@ -159,15 +162,16 @@ def measure(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
 
 
 def coarseness(run: Runs, names: Sequence[str]) -> str:
-    """Why the largest loads among some metrics of a run may lie between its samples; empty where they do not."""
+    """Why metrics of loads may not be the largest, between samples, or are not determined; empty otherwise."""
     found = [one for one in run.solution.findings if one.code == COARSE] if set(names) & set(_LARGEST_LOADS) else []
+    found += shared_loads(run_traces(run).system, run.solution) if "joint_force_max" in names else []
     return "; ".join(f"{one.text}; {one.remedy}" for one in found)
 
 
 def coarse_runs(runs: int) -> str:
-    """A sentence on runs with too few samples for their largest loads."""
+    """A sentence on runs whose metrics do not have the largest loads: too few samples, or not determined."""
     which = "one run has" if runs == 1 else f"{runs} runs have"
-    return f"{which} larger loads between the samples than metrics show (column reason): take more samples [{COARSE}]"
+    return f"{which} loads that metrics lack, between the samples or not determined (column reason) [{COARSE}]"
 
 
 def smooth_metrics(names: Sequence[str]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics.constraints import RowTerm, Term, row_order
@@ -18,6 +19,7 @@ from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_coordinates import axis_angle, marker_place
 from paraflex.dynamics.points import point_motion
+from paraflex.dynamics.rank import NO_PART, dependence
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import ANGLE, POINT
 from paraflex.mechanism import Joint
@@ -112,6 +114,25 @@ def load_in(
         else:
             moment += torque
     return force, moment
+
+
+def undetermined_loads(
+    system: System, names: Sequence[str], q: Array, acting: NDArray[np.int64] | None = None
+) -> JointLoads:
+    """Components of forces (k, joints, 2) and moments (k, joints) that redundant rows, of those acting, share anyhow.
+
+    Rows are redundant in all poses (k, n) or in none that is looked at: the first one shows it.
+    """
+    force, moment = np.zeros((len(q), len(names), 2), dtype=bool), np.zeros((len(q), len(names)), dtype=bool)
+    for k, pose in enumerate(q):
+        free = dependence(system, pose, acting=acting).self_stresses(system.row_units)
+        if not len(free):
+            break
+        still = np.zeros((len(free), len(system.mechanism.motors)))
+        loads = joint_loads(system, names, np.repeat(pose[None], len(free), axis=0), free, still)
+        force[k] = np.any(np.abs(loads.force) * system.size > NO_PART, axis=0)
+        moment[k] = np.any(np.abs(loads.moment) > NO_PART, axis=0)
+    return JointLoads(force, moment)
 
 
 def drive_torques(system: System, multipliers: Array) -> Array:

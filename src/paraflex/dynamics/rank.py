@@ -21,7 +21,7 @@ _DEPENDENT_SQUARED = 1e-12
 # Up to so many rows a dense factorisation with pivots is as fast as a sparse one, and finer.
 DENSE_ROWS = 400
 # Rows with less than this part in a dependence have none in it.
-_NO_PART = 1e-6
+NO_PART = 1e-6
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Dependence:
     def sources(self, k: int) -> NDArray[np.int64]:
         """Row numbers from which the k-th dropped row follows."""
         part = np.abs(self.coefficients[:, k])
-        return self.kept[part > _NO_PART * max(1.0, part.max(initial=0.0))]
+        return self.kept[part > NO_PART * max(1.0, part.max(initial=0.0))]
 
     def conflict(self, residual: Array) -> Array:
         """Residual of each dropped row less that implied by the rows it follows from; residual (m,)."""
@@ -56,12 +56,17 @@ class Dependence:
 
     def least_norm(self, multipliers: Array) -> Array:
         """Multipliers (m,) of the same constraint forces with the least sum of squares."""
-        out = multipliers.copy()
-        if self.dropped.size:
-            null = np.vstack([-self.coefficients, np.eye(self.dropped.size)])
-            rows = np.concatenate([self.kept, self.dropped])
-            out[rows] -= null @ np.linalg.lstsq(null, multipliers[rows], rcond=None)[0]
-        return out
+        free = self.self_stresses(np.ones(multipliers.size)).T
+        return multipliers - free @ np.linalg.lstsq(free, multipliers, rcond=None)[0]
+
+    def self_stresses(self, units: Array) -> Array:
+        """Multipliers (dropped, m) that exert no force, the largest times units (m,) of size one.
+
+        What redundant rows carry is determined up to these.
+        """
+        out = np.zeros((self.dropped.size, units.size))
+        out[:, self.kept], out[:, self.dropped] = -self.coefficients.T, np.eye(self.dropped.size)
+        return out / np.max(np.abs(out * units), axis=1, keepdims=True)
 
 
 def constraint_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
@@ -69,7 +74,10 @@ def constraint_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
     return sparse_jacobian(system, q) if system.m > DENSE_ROWS else scipy.sparse.csr_matrix(system.jacobian(q))
 
 
-def dependence(system: System, q: Array, threshold: float = DEPENDENT, count: int | None = None) -> Dependence:
+def dependence(
+    system: System, q: Array, threshold: float = DEPENDENT, count: int | None = None,
+    acting: NDArray[np.int64] | None = None,
+) -> Dependence:  # fmt: skip
     """Redundant constraint rows at q.
 
     Parameters
@@ -80,11 +88,13 @@ def dependence(system: System, q: Array, threshold: float = DEPENDENT, count: in
         A row does where its independent part is smaller than this, as a fraction of the largest.
     count : int, optional
         How many rows do, in place of the threshold, where that is known.
+    acting : (c,) array, optional
+        The constraint rows that count; all by default.
     """
-    rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
+    rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0] if acting is None else acting
     if rigid.size == 0:
         return Dependence(rigid, rigid, np.zeros((0, 0)))
-    if rigid.size <= DENSE_ROWS:
+    if rigid.size <= DENSE_ROWS or acting is not None:
         return _dense(system, q, rigid, threshold, count)
     return _sparse(system, q, rigid, threshold, count)
 

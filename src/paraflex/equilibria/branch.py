@@ -93,19 +93,21 @@ class Branch:
         except _Failed:
             raise EquilibriumError("no static equilibrium is found near the start", remedy=_LOOSE) from None
 
-    def follow(self, first: Point, steps: int) -> Iterator[Point]:
-        """Points at multiples of a fraction of one, and limit points, in the order of the branch, until one.
+    def follow(self, first: Point, steps: int, goal: float = 1.0) -> Iterator[Point]:
+        """Points at multiples of a fraction of one, and limit points, in the order of the branch, until a goal.
 
         Parameters
         ----------
         first : Point
         steps : int
             How many multiples there are up to one. Where the branch turns back multiples below zero are met too.
+        goal : float
+            Fraction at which the branch ends.
 
         Raises
         ------
         LimitPointError
-            The branch turns back and does not come to one.
+            The branch turns back and does not come to the goal.
         EquilibriumError
             It ends.
         """
@@ -121,9 +123,9 @@ class Branch:
                 parts.insert(1, branch._limit(here, there))
                 turned = True
             for a, b in pairwise(parts):
-                yield from branch._between(a, b, steps)
+                yield from branch._between(a, b, steps, goal)
                 furthest = max(furthest, b.at.s)
-                if furthest >= 1.0:
+                if furthest >= goal:
                     return
                 if b.limit:
                     yield b
@@ -177,10 +179,10 @@ class Branch:
             return Point(found, tangent), min(longest, step * (_GROWTH if counted[0] <= _FEW else 1.0))
         raise self._stopped(here.at)
 
-    def _between(self, a: Point, b: Point, steps: int) -> Iterator[Point]:
+    def _between(self, a: Point, b: Point, steps: int, goal: float) -> Iterator[Point]:
         """Points at multiples between two points, the second included, in the order of the branch."""
         if b.at.s > a.at.s:
-            inside = range(int(np.floor(a.at.s * steps)) + 1, min(int(np.floor(b.at.s * steps)), steps) + 1)
+            inside = range(int(np.floor(a.at.s * steps)) + 1, int(np.floor(min(b.at.s, goal) * steps)) + 1)
         else:
             inside = range(int(np.ceil(a.at.s * steps)) - 1, int(np.ceil(b.at.s * steps)) - 1, -1)
         for k in inside:

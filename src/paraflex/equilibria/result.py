@@ -13,6 +13,7 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import System
+from paraflex.dynamics.rank import NO_PART, Dependence, dependence
 from paraflex.equilibria.branch import Point
 from paraflex.equilibria.equations import Equations
 from paraflex.equilibria.given import Coordinate
@@ -22,7 +23,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, doubtful_stresses
+from paraflex.validity import Validity, assess, doubtful_stresses, shared_loads
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class Equilibrium:
     Attributes
     ----------
     point : Point
-    vibrations : Vibrations
+    vibrations, free : Vibrations
+        What is held and moved kept; what is moved let go under the force that moves it.
     buckling : Buckling
     stiffness : (directions,) array
         [N/m, N m/rad]
@@ -40,6 +42,7 @@ class Equilibrium:
 
     point: Point
     vibrations: Vibrations
+    free: Vibrations
     buckling: Buckling
     stiffness: Array
 
@@ -106,10 +109,23 @@ class Statics(Shown):
         found = [self.equations.least_multipliers(one.point.at) for one in self.equilibria]
         return np.array([self.equations.multipliers(at) for at in found])
 
+    @cached_property
+    def _dependence(self) -> list[Dependence]:
+        """Redundant rows of each equilibrium, of those that hold the mechanism."""
+        return [dependence(self.equations.extended, q, acting=self.equations.holding) for q in self.q]
+
     @property
     def frequencies(self) -> Array:
-        """Natural frequencies (k, f), zero of motions that grow, NaN where there are fewer [rad/s]."""
+        """Natural frequencies (k, f), zero of motions that grow, NaN where there are fewer [rad/s].
+
+        What is held and moved stays; see `free_frequencies`.
+        """
         return self.within_rows([np.sqrt(np.maximum(one.vibrations.squares, 0.0)) for one in self.equilibria])
+
+    @property
+    def free_frequencies(self) -> Array:
+        """The same (k, f) with what is moved let go, under the force that moved it there [rad/s]."""
+        return self.within_rows([np.sqrt(np.maximum(one.free.squares, 0.0)) for one in self.equilibria])
 
     @staticmethod
     def within_rows(rows: Sequence[Array]) -> Array:
@@ -141,9 +157,18 @@ class Statics(Shown):
 
     @checked_arguments()
     def effort(self, name: str) -> Array:
-        """Force or torque (k,) at a named coordinate: given, or what holds or moves it [N, N m]."""
-        number = self.equations.number(self._named(name))
-        return -self.multipliers[:, number]
+        """Force or torque (k,) at a named coordinate: given, or what holds or moves it [N, N m].
+
+        Of least norm where it is not determined; see `known_effort`.
+        """
+        return -self.multipliers[:, self.equations.number(self._named(name))]
+
+    @checked_arguments()
+    def known_effort(self, name: str) -> Array:
+        """The same (k,), NaN where redundant rows share it in any way: two drives that hold one motion."""
+        number, units = self.equations.number(self._named(name)), self.equations.extended.row_units
+        free = [one.self_stresses(units)[:, number] * units[number] for one in self._dependence]
+        return np.where([np.any(np.abs(one) > NO_PART) for one in free], np.nan, self.effort(name))
 
     @checked_arguments()
     def stiffness(self, name: str) -> Array:
@@ -163,7 +188,10 @@ class Statics(Shown):
     @cached_property
     def solution(self) -> Solution:
         """The equilibria as samples at rest of `equations.extended`, numbered in place of times."""
-        return resting_solution(self.equations.extended, self.q, self.multipliers, self.status, self.message)
+        equations = self.equations
+        return resting_solution(
+            equations.extended, self.q, self.multipliers, equations.holding, self.status, self.message
+        )
 
     @cached_property
     def validity(self) -> Validity | None:
@@ -173,7 +201,8 @@ class Statics(Shown):
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
         """Findings: unstable equilibria with the motion that grows, stresses beyond the strength."""
-        stresses = tuple(doubtful_stresses(self.equations.extended, self.solution))
+        of_loads = (doubtful_stresses, shared_loads)
+        stresses = tuple(one for of in of_loads for one in of(self.equations.extended, self.solution))
         unstable = np.flatnonzero(~self.stable & ~self.limit)
         if not unstable.size:
             return stresses

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System
@@ -12,14 +13,17 @@ from paraflex.integrators import Solution
 from paraflex.kernel.packed import SPRING
 
 
-def resting_solution(system: System, q: Array, multipliers: Array, status: str, message: str) -> Solution:
-    """Samples at rest with coordinates (k, n) and multipliers (k, m), numbered in place of times."""
+def resting_solution(
+    system: System, q: Array, multipliers: Array, acting: NDArray[np.int64], status: str, message: str
+) -> Solution:
+    """Samples at rest with coordinates (k, n) and multipliers (k, m) of rows that act, numbered in place of times."""
     zeros = np.zeros(len(q))
     return Solution(
         t=np.arange(len(q), dtype=float), q=q, v=np.zeros_like(q), a=np.zeros_like(q), multipliers=multipliers,
         kinetic_energy=zeros, strain_energy=strain_energy(system, q, multipliers), work=zeros, status=status,
         message=message, steps=len(q), rejected=0, newton_iterations=0, factorisations=0, wall_time=0.0,
         constraint_position_max=0.0, constraint_velocity_max=0.0, energy_balance_max=0.0, resting=True,
+        acting=acting,
     )  # fmt: skip
 
 

@@ -7,24 +7,27 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
 from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, slowest, typical_square, undamped_modes
-from paraflex.dynamics.sparse import solved
+from paraflex.dynamics.sparse import Saddle, solved
 from paraflex.equilibria.branch import Point
 from paraflex.equilibria.equations import Equations, Matrices, Unknowns
 from paraflex.equilibria.given import Coordinate
-from paraflex.linear.independent import unit_rows
 
-Complex = NDArray[np.complex128]
 # Differences along the branch move links by this [sizes of the mechanism, rad], and change the fraction by no more.
 _MOVE, _FRACTION = 1e-4, 1e-2
 # Of an eigenvalue that belongs to no buckling: load stiffness as a part of the stiffness.
 _NOTHING = 1e-9
-# The imaginary part of a real eigenvalue, as a part of it.
-_COMPLEX = 1e-6
+# Places and turns of links give way before links bend or stretch: what they cost, as a part of typical energies.
+_RIGID_FIRST = 1e-6
+# Typical energies are those of so many slowest vibrations.
+_SLOWEST = 5
+# Links turn by no more until the fraction at which something buckles by a linear estimate [rad].
+_MOST_TURN = 2.0 * np.pi
+# Of more coordinates dense matrices take minutes.
+_MOST_COORDINATES = 2000
 
 
 class Vibrations(NamedTuple):
@@ -59,10 +62,13 @@ class Buckling(NamedTuple):
         Ascending, of all that is given; those above the fraction of the equilibrium, NaN where there are fewer.
     shapes : (n, b) array
         The largest displacement or turn is one [sizes of the mechanism, rad].
+    reason : str
+        Why there is no factor; empty where nothing buckles.
     """
 
     factors: Array
     shapes: Array
+    reason: str
 
 
 def vibrations(equations: Equations, found: Matrices) -> Vibrations:
@@ -77,60 +83,94 @@ def vibrations(equations: Equations, found: Matrices) -> Vibrations:
         freedoms = equations.system.n - equations.independent(C)[0].size
         low = slowest(symmetric, M, C, typical, min(LOWEST, freedoms), freedoms)
         return Vibrations(low.squares, low.shapes, False)
-    basis = admissible(C, elastic, typical)
+    # Places and turns by the root of their mass, as elastic coordinates are, whatever the size of the mechanism.
+    sizes = scipy.sparse.diags(1.0 / np.sqrt(np.asarray(M.diagonal())))
+    basis = sizes @ admissible(csr_matrix(C @ sizes), elastic, typical)
     if not basis.shape[1]:
         return Vibrations(np.zeros(0), np.zeros((elastic.size, 0)), True)
     squares, shapes = undamped_modes(basis.T @ (M @ basis), basis.T @ (symmetric @ basis), typical)
     return Vibrations(squares, basis @ shapes, True)
 
 
-def _eigenpairs(a: Array, b: Array) -> tuple[Complex, Complex]:
-    """Eigenvalues (k,) and vectors (k, k) of a x = value b x."""
-    values, vectors = (np.asarray(part, dtype=complex) for part in scipy.linalg.eig(a, b))
-    return values, vectors
-
-
-def buckling(equations: Equations, point: Point, vibration: Vibrations, count: int) -> Buckling:
+def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vibrations, count: int) -> Buckling:
     """Factors of buckling about an equilibrium: fractions s' with a singular K + (s' - s) dK/ds.
 
-    The derivative is along the branch and takes the deflection with it.
+    The derivative is along the branch, in displacements that follow the deflection with the least change of elastic
+    energy. Where links turn, displacements that do not follow stretch them: to first order that couples what stretches
+    links to what bends them, a loss of stiffness that terms of second order cancel.
     """
-    n = equations.system.n
-    none = Buckling(np.full(count, np.nan), np.full((n, count), np.nan))
-    if not count or not vibration.complete or not vibration.squares.size:
-        return none
-    if point.limit or abs(point.tangent.s) < _NOTHING:
-        factors, shapes = none
+    factors, shapes = np.full(count, np.nan), np.full((equations.system.n, count), np.nan)
+    along, squares = point.tangent, vibration.squares
+    if not count or not squares.size:
+        return Buckling(factors, shapes, "")
+    if point.limit or abs(along.s) < _NOTHING:
         factors[0], shapes[:, 0] = point.at.s, _largest_one(equations, vibration.shapes[:, :1])[:, 0]
-        return Buckling(factors, shapes)
-    along = point.tangent
+        return Buckling(factors, shapes, "")
+    if squares[0] <= 0.0 or equations.system.n > _MOST_COORDINATES:
+        reason = f"more than {_MOST_COORDINATES} coordinates" if squares[0] > 0.0 else "the equilibrium is not stable"
+        return Buckling(factors, shapes, reason)
+    basis, stiffness = vibration.shapes, np.diag(squares)
+    if not vibration.complete:
+        basis = admissible(found.rows, equations.elastic, squares[0])
+        stiffness = basis.T @ (found.stiffness @ basis)
+    slow = vibration.shapes[:, :_SLOWEST] / equations.scale[:, None]
+    typical = float(np.median(squares[:_SLOWEST] / np.sum(slow**2, axis=0)))
     reach = float(np.max(np.abs(along.q / equations.scale)))
     step = min(_FRACTION / abs(along.s), _MOVE / max(reach, 1e-300)) * np.sign(along.s)
-    ahead, behind = (_reduced(equations, point.at.plus(along, side * step), vibration.shapes) for side in (1.0, -1.0))
-    change = (ahead - behind) / (2.0 * step * along.s)
-    change, squares = 0.5 * (change + change.T), vibration.squares
-    if np.all(squares > 0.0):
-        inverse, vectors = scipy.linalg.eigh(-change, np.diag(squares))
-    else:
-        found, vectors = _eigenpairs(-change, np.diag(squares))
-        real = np.abs(found.imag) <= _COMPLEX * np.abs(found)
-        inverse, vectors = found.real[real], vectors.real[:, real]
-    typical = float(np.max(np.abs(np.diag(change)) / np.abs(squares), initial=0.0))
-    order = [k for k in np.argsort(-inverse) if inverse[k] > _NOTHING * typical and inverse[k] > _NOTHING][:count]
-    factors, shapes = none
-    factors[: len(order)] = point.at.s + 1.0 / inverse[order]
-    shapes[:, : len(order)] = _largest_one(equations, vibration.shapes @ vectors[:, order])
-    return Buckling(factors, shapes)
+    ahead, behind = (_reduced(equations, point.at.plus(along, side * step), basis, typical) for side in (1.0, -1.0))
+    change = (behind - ahead) / (2.0 * step * along.s)
+    try:
+        inverse, vectors = (part[..., ::-1] for part in scipy.linalg.eigh(change + change.T, stiffness + stiffness.T))
+    except np.linalg.LinAlgError:
+        return Buckling(factors, shapes, "the stiffness is singular to rounding")
+    q = along.q / along.s
+    turn = max(abs(q[body.angle]) for body in equations.system.bodies)
+    turn += float(np.max(np.abs(equations.system.slope_rows @ q), initial=0.0))
+    known = inverse > _NOTHING * max(1.0, *np.abs(inverse))
+    which = np.flatnonzero(known & (_MOST_TURN * inverse > turn))[:count]
+    factors[: which.size] = point.at.s + 1.0 / inverse[which]
+    shapes[:, : which.size] = _largest_one(equations, basis @ vectors[:, which])
+    far = "links would turn by more than a full turn before anything buckles by the linear estimate"
+    return Buckling(factors, shapes, far if known.any() and not which.size else "")
 
 
-def _reduced(equations: Equations, at: Unknowns, shapes: Array) -> Array:
-    """Stiffness (f, f) at a point near by, in displacements nearest to shapes that the rows allow there."""
-    found = equations.matrices(at)
-    scale = equations.scale
-    rows = unit_rows(found.rows.toarray() * scale)
-    moved = shapes / scale[:, None]
-    moved = scale[:, None] * (moved - np.linalg.lstsq(rows, rows @ moved, rcond=1e-10)[0])
+def _reduced(equations: Equations, at: Unknowns, shapes: Array, typical: float) -> Array:
+    """Stiffness (f, f) at a point near by, in displacements that the rows allow there.
+
+    They differ from shapes by as little elastic energy as can be, and within that by least places and turns. Typical
+    is the energy of displacements by sizes of the mechanism.
+    """
+    found, elastic = equations.matrices(at), equations.elastic
+    weight = np.where(elastic > 0.0, elastic / (_RIGID_FIRST * typical), equations.scale**-2.0)
+    nearest = Saddle(csr_matrix(scipy.sparse.diags(weight)), found.rows)
+    moved = shapes - np.column_stack([nearest.solve(0.0, found.rows @ shape)[0] for shape in shapes.T])
     return moved.T @ (found.stiffness @ moved)
+
+
+def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> Buckling:
+    """Factors of the first of some equilibria along their branch, less what the others contradict.
+
+    Where stable equilibria lead to a limit point it is that of the limit point.
+    """
+    point, vibration, own = ahead[0]
+    reached, lost = point.at.s, np.inf
+    for there, moving, that in ahead[1:] if vibration.stable and not point.limit else ():
+        if there.at.s <= reached:
+            break
+        # One square is zero at a limit point; where another is negative the branch has lost its stability before.
+        if there.limit and np.all(moving.squares[1:2] > np.abs(moving.squares[:1])):
+            return Buckling(that.factors[:count], that.shapes[:, :count], "")
+        if there.limit or not moving.stable:
+            lost = there.at.s
+            break
+        reached = there.at.s
+    kept = [k for k, factor in enumerate(own.factors) if factor > reached or reached == point.at.s]
+    reason = own.reason
+    if np.isfinite(own.factors[:1]).any() and not np.any(own.factors[kept[:1]] <= lost):
+        kept, reason = [], f"the branch contradicts the linear estimate: stable up to {reached:.4g} of what is given"
+    parts = (np.append(own.factors[kept], np.full(count, np.nan)), np.pad(own.shapes[:, kept], ((0, 0), (0, count)),
+                                                                        constant_values=np.nan))  # fmt: skip
+    return Buckling(parts[0][:count], parts[1][:, :count], reason)
 
 
 def _largest_one(equations: Equations, shapes: Array) -> Array:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.dynamics import State, pose_at_rest, standing_system
@@ -10,12 +14,18 @@ from paraflex.equilibria.branch import Branch, Point
 from paraflex.equilibria.equations import Equations
 from paraflex.equilibria.given import ModelWithStatics, StaticsDefaults, conditions
 from paraflex.equilibria.result import Equilibrium, Statics
-from paraflex.equilibria.stability import buckling as buckling_about, stiffness as stiffness_at, vibrations
+from paraflex.equilibria.stability import buckling as buckling_about, checked, stiffness as stiffness_at, vibrations
 from paraflex.errors import EquilibriumError, ResultWarning
 from paraflex.findings import warn_of
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, Start
 from paraflex.validity import warn
+
+# Factors of buckling beyond those asked for, in place of those that the branch contradicts.
+_SPARE = 3
+# A limit point is looked for where the linear estimate is further away, as it is off by no more than its distance; and
+# no further along than so much of what is given.
+_NEAR, _FURTHEST = 0.01, 2.0
 
 
 @checked_arguments()
@@ -106,23 +116,47 @@ def _followed(
     system = standing_system(mechanism, start, assembly)
     equations = Equations(system, pose_at_rest(system, start, assembly), given)
     found: list[Equilibrium] = []
+    branch = Branch(equations)
     try:
-        branch = Branch(equations)
         first = branch.first()
         found.append(_equilibrium(equations, first, asked.buckling))
         if given.moved or given.loads:
             for point in branch.follow(first, asked.steps):
                 found.append(_equilibrium(equations, point, asked.buckling))
     except EquilibriumError as error:
-        error.partial = Statics(equations, tuple(found), "failed", str(error)) if found else None
+        error.partial = Statics(equations, _checked(found, [], asked), "failed", str(error)) if found else None
         raise
-    return Statics(equations, tuple(found))
+    return Statics(equations, _checked(found, _limit_beyond(branch, found[-1], asked), asked))
 
 
 def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibrium:
     found = equations.matrices(point.at)
-    vibration = vibrations(equations, found)
+    vibration = free = vibrations(equations, found)
+    if equations.given.moved:
+        moved = [equations.number(one) for one in equations.given.moved]
+        kept = np.flatnonzero(~np.isin(equations.holding, moved))
+        free = vibrations(equations, found._replace(rows=csr_matrix(found.rows[kept])))
     return Equilibrium(
-        point, vibration, buckling_about(equations, point, vibration, buckling),
+        point, vibration, free, buckling_about(equations, point, found, vibration, buckling and buckling + _SPARE),
         stiffness_at(equations, point.at, found, equations.given.measured),
     )  # fmt: skip
+
+
+def _checked(found: list[Equilibrium], beyond: list[Equilibrium], asked: StaticsDefaults) -> tuple[Equilibrium, ...]:
+    """The equilibria with factors of buckling that the branch does not contradict, there and beyond."""
+    seen = [(one.point, one.vibrations, one.buckling) for one in (*found, *beyond)]
+    return tuple(replace(one, buckling=checked(seen[k:], asked.buckling)) for k, one in enumerate(found))
+
+
+def _limit_beyond(branch: Branch, last: Equilibrium, asked: StaticsDefaults) -> list[Equilibrium]:
+    """The limit point beyond what is given, if the last equilibrium buckles by its estimate and there is one near."""
+    estimate = float(np.min(last.buckling.factors[:1], initial=np.inf)) / max(last.point.at.s, 1e-300)
+    if not (last.vibrations.stable and 1.0 + _NEAR < estimate < np.inf):
+        return []
+    try:
+        for point in branch.follow(last.point, asked.steps, min(estimate, _FURTHEST)):
+            if point.limit:
+                return [_equilibrium(branch.equations, point, asked.buckling)]
+    except EquilibriumError:
+        pass
+    return []

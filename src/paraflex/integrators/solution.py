@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.findings import Finding
@@ -56,6 +57,8 @@ class Solution:
         What makes it doubtful: points that slid off their beams.
     resting : bool
         Whether the samples are equilibria, numbered in place of times.
+    acting : (c,) array, optional
+        Numbers of the constraint rows that act; all by default.
     """
 
     t: Array
@@ -84,6 +87,7 @@ class Solution:
     brake_energy: float = 0.0
     findings: tuple[Finding, ...] = ()
     resting: bool = False
+    acting: NDArray[np.int64] | None = None
 
     def instant(self, sample: int, digits: int = 3) -> str:
         """In a text, which sample it is: "t = 0.125 s", or "step 3"."""

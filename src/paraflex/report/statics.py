@@ -28,6 +28,8 @@ from paraflex.results.statics_rows import (
     given_coordinates,
     is_stressed,
     last_rows,
+    lowest_frequencies,
+    no_buckling,
     quantity_word,
     shown_unit,
     step_table,
@@ -71,7 +73,7 @@ def statics_page(data: xr.Dataset) -> Page:
             *([] if summary["status"] == "complete" else [f"{summary['status']}: {summary['message']}"]),
             *doubt_lines(verdict_of(data)),
         ],
-        remarks=list(filter(None, [validity_line({"": summary["validity"]})])),
+        remarks=list(filter(None, [validity_line({"": summary["validity"]}), no_buckling(data)])),
     )
 
 
@@ -133,10 +135,12 @@ def _tiles(data: xr.Dataset, summary: dict[str, Any]) -> list[tuple[str, str, st
         one = data.isel(named=k)
         before = f"{_shown(one, 'stiffness', 0)} at the start" if data.sizes["step"] > 1 else ""
         tiles.append((f"stiffness of {text_symbol(str(one['named'].item()))}", _shown(one, "stiffness", -1), before))
-    frequencies = data["natural_frequency"].values
-    if frequencies.size and np.isfinite(frequencies[-1, 0]):
-        before = f"{frequencies[0, 0]:.4g} Hz at the start" if len(frequencies) > 1 else ""
-        tiles.append(("lowest frequency", f"{frequencies[-1, 0]:.4g} Hz", before))
+    for name, word in lowest_frequencies(data).items():
+        lowest = data[name].values[:, 0]
+        before = f"{lowest[0]:.4g} Hz at the start" if len(lowest) > 1 else ""
+        tiles.append(
+            (f"{'lowest' if word == 'lowest' else f'lowest {word}'} frequency", f"{lowest[-1]:.4g} Hz", before)
+        )
     if words := buckling_words(data):
         factor, _, rest = words.partition(" of what")
         tiles.append(("buckling", f"{factor} ×", f"of what{rest}"))

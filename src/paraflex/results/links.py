@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
-from paraflex.dynamics.joint_loads import FrameLoad, LoadErrors, drive_torques, frame_load, joint_loads, load_errors
+from paraflex.dynamics.joint_loads import (
+    FrameLoad,
+    LoadErrors,
+    drive_torques,
+    frame_load,
+    joint_loads,
+    load_errors,
+    undetermined_loads,
+)
 from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
@@ -115,6 +123,7 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
     coordinates = {joint.name: joint_coordinate(system, joint.name, q, v) for joint in mechanism.joints}
     joints, errors = [joint.name for joint in mechanism.joints], solution.multiplier_errors
     loads = joint_loads(system, joints, q, multipliers, torques[:samples])
+    shared = undetermined_loads(system, joints, q, solution.acting)
     drawn = system_drawing(system, q)
     return Links(
         angle=q[:, first],
@@ -126,8 +135,8 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         points=points.position,
         point_velocity=points.velocity,
         point_acceleration=points.acceleration,
-        joint_force=loads.force,
-        joint_moment=loads.moment,
+        joint_force=np.where(shared.force, np.nan, loads.force),
+        joint_moment=np.where(shared.moment, np.nan, loads.moment),
         multiplier=_multipliers(system, multipliers),
         motor_speed=_stacked([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
         kinetic_energy=solution.kinetic_energy[:samples],

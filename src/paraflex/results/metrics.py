@@ -7,13 +7,16 @@ formulas are sums, products and roots alone.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from paraflex.errors import InputError
 from paraflex.mechanism import rotor_mass
+from paraflex.mechanism.quantities import known
 from paraflex.results.formulas import drift_speed, integral, largest_norm, overshoot, rms, settling_time, vibration
 from paraflex.results.traces import Trace
 from paraflex.units import WHERE_IT_SLIDES
@@ -26,6 +29,13 @@ if TYPE_CHECKING:
 PATH, MOTION, STATICS = "path", "motion", "statics"
 # Kinds of members, of which a metric has a number each: of equilibria named coordinates, and those with a stiffness.
 MOTOR, DRIVE, JOINT, COORDINATE, DIRECTION = "motor", "drive", "joint", "coordinate", "direction"
+# What an expression takes of a coordinate in all steps.
+_TAKEN = {"max": np.max, "min": np.min, "mean": np.mean, "last": lambda values: values[-1]}
+_EXPRESSION = re.compile(
+    rf"(?P<taken>{'|'.join(_TAKEN)})\((?P<magnitude>abs\()?((?P<trace>travel|effort|stiffness|compliance)\.)?"
+    r"(?P<member>[^()]+)\)(?(magnitude)\))"
+)
+_EXPRESSIONS = f"{', '.join(_TAKEN)}, abs, and travel (or nothing), effort, stiffness or compliance of a coordinate"
 # Names of a mechanism's members by these words, and of those that slide by `sliding`.
 Members = Mapping[str, Sequence[str]]
 # Of the traces of a run and those of the nominal one. What only some traces have (`RunTraces`) is asked for as well.
@@ -62,6 +72,8 @@ class Metric:
         Kinds of runs that it is kept of unless metrics are named; all that have it by default.
     judged : bool
         Whether less of it is better, so that designs may be chosen by it.
+    member : str
+        The one member that an expression is of.
     """
 
     name: str
@@ -78,13 +90,23 @@ class Metric:
     of_motors: bool = False
     kept_of: tuple[str, ...] | None = None
     judged: bool = True
+    member: str = ""
 
     def value(self, traces: Any) -> Any:
         """The metric of a run; an array for a metric of each motor, drive or joint."""
         return self.formula(traces, traces)
 
     def columns(self, members: Members) -> list[str]:
-        """Names of its columns: NAME, or NAME.MOTOR for each motor, and so for other members."""
+        """Names of its columns: NAME, or NAME.MOTOR for each motor, and so for other members.
+
+        Raises
+        ------
+        InputError
+            An expression of no such member.
+        """
+        if self.member:
+            known(self.member, members.get(self.each, ()), "metrics", self.each)
+            return [self.name]
         return [f"{self.name}.{member}" for member in members.get(self.each, ())] if self.each else [self.name]
 
     def is_kept_of(self, runs: str) -> bool:
@@ -93,8 +115,38 @@ class Metric:
 
     def unit_of(self, column: str, members: Members) -> str:
         """Unit of one of its columns: of a member that slides that of a length."""
-        slides = column.partition(".")[2] in members.get(sliding(self.each), ())
+        slides = (self.member or column.partition(".")[2]) in members.get(sliding(self.each), ())
         return WHERE_IT_SLIDES.get(self.unit, self.unit) if slides else self.unit
+
+
+class _Metrics(dict[str, Metric]):
+    """Metrics by name; an expression is its own name."""
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or "(" in str(name)
+
+    def __missing__(self, name: str) -> Metric:
+        if "(" not in name:
+            raise KeyError(name)
+        found = _EXPRESSION.fullmatch(name.replace(" ", ""))
+        if found is None:
+            raise InputError("no such expression of a metric", field="metrics", value=name,
+                             remedy=f"write max(abs(body.point.y)); {_EXPRESSIONS}")  # fmt: skip
+        taken, magnitude, trace, member = found.group("taken", "magnitude", "trace", "member")
+        base, size, take = self[trace or "travel"], np.abs if magnitude else np.asarray, _TAKEN[taken]
+
+        def value(run: Any, _: Any) -> Any:
+            here = run.run.coordinates if base.each == COORDINATE else run.run.directions
+            column = getattr(run, base.name)[:, [one.name for one in here].index(member)]
+            return take(size(column))
+
+        meaning = f"{name} of {base.name} in all steps, with its sign unless by abs"
+        return replace(base, name=name, meaning=meaning, formula=value, label=name, kept_of=(), member=member)
+
+
+def metric_name(column: str) -> str:
+    """The metric of a column: NAME of NAME.MEMBER, an expression itself."""
+    return column if "(" in column else column.partition(".")[0]
 
 
 def sliding(each: str) -> str:
@@ -104,7 +156,7 @@ def sliding(each: str) -> str:
 
 def metric_unit(column: str, members: Members) -> str:
     """Unit of a column, of a mechanism with these members."""
-    return METRICS[column.partition(".")[0]].unit_of(column, members)
+    return METRICS[metric_name(column)].unit_of(column, members)
 
 
 def _saturated_share(controllers: Sequence[ControllerRecord]) -> float:
@@ -320,7 +372,7 @@ _ALL = (
     _of_the_solver("steps", "accepted steps", whole=True),
     _of_the_solver("rejected", "rejected steps", whole=True),
     _of_the_solver("newton_iterations", "Newton iterations", whole=True),
-    _of_statics("travel", "change of each named coordinate from the start to the last step", "rad",
+    _of_statics("travel", "change of each named coordinate from the start to the last step, with its sign", "rad",
                 lambda x: x.travel[-1], each=COORDINATE),
     _of_statics("travel_max", "largest magnitude of each named coordinate's change in all steps", "rad",
                 lambda x: _peaks(x.travel), "largest travel", each=COORDINATE, judged=True),
@@ -338,6 +390,8 @@ _ALL = (
                 lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, judged=True),
     _of_statics("frequency", "lowest natural frequency at the last step, what is held and moved kept", "Hz",
                 lambda x: x.frequency[-1], "lowest natural frequency at the last step"),
+    _of_statics("frequency_free", "lowest natural frequency at the last step, what is moved let go", "Hz",
+                lambda x: x.free_frequency[-1], "lowest free frequency at the last step"),
     _of_statics("frequency_min", "lowest natural frequency of all steps; zero where a motion grows", "Hz",
                 lambda x: np.min(x.frequency), "lowest natural frequency"),
     _of_statics("buckling_factor", "fraction of what is given at which it buckles, seen from the start; NaN for none",
@@ -348,7 +402,7 @@ _ALL = (
                 judged=True),
 )  # fmt: skip
 
-METRICS: Mapping[str, Metric] = {metric.name: metric for metric in _ALL}
+METRICS: Mapping[str, Metric] = _Metrics({metric.name: metric for metric in _ALL})
 
 
 def metric_label(column: str, motor: Callable[[str], str] = str) -> str:
@@ -361,6 +415,8 @@ def metric_label(column: str, motor: Callable[[str], str] = str) -> str:
     motor : callable
         How the name of a motor, drive or joint is printed.
     """
+    if "(" in column:
+        return column
     name, dot, whose = column.partition(".")
     printed = METRICS[name].label if name in METRICS else ""
     return (printed or name.replace("_", " ")) + (f" of {motor(whose)}" if dot else "")

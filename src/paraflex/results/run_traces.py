@@ -14,7 +14,7 @@ from paraflex.control.laws import internal_torques
 from paraflex.control.loop import ControllerRecord
 from paraflex.control.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
-from paraflex.dynamics.joint_loads import drive_torques, joint_parts, load_in
+from paraflex.dynamics.joint_loads import drive_torques, joint_parts, load_in, undetermined_loads
 from paraflex.dynamics.points import point_motion
 from paraflex.equilibria.given import Coordinate
 from paraflex.equilibria.result import Statics
@@ -79,14 +79,17 @@ class SolutionTraces(Generic[R]):
 
     @cached_property
     def joint_force(self) -> Trace:
-        """Magnitude of the force in every joint (k, joints) [N]; zero where it is not known."""
+        """Magnitude of the force in every joint (k, joints) [N]; zero near poles, NaN where not determined."""
         system, solution = self.system, self.solution
         multipliers = np.where(np.isnan(solution.multipliers), 0.0, solution.multipliers)
         forces = [
             load_in(system, joint.name, joint_parts(system, joint.name), solution.q, multipliers, self.torque)[0]
             for joint in system.described.joints
         ]
-        return np.stack([length(each) for each in forces], axis=1) if forces else np.zeros((len(solution.q), 0))
+        names = [joint.name for joint in system.described.joints]
+        shared = undetermined_loads(system, names, solution.q.real, solution.acting).force.any(axis=2)
+        known = np.stack([length(each) for each in forces], axis=1) if forces else np.zeros((len(solution.q), 0))
+        return np.where(shared, np.nan, known)
 
     @cached_property
     def joint_speed(self) -> Trace:
@@ -200,7 +203,7 @@ class StaticsTraces(SolutionTraces[Statics]):
     @cached_property
     def effort(self) -> Trace:
         """Force or torque (k, coordinates) at every named coordinate [N, N m]."""
-        return self._columns(self.run.effort, self.run.coordinates)
+        return self._columns(self.run.known_effort, self.run.coordinates)
 
     @cached_property
     def stiffness(self) -> Trace:
@@ -216,7 +219,15 @@ class StaticsTraces(SolutionTraces[Statics]):
     @property
     def frequency(self) -> Trace:
         """Lowest natural frequency (k,) [Hz]; NaN where nothing can move."""
-        found = self.run.frequencies
+        return self._lowest(self.run.frequencies)
+
+    @property
+    def free_frequency(self) -> Trace:
+        """The same (k,) with what is moved let go [Hz]."""
+        return self._lowest(self.run.free_frequencies)
+
+    @staticmethod
+    def _lowest(found: Trace) -> Trace:
         return found[:, 0] / (2.0 * np.pi) if found.shape[1] else np.full(len(found), np.nan)
 
     @property

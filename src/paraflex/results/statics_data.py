@@ -44,8 +44,10 @@ UNITS = {
     "role": ("what is given of a named coordinate", "1"),
     "stiffness": ("force for a unit displacement of a named coordinate", ""),
     "compliance": ("displacement by a unit force at a named coordinate", ""),
-    "natural_frequency": ("undamped natural frequency about the equilibrium", "Hz"),
+    "natural_frequency": ("undamped natural frequency about the equilibrium, held", "Hz"),
+    "free_frequency": ("undamped natural frequency about the equilibrium, free", "Hz"),
     "buckling_factor": ("fraction of all that is given at which the mechanism buckles", "1"),
+    "buckling_note": ("why a step has no factor of buckling; empty where it has one, or nothing buckles", "1"),
     "buckling_shape": ("displacement of drawn points as it buckles, the largest is 1", "1"),
     "stress_step": ("step at which a beam's stress is largest", "1"),
 }
@@ -58,7 +60,9 @@ _COMMENTS = {
     "effort": "on the mechanism along the coordinate: of a joint on its second body",
     "stiffness": "others are held and moved as they are, the coordinate itself set free; infinite where it cannot move",
     "natural_frequency": "zero of a motion that grows; what is held and moved stays",
-    "buckling_factor": "from the stiffness about the equilibrium and its change along the branch; NaN where none is",
+    "free_frequency": "zero of a motion that grows; what is moved is let go, under the force that moved it",
+    "buckling_factor": "that of the limit point to which stable steps lead, else a linear estimate from the stiffness "
+    "and its change along the branch; NaN where none is, see buckling_note",
 }
 
 
@@ -133,15 +137,24 @@ def _of_steps(found: Statics) -> dict[str, Any]:
         "stable": ("step", found.stable),
         "place": (*along, _columns(found, found.place)),
         "travel": (*along, _columns(found, found.travel)),
-        "effort": (*along, _columns(found, found.effort)),
+        "effort": (*along, _columns(found, found.known_effort)),
         "stiffness": (*along, stiffness),
         "compliance": (*along, compliance),
-        "natural_frequency": (("step", "frequency_number"), found.frequencies[:, :_FREQUENCIES] / (2.0 * np.pi)),
+        "natural_frequency": (("step", "frequency_number"), _hertz(found.frequencies, found)),
+        "free_frequency": (("step", "frequency_number"), _hertz(found.free_frequencies, found)),
         "buckling_factor": (("step", "buckling_number"), found.buckling),
+        "buckling_note": ("step", [one.buckling.reason for one in found.equilibria]),
         **_buckling_shapes(found),
         **_given_travel(found),
         **_motors(found),
     }
+
+
+def _hertz(frequencies: np.ndarray, found: Statics) -> np.ndarray:
+    """The lowest frequencies (k, f) [Hz], f as many as there are with what is moved let go."""
+    out = np.full((len(frequencies), min(found.free_frequencies.shape[1], _FREQUENCIES)), np.nan)
+    out[:, : frequencies.shape[1]] = frequencies[:, : out.shape[1]] / (2.0 * np.pi)
+    return out
 
 
 def _given_travel(found: Statics) -> dict[str, Any]:
@@ -183,7 +196,7 @@ def _motors(found: Statics) -> dict[str, Any]:
     torque = np.zeros((len(found.equilibria), len(at)))
     for k, joint in enumerate(at):
         if joint in names:
-            torque[:, k] = found.effort(joint) / at.count(joint)
+            torque[:, k] = found.known_effort(joint) / at.count(joint)
     units = list(dict.fromkeys(mechanism.motor_units()))
     return {"torque": (("step", "motor"), torque, {"long_name": "motor torque or force", "units": ", ".join(units)})}
 
@@ -197,7 +210,7 @@ def _names(found: Statics) -> dict[str, Any]:
         "role": ("named", [roles.get(one, "free") for one in coordinates]),
         "unit": ("named", [one.unit for one in coordinates]),
         "effort_unit": ("named", [one.effort_unit for one in coordinates]),
-        "frequency_number": np.arange(1, min(found.frequencies.shape[1], _FREQUENCIES) + 1),
+        "frequency_number": np.arange(1, min(found.free_frequencies.shape[1], _FREQUENCIES) + 1),
         "buckling_number": np.arange(1, found.buckling.shape[1] + 1),
     }
 
@@ -270,7 +283,8 @@ def statics_summary(data: xr.Dataset) -> dict[str, Any]:
             }
             for name in data["named"].values
         },
-        "natural_frequency": [finite_or_none(float(x)) for x in last["natural_frequency"].values],
+        **{name: [finite_or_none(float(x)) for x in last[name].values] for name in
+           ("natural_frequency", "free_frequency")},
         **({"stress_max": _of_bodies(data["stress_max"])} if "stress_max" in data else {}),
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),

@@ -21,6 +21,8 @@ GIVEN = ("moved", "loaded")
 _NO_STRESS = 1.0
 # Stiffnesses that differ by more are drawn on a logarithmic axis.
 _SPREAD = 30.0
+# Factors of buckling that differ by less are the same.
+_SAME = 0.01
 # Quantities of a coordinate, and the word of each in a table.
 _LAST = ("travel", "effort", "stiffness", "compliance")
 
@@ -49,14 +51,21 @@ def step_table(data: xr.Dataset) -> StepTable:
                 name = str(one["named"].item()) if quantity == "travel" else quantity_word(one, quantity)
                 heads.append((name, shown.name))
                 columns.append([four_digits(shown.factor * x) for x in values])
-    if data.sizes["frequency_number"]:
-        heads.append(("lowest", "Hz"))
+    if word := lowest_frequencies(data).get("natural_frequency"):
+        heads.append((word, "Hz"))
         columns.append([four_digits(x) for x in data["natural_frequency"].values[:, 0]])
     kinds = step_kinds(data)
     steps = range(data.sizes["step"])
     every = math.ceil(len(steps) / _ROWS)
     kept = [k for k in steps if k % every == 0 or k == steps[-1] or kinds[k] == "limit point"]
     return StepTable(heads, [[kinds[k], *(column[k] for column in columns)] for k in kept], len(steps))
+
+
+def lowest_frequencies(data: xr.Dataset) -> dict[str, str]:
+    """Variables of natural frequencies and what tells them apart: "held" and "free" where something is moved."""
+    words = {"natural_frequency": "held", "free_frequency": "free"}
+    words = words if (data["role"] == "moved").any() else {"natural_frequency": "lowest"}
+    return {name: word for name, word in words.items() if name in data and np.isfinite(data[name].values[:, :1]).any()}
 
 
 def last_rows(data: xr.Dataset) -> Iterator[list[str]]:
@@ -75,7 +84,15 @@ def buckling_words(data: xr.Dataset) -> str:
     seen = [f"{factors[0, 0]:.4g} of what is given, as seen from the start"]
     if data.sizes["step"] > 1 and np.isfinite(factors[-1, 0]):
         seen.append(f"{factors[-1, 0]:.4g} as seen from the last step")
+        if abs(factors[-1, 0] / factors[0, 0] - 1.0) > _SAME:
+            seen[-1] += ": linear estimates, which change along the branch"
     return ", ".join(seen)
+
+
+def no_buckling(data: xr.Dataset) -> str:
+    """Why no factor of buckling is known at the start, in words; empty if one is, or nothing buckles."""
+    reason = str(data["buckling_note"].values[0]) if "buckling_note" in data else ""
+    return f"no factor of buckling: {reason}" if reason and (data["role"] == "loaded").any() else ""
 
 
 def is_stressed(data: xr.Dataset) -> bool:

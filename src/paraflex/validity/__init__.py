@@ -32,6 +32,7 @@ from paraflex.validity.plausibility import (
     doubtful_results as doubtful_results,
     doubtful_stresses as doubtful_stresses,
     moved_far as moved_far,
+    shared_loads as shared_loads,
     stiff_modes as stiff_modes,
 )
 

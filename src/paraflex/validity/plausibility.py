@@ -11,7 +11,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, joint_coordinate, missed_turns
-from paraflex.dynamics.joint_loads import drive_torques, load_errors
+from paraflex.dynamics.joint_loads import drive_torques, load_errors, undetermined_loads
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import RESOLVED, Finding
@@ -136,6 +136,7 @@ def doubtful_results(
         *_unresolved(where, system, solution),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
+        *shared_loads(system, solution),
     ]
     if driven is not None:
         found += [*_lost(where, driven), *_large_torques(where, system, driven, solution.t)]
@@ -145,6 +146,21 @@ def doubtful_results(
 def doubtful_stresses(system: System, solution: Solution) -> list[Finding]:
     """Findings about the stresses of equilibria or a run."""
     return list(_overstressed(_Where("", system.described), system, solution))
+
+
+def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
+    """Findings about forces and moments of joints that redundant constraints share in any way."""
+    names = [joint.name for joint in system.described.joints]
+    found = undetermined_loads(system, names, solution.q, solution.acting)
+    kinds = {"forces": found.force.any(axis=(0, 2)), "moments": found.moment.any(axis=0)}
+    parts = [f"{kind} in {', '.join(np.array(names)[at])}" for kind, at in kinds.items() if at.any()]
+    if parts:
+        yield Finding(
+            "loads-undetermined", "", f"{' and '.join(parts)} are not determined: redundant constraints share them in "
+            "any way, and tables have none of them",
+            "leave out what holds twice, with `slot` or `revolute` joints in place of `prismatic` or `weld` ones, or "
+            "make links flexible in what they share",
+        )  # fmt: skip
 
 
 def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
-from paraflex.designs.measure import check_smooth
+from paraflex.designs.measure import check_smooth, metric_of
 from paraflex.designs.run import Task
 from paraflex.designs.setting import INTEGRATION, Setting
 from paraflex.dynamics import pack_signals
@@ -142,7 +142,7 @@ def check_differentiable_study(setting: Setting, values: Sequence[float], column
         derivatives, or such a parameter.
     """
     check_has_path(setting)
-    check_smooth(tuple(column.partition(".")[0] for column in columns))
+    check_smooth(tuple(metric_of(column).name for column in columns))
     model, options = setting.design(tuple(values))
     check_differentiable(options)
     check_open_and_whole(model)
