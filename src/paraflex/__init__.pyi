@@ -17,6 +17,7 @@ from .mechanism import (
     SlotJoint as SlotJoint,
     SlidingJoint as SlidingJoint,
     WeldJoint as WeldJoint,
+    DistanceJoint as DistanceJoint,
     PointRef as PointRef,
     Motor as Motor,
     Actuator as Actuator,

@@ -28,8 +28,8 @@ class Term:
     direction : float
         Of an axis against body a [rad].
     carrier : str
-        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
-        origin on.
+        What carries an axis: the "material" at point a, the body's "frame" there, its "track", from the frame's
+        origin on, or "nothing": then it points from a to b.
     """
 
     joint: str
@@ -88,6 +88,9 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
         "points": Constraint(name, (Term(name, POINT, a, b),), (f"{name} x", f"{name} y")),
         "axis": Constraint(name, (axis,), (f"{name} normal",)),
         "angle": Constraint(name, (Term(name, ANGLE, a, b),), (f"{name} angle",), rest=joint.angle),
+        "distance": Constraint(
+            name, (Term(name, AXIS, a, b, carrier="nothing"),), (f"{name} length",), rest=joint.length or 0.0
+        ),
     }
     return [parts[held] for held in joint.holds]
 

@@ -34,6 +34,9 @@ from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
 from paraflex.mechanism import AngleLaw, Joint, Mechanism, PointRef
 
+# Rows in the body frame that an axis takes of the body of point a, by what carries it: see `packed.PORT`.
+_AXIS_PARTS = {"nothing": 2, "material": 3, "frame": 3, "track": 4}
+
 
 def pack_system(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], constraints: list[Constraint]
@@ -151,7 +154,7 @@ class _Packer:
             elif ref is term.b:
                 marker, parts = self.axes[axis]["b"], 2
             else:
-                marker, parts = self.axes[axis]["a"], 3 if self.axes[axis]["track"] < 0 else 4
+                marker, parts = self.axes[axis]["a"], _AXIS_PARTS[term.carrier]
             self.ports[self.index[ref.body]].append(
                 {
                     "marker": marker,
@@ -177,7 +180,7 @@ class _Packer:
     ) -> int:
         ends = self.end(a, "a") | self.end(b, "b")
         track = -1
-        if carrier != "material":
+        if carrier in ("frame", "track"):
             # The frame has no slope of its own, and a track counts from its origin.
             fixed = self.markers[int(ends["a"])].on_frame
             self.markers[int(ends["a"])] = fixed if carrier == "frame" else replace(fixed, x0=np.zeros(2))
@@ -185,7 +188,7 @@ class _Packer:
             self.tracks.append(self.index[a.body])
             track = len(self.tracks) - 1
         record = {"angle": direction, "row": row, "weight": weight, "signal": signal, "track": track}
-        self.axes.append(ends | record)
+        self.axes.append(ends | record | {"between": int(carrier == "nothing")})
         return len(self.axes) - 1
 
     def add_motor(self, joint: Joint, signal: int) -> None:

@@ -33,6 +33,7 @@ from paraflex.mechanism.joints import (
     GROUND as GROUND,
     JOINT_KINDS as JOINT_KINDS,
     AtEnd as AtEnd,
+    DistanceJoint as DistanceJoint,
     Joint as Joint,
     Motor as Motor,
     PointRef as PointRef,

@@ -11,8 +11,8 @@ from paraflex.mechanism.bodies import AssumedModesBeam, FlexibleBeam
 from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.groups import Group, grouped, groups_of
 from paraflex.mechanism.joints import GROUND, Joint, PointRef, points_named
-from paraflex.mechanism.members import Members
-from paraflex.mechanism.poses import approximate_poses
+from paraflex.mechanism.members import Assembly, Members
+from paraflex.mechanism.poses import approximate_poses, placed_poses
 from paraflex.mechanism.quantities import check_numbers, finite, joints_named, known
 from paraflex.mechanism.rotors import check_actuators
 from paraflex.mechanism.sensors import JointForceSensor, PointSensor, Sensor, StrainGauge
@@ -122,6 +122,19 @@ def check_assemblies(mechanism: Members) -> None:
             _on_body(ref, field, "the places of ground points are given in [ground]")
         # It names the body that neither angles nor points place.
         approximate_poses(mechanism, assembly)
+        _check_hung(mechanism, assembly)
+
+
+def _check_hung(mechanism: Members, assembly: Assembly) -> None:
+    """Check that a body on distances alone has a place, unless the mechanism takes its poses from another."""
+    hung = [name for name, joints in mechanism.joints_at.items() if {each.holds for each in joints} == {("distance",)}]
+    placed = placed_poses(mechanism, assembly) if hung and mechanism.cut is None else hung
+    for name in hung:
+        if name not in placed and name != GROUND:
+            raise InputError(
+                "distances alone do not give a body its place", field=f"assembly.{assembly.name}.points", value=name,
+                remedy=f'give the place of one of its points: points = {{"{name}.POINT" = [x, y]}}',
+            )  # fmt: skip
 
 
 def check_connected(mechanism: Members) -> None:
@@ -193,7 +206,7 @@ def _check_measured(mechanism: Members, sensor: Sensor) -> None:
         known(sensor.body, mechanism.points, f"{field}.body", "body")
     elif isinstance(sensor, JointForceSensor):
         joint = mechanism.joint(sensor.joint)
-        if sensor.axis == "along" and not joint.slides:
+        if sensor.axis == "along" and not (joint.slides or "distance" in joint.holds):
             raise InputError(
                 f"a {joint.kind} joint has no axis to measure along", field=f"{field}.axis", value=sensor.axis,
                 remedy='give "x", "y", "moment" or an angle in rad',

@@ -16,7 +16,7 @@ from paraflex.mechanism.bodies import Body, BodyReduction, Curvature, FlexibleBe
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
 from paraflex.mechanism.payload import Payload, loaded, together
-from paraflex.mechanism.phases import with_phases
+from paraflex.mechanism.phases import with_lengths, with_phases
 from paraflex.mechanism.quantities import known
 from paraflex.mechanism.tracks import with_meshes
 
@@ -33,7 +33,8 @@ class Mechanism(Members, Shown):
         Named points fixed in the ground frame [m].
     bodies : tuple of RigidBody, FlexibleBeam, AssumedModesBeam or ModalBody
     joints : tuple of Joint
-        Of any kind: RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint, WeldJoint.
+        Of any kind: RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint, WeldJoint,
+        DistanceJoint.
     motors : tuple of Motor
         Their order is that of the signs in a mode such as "+-+-".
     prescribed : tuple of PrescribedAngle
@@ -81,6 +82,8 @@ class Mechanism(Members, Shown):
         object.__setattr__(self, "bodies", with_meshes(self))
         # The checks have looked bodies up by name.
         self.__dict__.pop("_bodies_by_name", None)
+        object.__setattr__(self, "joints", with_lengths(self))
+        self.__dict__.pop("_joints_by_name", None)
         for field, relations in with_phases(self).items():
             object.__setattr__(self, field, relations)
 

@@ -38,7 +38,7 @@ class Drawing:
         Bodies as they are, body after body, and drawn stiff: where something slides along a beam held at three or more
         places in line, in the nearest pose of the rigid mechanism, else between the joints that hold them [m].
     joints, joint_bases : (k, joints, 2) arrays
-        Each on its second body, and on that in the base [m].
+        Each on its second body, a rod on the ground where it is on that, and in the base [m].
     directions, direction_bases : (k, joints) arrays
         Of the axes of joints that slide, NaN of others, and in the base [rad].
     springs : (k, springs, 2, 2) array
@@ -82,7 +82,7 @@ def drawing(
         return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
 
     joined = _joined(mechanism)
-    joints = _second([place(joint.b) for joint in mechanism.joints], samples)
+    joints = _second([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples)
     directions = _directions(mechanism, samples, angle, frame)
     springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
     posed = None
@@ -218,9 +218,15 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     }
 
 
+def _drawn_ends(joint: Joint) -> tuple[PointRef, PointRef]:
+    """The point at which a joint is drawn, of a rod that on the ground, and its other point."""
+    return (joint.a, joint.b) if "distance" in joint.holds and joint.a.on_ground else (joint.b, joint.a)
+
+
 def _rail_station(joint: Joint, stations: Mapping[PointRef, int]) -> int:
-    """The station that a joint's rail goes through; the rail of what slides along a beam is the beam."""
-    return stations.get(joint.a, -1) if joint.slides and not joint.follows_beam else -1
+    """The station that a joint's rail or rod goes through; the rail of what slides along a beam is the beam."""
+    drawn = (joint.slides and not joint.follows_beam) or "distance" in joint.holds
+    return stations.get(_drawn_ends(joint)[1], -1) if drawn else -1
 
 
 def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
@@ -279,7 +285,7 @@ def _rigid_bases(
         np.broadcast_to(np.array(mechanism.ground[end.point], dtype=float), (samples, 2))
         if end.on_ground
         else bases[end.body][:, drawn[end.body].points[end.point]]
-        for end in (joint.b for joint in mechanism.joints)
+        for end in (_drawn_ends(joint)[0] for joint in mechanism.joints)
     ]
     directions = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
     return bases, _second(ends, samples), directions
