@@ -34,6 +34,7 @@ from .mechanism import (
     TorsionalDamper as TorsionalDamper,
     JointFriction as JointFriction,
     Gear as Gear,
+    SumRelation as SumRelation,
     Encoder as Encoder,
     Tachometer as Tachometer,
     PositionSensor as PositionSensor,

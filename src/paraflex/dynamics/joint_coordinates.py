@@ -61,9 +61,8 @@ def axis_angle(system: System, joint: Joint, q: Array) -> Array:
 
 
 def line_direction(system: System, joint: Joint, q: Array) -> Array:
-    """Unit vector (k, 2) from point a of a joint to its point b."""
+    """Unit vector (k, 2) from point a of a joint to its point b, not by a norm, as q may have complex steps."""
     a, b = (marker_position(system, system.marker(ref), q) for ref in (joint.a, joint.b))
-    # Not by a norm, as q may have a complex step.
     return (b - a) / np.sqrt(np.sum((b - a) ** 2, axis=1))[:, None]
 
 

@@ -34,9 +34,6 @@ from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
 from paraflex.mechanism import AngleLaw, Joint, Mechanism, PointRef
 
-# Rows in the body frame that an axis takes of the body of point a, by what carries it: see `packed.PORT`.
-_AXIS_PARTS = {"nothing": 2, "material": 3, "frame": 3, "track": 4}
-
 
 def pack_system(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], constraints: list[Constraint]
@@ -154,7 +151,7 @@ class _Packer:
             elif ref is term.b:
                 marker, parts = self.axes[axis]["b"], 2
             else:
-                marker, parts = self.axes[axis]["a"], _AXIS_PARTS[term.carrier]
+                marker, parts = self.axes[axis]["a"], {"nothing": 2, "track": 4}.get(term.carrier, 3)
             self.ports[self.index[ref.body]].append(
                 {
                     "marker": marker,

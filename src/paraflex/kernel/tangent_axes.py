@@ -91,9 +91,8 @@ def axis_tangent(system, k, q, v, a, direction):
         )
     if axis.between:
         turn, growth = line_rates(at[0], at[1], change[0], change[1])
-        d_w, _ = line_rates(at[0], at[1], change[2], change[3])
+        d_w, d_dw = line_rates(at[0], at[1], change[2], change[3])[0], 0.0
         d_w -= line_rates(at[0], at[1], at[2], at[3])[1] * turn + growth * w
-        d_dw = 0.0
     ex, ey = cos(theta), sin(theta)
     d_ex, d_ey = -turn * ey, turn * ex
     _, _, _, lever = component(ex, ey, at, w, dw)

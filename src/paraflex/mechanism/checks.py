@@ -101,10 +101,10 @@ def check_relations(mechanism: Members) -> None:
     """Check that gears and the like relate two different joints."""
     for group, members in grouped(mechanism):
         for one in members if group.relates else ():
-            if one.first_joint == one.second_joint:
+            if len(one.joints) < 2:
                 raise InputError(
                     f"a {group.word} needs two different joints", field=f"{group.table}.{one.name}.joints",
-                    value=one.first_joint, remedy="name the two whose angles or travels belong together",
+                    value=", ".join(one.joints), remedy="name the two whose angles or travels belong together",
                 )  # fmt: skip
 
 
@@ -129,12 +129,11 @@ def _check_hung(mechanism: Members, assembly: Assembly) -> None:
     """Check that a body on distances alone has a place, unless the mechanism takes its poses from another."""
     hung = [name for name, joints in mechanism.joints_at.items() if {each.holds for each in joints} == {("distance",)}]
     placed = placed_poses(mechanism, assembly) if hung and mechanism.cut is None else hung
-    for name in hung:
-        if name not in placed and name != GROUND:
-            raise InputError(
-                "distances alone do not give a body its place", field=f"assembly.{assembly.name}.points", value=name,
-                remedy=f'give the place of one of its points: points = {{"{name}.POINT" = [x, y]}}',
-            )  # fmt: skip
+    for name in (name for name in hung if name not in {GROUND, *placed}):
+        raise InputError(
+            "distances alone do not give a body its place", field=f"assembly.{assembly.name}.points", value=name,
+            remedy=f'give the place of one of its points: points = {{"{name}.POINT" = [x, y]}}',
+        )  # fmt: skip
 
 
 def check_connected(mechanism: Members) -> None:

@@ -180,6 +180,7 @@ class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
 
 
 _DIRECTION = said("the angle of its axis against the first body in rad", finite)
+_LENGTH = said("the distance that it keeps in m, by default as the first assembly stands", positive, "m")
 _ANGLE = said("the angle of the second body against the first in rad", finite)
 
 
@@ -250,10 +251,7 @@ class DistanceJoint(Joint, kind="distance", holds=("distance",), symbol="rod"):
         Of the rod [m]. By default as the first assembly stands; a mechanism has the number.
     """
 
-    length: float | None = field(
-        default=None,
-        metadata=said("the distance that it keeps in m, by default as the first assembly stands", positive, "m"),
-    )
+    length: float | None = field(default=None, metadata=_LENGTH)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from paraflex.mechanism.bodies import Body, BodyReduction, Curvature, FlexibleBe
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
 from paraflex.mechanism.payload import Payload, loaded, together
-from paraflex.mechanism.phases import with_lengths, with_phases
+from paraflex.mechanism.phases import with_phases
 from paraflex.mechanism.quantities import known
 from paraflex.mechanism.tracks import with_meshes
 
@@ -49,6 +49,8 @@ class Mechanism(Members, Shown):
         JointForceSensor, DeflectionSensor. They do not act on it.
     gears : tuple of Gear
         Each with its phase.
+    sums : tuple of SumRelation
+        Relations of two joints and more, each with its phase.
     actuators : tuple of Actuator
         What motors are: gears, rotors, windings and amplifiers. Motors without one give torques as they are asked.
     gravity : (x, y)
@@ -82,10 +84,9 @@ class Mechanism(Members, Shown):
         object.__setattr__(self, "bodies", with_meshes(self))
         # The checks have looked bodies up by name.
         self.__dict__.pop("_bodies_by_name", None)
-        object.__setattr__(self, "joints", with_lengths(self))
+        for field, members in with_phases(self).items():
+            object.__setattr__(self, field, members)
         self.__dict__.pop("_joints_by_name", None)
-        for field, relations in with_phases(self).items():
-            object.__setattr__(self, field, relations)
 
     def save(self, path: str | Path) -> None:
         """Write the model file of this mechanism, from which `load` reads an equal one; see `Model.save`."""

@@ -8,22 +8,24 @@ from math import cos, dist, sin
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.mechanism.gears import Relation
 from paraflex.mechanism.groups import Group, groups_of
 from paraflex.mechanism.joints import Joint, PointRef
 from paraflex.mechanism.members import Members
 from paraflex.mechanism.poses import Place, Pose, approximate_poses, local_points, placed_in, placed_poses
+from paraflex.mechanism.quantities import positive
 
 
-def with_phases(mechanism: Members) -> dict[str, tuple[Relation, ...]]:
-    """The relations of a mechanism by the fields that have them, each with its phase.
+def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:
+    """The joints and relations of a mechanism by the fields that have them, each with its length or phase.
 
     Raises
     ------
     InputError
-        One without a phase where there is no assembly to take it from.
+        One without a length or phase where there is no assembly to take it from.
     """
-    found = {}
+    found: dict[str, tuple[Any, ...]] = {
+        "joints": tuple(_with_length(mechanism, one) if one.length is None else one for one in mechanism.joints)
+    }
     for name, group in groups_of(type(mechanism)).items():
         if group.relates:
             members = getattr(mechanism, name)
@@ -31,35 +33,21 @@ def with_phases(mechanism: Members) -> dict[str, tuple[Relation, ...]]:
     return found
 
 
-def with_lengths(mechanism: Members) -> tuple[Joint, ...]:
-    """The joints of a mechanism, each that keeps a distance with its length.
-
-    Raises
-    ------
-    InputError
-        One without a length where there is no assembly to take it from, or its points coincide there.
-    """
-    return tuple(_with_length(mechanism, one) if one.length is None else one for one in mechanism.joints)
-
-
 def _with_length(mechanism: Members, joint: Any) -> Joint:
     """A joint that keeps a distance, with that of its points in the first assembly."""
     field = f"joint.{joint.name}.length"
     a, b = _in_first(mechanism, "the length", field, "give it in m", _place, (joint.a, joint.b))
-    if a == b:
-        raise InputError(
-            f"{joint.a} and {joint.b} coincide in assembly {mechanism.assemblies[0].name}", field=field, value=0.0,
-            remedy="give the length in m, or correct the assembly; a revolute joint holds points together",
-        )  # fmt: skip
+    positive(dist(a, b), field, f"m: {joint.a} and {joint.b} coincide in assembly {mechanism.assemblies[0].name}")
     return replace(joint, length=dist(a, b))
 
 
 def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
     """A relation with its phase in the first assembly."""
-    field, joints = f"{group.table}.{relation.name}.phase", [mechanism.joint(name) for name in relation.joints]
+    field, shares = f"{group.table}.{relation.name}.phase", relation.shares
+    joints = [mechanism.joint(name) for name in shares]
     remedy = "give it in rad (in m where the second joint slides)"
-    first, second = _in_first(mechanism, f"a {group.word}'s phase", field, remedy, _coordinate, joints)
-    return replace(relation, phase=second - relation.transmission * first)
+    values = _in_first(mechanism, f"a {group.word}'s phase", field, remedy, _coordinate, joints)
+    return replace(relation, phase=sum(weight * value for weight, value in zip(shares.values(), values, strict=True)))
 
 
 def _in_first(mechanism: Members, what: str, field: str, remedy: str, value: Callable[..., Any], of: Any) -> list[Any]:
@@ -74,8 +62,7 @@ def _in_first(mechanism: Members, what: str, field: str, remedy: str, value: Cal
     found = [value(mechanism, one, poses) for one in of]
     if None in found:
         raise InputError(
-            f"{what} is not given, and assembly {assembly.name} does not determine its "
-            f"{'points' if value is _place else 'joints'}",
+            f"{what} is not given, and assembly {assembly.name} does not determine it",
             field=field, remedy="give it, or places of points in the assembly",
         )  # fmt: skip
     return found

@@ -66,9 +66,7 @@ class Mark(NamedTuple):
 def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
     """Symbols of the ground, at one time."""
     # A joint that neither slides nor holds a point has no support.
-    held = [
-        joint for joint in shown.joints if joint.slides or {"pin", "weld", "rod"} & SYMBOLS.get(joint.kind, {}).keys()
-    ]
+    held = [joint for joint in shown.joints if joint.slides or {"pin", "weld"} & SYMBOLS.get(joint.kind, {}).keys()]
     found = [(joint.name, ground_of(joint, limits)) for joint in held if joint.grounded]
     found += [("", support(place, limits)) for place in shown.anchors]
     return [
@@ -239,9 +237,8 @@ def dot(joint: DrawnJoint, _: Limits) -> Array:
 def rod(joint: DrawnJoint, limits: Limits) -> Array:
     """A line (f, n, 2) between pins round both ends of a rod; of a sign in a legend one of the size of a block."""
     half = np.array([0.5 * BLOCK[0] * limits.size, 0.0])
-    ends = np.stack(
-        [joint.place + half, joint.place - half] if joint.rail is None else [joint.place, joint.rail], axis=1
-    )
+    both = (joint.place + half, joint.place - half) if joint.rail is None else (joint.place, joint.rail)
+    ends = np.stack(both, axis=1)
     along = np.arctan2(*(ends[:, 0] - ends[:, 1]).T[::-1])[:, None] + np.linspace(0.0, 2.0 * np.pi, _ROUND)
     rim = 0.5 * PIN * limits.size * np.stack([np.cos(along), np.sin(along)], axis=-1)
     return np.concatenate([ends[:, :1] - rim, ends[:, 1:] + rim], axis=1)
@@ -264,7 +261,7 @@ def zigzag(ends: Array, limits: Limits) -> Array:
 SYMBOLS: dict[str, dict[str, Callable[[DrawnJoint, Limits], Array]]] = {
     "pin": {"pin": dot},
     "weld": {"weld": square},
-    "rod": {"rod": rod},
+    "rod": {"rod": rod, "pin": dot},
     "slider": {"block": block},
     "slot": {"block": block, "pin": dot},
     "sliding": {"block": block, "pin": dot},

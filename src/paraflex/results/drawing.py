@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
+from paraflex.mechanism.gears import SumRelation
 from paraflex.mechanism.poses import local_points
 from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
 from paraflex.results.stiff import Frames, rigid_frames
@@ -191,11 +193,12 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     of_gears: dict[str, Any] = {}
     if related := mechanism.relations:
         number = {joint.name: k for k, joint in enumerate(joints)}
-        held = [[number[name] for name in one.joints] for one in related]
+        pairs = [(one, names) for one in related for names in pairwise(one.joints)]
+        held = [[number[name] for name in names] for _, names in pairs]
         of_gears = {
-            "gear": [one.name for one in related],
+            "gear": [one.name if len(one.joints) == 2 else f"{one.name} {'-'.join(names)}" for one, names in pairs],
             "gear_joint": (("gear", "end"), np.array(held, dtype=np.int32)),
-            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, one) for one in related])),
+            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, one) for one, _ in pairs])),
         }
     of_loads: dict[str, Any] = {}
     if mechanism.loads:
@@ -237,6 +240,8 @@ def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
     not about a radius from the pinion: a screw's ratio is no radius.
     """
     unknown = np.nan, np.nan
+    if isinstance(one, SumRelation):
+        return unknown
     joints = first, second = [mechanism.joint(name) for name in one.joints]
     carriers = {first.a.body, first.b.body} & {second.a.body, second.b.body}
     kinds = [(joint.slides, set(joint.holds)) for joint in joints]
