@@ -25,12 +25,10 @@ def axis_end(system, marker, x, y, q, v, a):
 
 
 @inlined
-def line_rates(dx, dy, ux, uy):
-    """Rates at which a line d turns and grows, the latter over its length, where d changes at the rate u."""
+def line_turn(dx, dy, ux, uy):
+    """Rate at which a line d turns where it changes at the rate u; zero where it has no direction."""
     square = dx * dx + dy * dy
-    if square == 0.0:
-        return 0.0, 0.0
-    return (dx * uy - dy * ux) / square, (dx * ux + dy * uy) / square
+    return (dx * uy - dy * ux) / square if square > 0.0 else 0.0
 
 
 @inlined
@@ -46,7 +44,7 @@ def axis_frame(system, axis, q, v, a):
     d = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
     if axis.between:
         # The second derivative of theta has no share in the value's, as n . d is zero.
-        theta, w, dw = atan2(d[1], d[0]), line_rates(d[0], d[1], d[2], d[3])[0], 0.0
+        theta, w, dw = atan2(d[1], d[0]), line_turn(d[0], d[1], d[2], d[3]), 0.0
     return d, theta, w, dw, rax, ray, rbx, rby
 
 
