@@ -30,6 +30,7 @@ from paraflex.mechanism import (
     Assembly,
     AtEnd,
     Curvature,
+    DistanceJoint,
     FlexibleBeam,
     Gear,
     Geometry,
@@ -66,7 +67,10 @@ def ref(text):
 
 
 def make_sliders(geometry=Geometry.LINEAR):
-    """One of everything that slides: axes on a beam, on a rigid body and on the ground, on side a and on side b."""
+    """One of everything that slides: axes on a beam, on a rigid body and on the ground, on side a and on side b.
+
+    And rods without mass: between beams, and to the ground on either side.
+    """
     crank = FlexibleBeam(
         "crank",
         0.3,
@@ -107,6 +111,9 @@ def make_sliders(geometry=Geometry.LINEAR):
             # Equations that hold together are asked for, not whether the beams are long enough.
             SlidingJoint("bead", ref("rod.R"), ref("bob.C"), at_end=AtEnd.IGNORE),
             SlidingJoint("trolley", ref("crank.P"), ref("ground.G"), at_end=AtEnd.IGNORE),
+            DistanceJoint("strut", ref("crank.P"), ref("rod.W"), 0.4),
+            DistanceJoint("stay", ref("ground.O"), ref("rod.R"), 0.3),
+            DistanceJoint("tie", ref("block.S"), ref("ground.G"), 0.7),
         ),
         motors=(Motor("screw", "guide"), Motor("turn", "O"), Motor("push", "pin"), Motor("pull", "bead")),
         prescribed=(PrescribedAngle("drive", "slot", swing),),
@@ -185,6 +192,8 @@ def row_values(system, t, q):
         out |= {f"{joint.name} x": gap[0], f"{joint.name} y": gap[1], f"{joint.name} angle": turn}
         if isinstance(joint, SlidingJoint):
             out[f"{joint.name} normal"] = above_beam(system, joint, q)
+        elif isinstance(joint, DistanceJoint):
+            out[f"{joint.name} length"] = np.sqrt(gap @ gap) - joint.length
         elif hasattr(joint, "direction"):
             out[f"{joint.name} normal"] = along_axis(system, joint, q, np.pi / 2)
     mechanism = system.mechanism
@@ -235,7 +244,15 @@ def random_state(system, seed):
 
 def test_rows_are_named_by_joint_and_what_they_hold(sliders):
     joints = ["O x", "O y", "guide normal", "guide angle", "slot normal", "weld x", "weld y", "weld angle"]
-    joints += ["rail normal", "pin normal", "bead normal", "trolley normal"]
+    joints += [
+        "rail normal",
+        "pin normal",
+        "bead normal",
+        "trolley normal",
+        "strut length",
+        "stay length",
+        "tie length",
+    ]
     others = ["drive travel", "soft travel", "twist angle", "oil travel", "dry travel", "rub angle"]
     gears = ["lead travel", "rack travel", "pinion angle", "cable travel"]
     assert sorted(sliders.rows) == sorted(joints + others + gears)
@@ -589,6 +606,8 @@ def sliders_put_together(geometry=Geometry.LINEAR):
     mechanism = make_sliders(geometry)
     nylon = Material(youngs_modulus=2e9, density=1100.0)
     mechanism = mechanism.with_bodies(replace(mechanism.body(name), material=nylon) for name in ("crank", "rod"))
+    # Rods besides would hold all of it.
+    mechanism = replace(mechanism, joints=tuple(one for one in mechanism.joints if one.kind != "distance"))
     free = build_system(replace(mechanism, gears=()))
     q = np.zeros(free.n)
     for name, turn in {"crank": 0.9, "rod": -0.4, "block": 1.1, "plate": -0.1}.items():

@@ -26,6 +26,7 @@ from paraflex.mechanism import (
     PointForce,
     PrescribedAngle,
     Relation,
+    SumRelation,
     actuator_motors,
     grouped,
     loops,
@@ -165,6 +166,9 @@ def _drive(drive: PrescribedAngle, unit: str) -> str:
 def _equation(one: Relation) -> str:
     """What a relation holds, as an equation of the joints' coordinates."""
     sign = "-" if one.phase and one.phase < 0.0 else "+"
+    if isinstance(one, SumRelation):
+        terms = " ".join(f"{weight:+.4g} {joint}" for joint, weight in one.weights.items())
+        return f"{one.name}: {terms} = {one.phase:.4g}"
     phase = f" {sign} {abs(one.phase):.4g}" if one.phase else ""
     return f"{one.name}: {one.second_joint} = {one.transmission:.4g} {one.first_joint}{phase}"
 

@@ -28,8 +28,8 @@ class Term:
     direction : float
         Of an axis against body a [rad].
     carrier : str
-        What carries an axis: the "material" at point a, the body's "frame" there, or its "track", from the frame's
-        origin on.
+        What carries an axis: the "material" at point a, the body's "frame" there, its "track", from the frame's
+        origin on, or "nothing": then it points from a to b.
     """
 
     joint: str
@@ -84,10 +84,12 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
     name, a, b = joint.name, joint.a, joint.b
     normal, carrier = joint.direction + 0.5 * np.pi, "track" if joint.follows_beam else "material"
     axis = Term(name, AXIS, a, b, direction=normal, carrier=carrier)
+    between = Term(name, AXIS, a, b, carrier="nothing")
     parts = {
         "points": Constraint(name, (Term(name, POINT, a, b),), (f"{name} x", f"{name} y")),
         "axis": Constraint(name, (axis,), (f"{name} normal",)),
         "angle": Constraint(name, (Term(name, ANGLE, a, b),), (f"{name} angle",), rest=joint.angle),
+        "distance": Constraint(name, (between,), (f"{name} length",), rest=joint.length or 0.0),
     }
     return [parts[held] for held in joint.holds]
 
@@ -128,11 +130,11 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
 
 
 def _relation_constraint(mechanism: Mechanism, one: Relation) -> Constraint:
-    """Coordinate of the second joint less the transmission times that of the first, less the phase."""
-    first, second = (mechanism.joint(name) for name in one.joints)
+    """Sum of joints' coordinates times their weights less the phase, over the first of these weights."""
+    joints, (scale, *_) = [mechanism.joint(name) for name in one.shares], one.shares.values()
     assert one.phase is not None
-    terms = (_coordinate(second), _coordinate(first, -one.transmission))
-    return Constraint(one.name, terms, (f"{one.name} {coordinate_kind(second)}",), rest=one.phase)
+    terms = tuple(_coordinate(joint, one.shares[joint.name] / scale) for joint in joints)
+    return Constraint(one.name, terms, (f"{one.name} {coordinate_kind(joints[0])}",), rest=one.phase / scale)
 
 
 def constraint_count(mechanism: Mechanism) -> int:

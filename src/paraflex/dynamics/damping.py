@@ -6,6 +6,7 @@ deformation is described in. Its points are held as its joints hold them, the bo
 - a revolute joint holds the point, a weld the slope there too, and so does a prescribed angle;
 - a rail (prismatic joint) holds the slope and what is normal to the rail, with a prescribed travel all;
 - a pin in another body's slot or on another beam is held across the body, and in both directions if prescribed;
+- the pin of a rod without mass (distance joint) is held across the body;
 - only the first of several points held in both directions is held along the line to the others: joints are not so far
   apart by force that a bar could not stretch;
 - nothing is held by what slides along the body itself, by motors, springs, dampers or gears, or by a joint to bodies
@@ -96,7 +97,7 @@ def _conditions(
             elif joint.slides and turns_with:
                 angle = joint.direction if here is joint.a else joint.direction - joint.angle
                 yield np.array([-np.sin(angle), np.cos(angle)]) @ place_rows(marker)
-            elif joint.slides and not along_itself:
+            elif "distance" in joint.holds or (joint.slides and not along_itself):
                 across.append(marker)
     pinned.sort(key=lambda marker: np.real(marker.x0).tolist())
     if pinned:

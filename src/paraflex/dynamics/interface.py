@@ -44,12 +44,12 @@ def interface_rows(
 def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator[tuple[PointRef, Rows]]:
     """Points, and rows of what works there: forces on their places, moments on their turns."""
     for term in (term for constraint in constraints for term in constraint.terms):
-        if term.carrier != "material":
+        if term.carrier in ("frame", "track"):
             _refuse_sliding(mechanism, term.a)
         if term.kind != ANGLE:
             yield from ((term.a, place_rows), (term.b, place_rows))
         # What slides along an axis pushes beside the point that carries it.
-        if term.kind != POINT:
+        if term.kind != POINT and term.carrier != "nothing":
             yield term.a, slope_rows
         if term.kind == ANGLE:
             yield term.b, slope_rows

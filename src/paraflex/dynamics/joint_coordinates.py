@@ -66,6 +66,12 @@ def axis_angle(system: System, joint: Joint, q: Array) -> Array:
     return _marker_angle(system, axis_marker(system, joint), q)[0] + joint.direction
 
 
+def line_direction(system: System, joint: Joint, q: Array) -> Array:
+    """Unit vector (k, 2) from point a of a joint to its point b, not by a norm, as q may have complex steps."""
+    a, b = (marker_position(system, system.marker(ref), q) for ref in (joint.a, joint.b))
+    return (b - a) / np.sqrt(np.sum((b - a) ** 2, axis=1))[:, None]
+
+
 def material_angle(system: System, ref: PointRef, q: Array) -> Array:
     """Angle (k,) of the material at a point, that of its body and the slope; zero on the ground [rad]."""
     return _angle(system, ref, q)[0]

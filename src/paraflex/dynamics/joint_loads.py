@@ -17,7 +17,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics.constraints import RowTerm, Term, row_order
 from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
 from paraflex.dynamics.inputs import inputs_of
-from paraflex.dynamics.joint_coordinates import axis_angle, marker_place
+from paraflex.dynamics.joint_coordinates import axis_angle, line_direction, marker_place
 from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.rank import NO_PART, dependence
 from paraflex.dynamics.system import System
@@ -231,6 +231,8 @@ def _cross(a: Array, b: Array) -> Array:
 def _direction(system: System, term: Term, q: Array) -> Array:
     """Derivative (k, 2) of a row along an axis by the place of point b."""
     joint = system.mechanism.joint(term.joint)
+    if term.carrier == "nothing":
+        return line_direction(system, joint, q)
     along = axis_angle(system, joint, q)
     direction = _unit(along + term.direction - joint.direction)
     if term.carrier == "track":

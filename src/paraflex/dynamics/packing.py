@@ -151,7 +151,7 @@ class _Packer:
             elif ref is term.b:
                 marker, parts = self.axes[axis]["b"], 2
             else:
-                marker, parts = self.axes[axis]["a"], 3 if self.axes[axis]["track"] < 0 else 4
+                marker, parts = self.axes[axis]["a"], {"nothing": 2, "track": 4}.get(term.carrier, 3)
             self.ports[self.index[ref.body]].append(
                 {
                     "marker": marker,
@@ -177,7 +177,7 @@ class _Packer:
     ) -> int:
         ends = self.end(a, "a") | self.end(b, "b")
         track = -1
-        if carrier != "material":
+        if carrier in ("frame", "track"):
             # The frame has no slope of its own, and a track counts from its origin.
             fixed = self.markers[int(ends["a"])].on_frame
             self.markers[int(ends["a"])] = fixed if carrier == "frame" else replace(fixed, x0=np.zeros(2))
@@ -185,7 +185,7 @@ class _Packer:
             self.tracks.append(self.index[a.body])
             track = len(self.tracks) - 1
         record = {"angle": direction, "row": row, "weight": weight, "signal": signal, "track": track}
-        self.axes.append(ends | record)
+        self.axes.append(ends | record | {"between": int(carrier == "nothing")})
         return len(self.axes) - 1
 
     def add_motor(self, joint: Joint, signal: int) -> None:

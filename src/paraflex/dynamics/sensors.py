@@ -15,7 +15,7 @@ import scipy
 
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.contacts import sliding_joints
-from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, marker_position
+from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, line_direction, marker_position
 from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
 from paraflex.dynamics.points import marker_motion
 from paraflex.dynamics.sections import section_at
@@ -287,7 +287,10 @@ def _of_load(system: System, sensor: JointForceSensor, parts: JointParts, at: Mo
     if sensor.axis == "moment":
         return moment
     if sensor.axis == "along":
-        angle = axis_angle(system, system.mechanism.joint(sensor.joint), at.q)
+        joint = system.mechanism.joint(sensor.joint)
+        if "distance" in joint.holds:
+            return -np.sum(line_direction(system, joint, at.q) * force, axis=1)
+        angle = axis_angle(system, joint, at.q)
         return np.cos(angle) * force[:, 0] + np.sin(angle) * force[:, 1]
     ex, ey = unit_vector(sensor.axis)
     return ex * force[:, 0] + ey * force[:, 1]

@@ -136,11 +136,11 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
         if pose.position is not None:
             q[body.position] = pose.position
             placed.add(name)
-    # Joints that hold points together say where the next body is; others only where nothing better does. Among them the
-    # first of the mechanism comes first: a gap is left where the last joints close the loops.
-    joints: dict[str, list[tuple[bool, int]]] = {body.name: [] for body in system.bodies} | {GROUND: []}
+    # Joints that hold points together say where the next body is; others only where nothing better does, a distance
+    # last. Among them the first of the mechanism comes first: a gap is left where the last joints close the loops.
+    joints: dict[str, list[tuple[int, int]]] = {body.name: [] for body in system.bodies} | {GROUND: []}
     for number, joint in enumerate(system.mechanism.joints):
-        entry = ("points" not in joint.holds, number)
+        entry = (("points" not in joint.holds) + ("distance" in joint.holds), number)
         joints[joint.a.body].append(entry)
         joints[joint.b.body].append(entry)
     if not joints[GROUND] and not placed:
@@ -152,7 +152,8 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
         known, new = (joint.a, joint.b) if joint.a.on_ground or joint.a.body in placed else (joint.b, joint.a)
         if not new.on_ground and new.body not in placed:
             target = point_position(system, q, known)
-            q[system.body(new.body).position] += target - point_position(system, q, new)
+            # Points that keep a distance must not start from one place, where the line between them has no direction.
+            q[system.body(new.body).position] += target + [joint.length or 0.0, 0.0] - point_position(system, q, new)
             placed.add(new.body)
             for entry in joints[new.body]:
                 heapq.heappush(waiting, entry)

@@ -57,8 +57,9 @@ def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
     joints = {joint.name: joint for joint in mechanism.joints}
     if name in joints:
         joint = joints[name]
-        if not joint.slides and "angle" in joint.holds:
-            raise InputError("holds its angle, so that it has no coordinate", field=field, value=name,
+        if not joint.moves:
+            kept = "holds its angle" if "angle" in joint.holds else "keeps a distance"
+            raise InputError(f"{kept}, so that it has no coordinate", field=field, value=name,
                              remedy="name a joint that turns or slides, or a point")  # fmt: skip
         return Coordinate(name, *(("m", "N") if joint.slides else ("rad", "N m")))
     place, _, axis = name.rpartition(".")

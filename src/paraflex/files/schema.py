@@ -6,7 +6,7 @@ type (positive lengths, points that exist) is checked once, in `mechanism.checks
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from enum import Enum
 from functools import reduce
@@ -163,6 +163,7 @@ Yes = Annotated[bool, Field(strict=True)]
 # How files write what a field of a member is.
 _WRITTEN: dict[Any, Any] = {
     float: Number, int: Count, str: Text, bool: Yes, PointRef: Text, tuple[float, float]: Pair, NoneType: NoneType,
+    Mapping[str, float]: dict[Text, Number],
 }  # fmt: skip
 
 

@@ -4,11 +4,12 @@ With d = p_b - p_a and the unit vector e at the angle theta of marker a (and a c
 n = E e: rate e . d' + theta' n . d, second derivative e . d'' + 2 theta' n . d' + theta'' n . d - theta'^2 e . d. A
 slot holds the value of the normal at zero; motors, springs and prescribed motions of a prismatic joint take its travel.
 A sliding joint holds the normal's value at the deflection of the beam below the point: a *track*, W(x) u.
+A distance joint holds the value |d| of an axis *between* its points: e = d/|d|, theta' = e x d'/|d|, n . d = 0.
 """
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import atan2, cos, sin
 
 from paraflex.kernel.compiling import inlined, kernel, routine
 from paraflex.kernel.joints import apply_force, apply_torque, marker_angle, marker_motion
@@ -24,6 +25,13 @@ def axis_end(system, marker, x, y, q, v, a):
 
 
 @inlined
+def line_turn(dx, dy, ux, uy):
+    """Rate at which a line d turns where it changes at the rate u; zero where it has no direction."""
+    square = dx * dx + dy * dy
+    return (dx * uy - dy * ux) / square if square > 0.0 else 0.0
+
+
+@inlined
 def axis_frame(system, axis, q, v, a):
     """Geometry of an axis: d and its two derivatives, the angle theta and its two, and R s of both ends."""
     pax, pay, vax, vay, aax, aay, rax, ray = axis_end(system, axis.a, axis.ax, axis.ay, q, v, a)
@@ -34,6 +42,9 @@ def axis_frame(system, axis, q, v, a):
         theta += marker_angle(system, marker, q)
         w, dw = marker_angle(system, marker, v), marker_angle(system, marker, a)
     d = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
+    if axis.between:
+        # The second derivative of theta has no share in the value's, as n . d is zero.
+        theta, w, dw = atan2(d[1], d[0]), line_turn(d[0], d[1], d[2], d[3]), 0.0
     return d, theta, w, dw, rax, ray, rbx, rby
 
 

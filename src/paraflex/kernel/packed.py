@@ -146,6 +146,7 @@ AXIS_RECORD = np.dtype(
         ("weight", np.float64),  # what its value is multiplied by in that row
         ("signal", np.int64),  # of the motor, else -1
         ("track", np.int64),  # the deflection that a sliding point follows, -1 for none
+        ("between", np.int64),  # 1 where it points from a to b, so that its value is their distance, else 0
     ],
     align=True,
 )

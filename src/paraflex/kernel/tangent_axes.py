@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from paraflex.kernel.axes import axis_frame, component, track_piece
+from paraflex.kernel.axes import axis_frame, component, line_turn, track_piece
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.joints import apply_torque, marker_angle
 from paraflex.kernel.packed import CONSTRAINT, SPRING
@@ -89,6 +89,9 @@ def axis_tangent(system, k, q, v, a, direction):
             marker_angle(system, marker, direction.v),
             marker_angle(system, marker, direction.a),
         )
+    if axis.between:
+        # Where n . d is zero the second derivative is stationary in w, and has no part of dw.
+        turn, d_w, d_dw = line_turn(at[0], at[1], change[0], change[1]), 0.0, 0.0
     ex, ey = cos(theta), sin(theta)
     d_ex, d_ey = -turn * ey, turn * ex
     _, _, _, lever = component(ex, ey, at, w, dw)

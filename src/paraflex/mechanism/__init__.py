@@ -27,12 +27,13 @@ from paraflex.mechanism.damping import (
     stiffness_proportional as stiffness_proportional,
 )
 from paraflex.mechanism.frames import in_frames as in_frames
-from paraflex.mechanism.gears import Gear as Gear, Relation as Relation
+from paraflex.mechanism.gears import Gear as Gear, Relation as Relation, SumRelation as SumRelation
 from paraflex.mechanism.groups import Group as Group, grouped as grouped, groups_of as groups_of
 from paraflex.mechanism.joints import (
     GROUND as GROUND,
     JOINT_KINDS as JOINT_KINDS,
     AtEnd as AtEnd,
+    DistanceJoint as DistanceJoint,
     Joint as Joint,
     Motor as Motor,
     PointRef as PointRef,

@@ -27,8 +27,9 @@ def check_body(body: Body) -> None:
     """
     field = f"body.{body.name}"
     if isinstance(body, RigidBody):
-        positive(body.mass, f"{field}.mass", "kg")
-        positive(body.inertia, f"{field}.inertia", "kg m^2")
+        rod = ' (a rod without mass between two pins is a joint of type = "distance")'
+        positive(body.mass, f"{field}.mass", f"kg{rod}")
+        positive(body.inertia, f"{field}.inertia", f"kg m^2{rod}")
         finite(body.centre_of_mass, f"{field}.centre_of_mass")
         for name, position in body.points.items():
             finite(position, f"{field}.points.{name}")

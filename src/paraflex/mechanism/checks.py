@@ -11,8 +11,8 @@ from paraflex.mechanism.bodies import AssumedModesBeam, FlexibleBeam
 from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.groups import Group, grouped, groups_of
 from paraflex.mechanism.joints import GROUND, Joint, PointRef, points_named
-from paraflex.mechanism.members import Members
-from paraflex.mechanism.poses import approximate_poses
+from paraflex.mechanism.members import Assembly, Members
+from paraflex.mechanism.poses import approximate_poses, placed_poses
 from paraflex.mechanism.quantities import check_numbers, finite, joints_named, known
 from paraflex.mechanism.rotors import check_actuators
 from paraflex.mechanism.sensors import JointForceSensor, PointSensor, Sensor, StrainGauge
@@ -101,10 +101,10 @@ def check_relations(mechanism: Members) -> None:
     """Check that gears and the like relate two different joints."""
     for group, members in grouped(mechanism):
         for one in members if group.relates else ():
-            if one.first_joint == one.second_joint:
+            if len(one.joints) < 2:
                 raise InputError(
                     f"a {group.word} needs two different joints", field=f"{group.table}.{one.name}.joints",
-                    value=one.first_joint, remedy="name the two whose angles or travels belong together",
+                    value=", ".join(one.joints), remedy="name the two whose angles or travels belong together",
                 )  # fmt: skip
 
 
@@ -122,6 +122,18 @@ def check_assemblies(mechanism: Members) -> None:
             _on_body(ref, field, "the places of ground points are given in [ground]")
         # It names the body that neither angles nor points place.
         approximate_poses(mechanism, assembly)
+        _check_hung(mechanism, assembly)
+
+
+def _check_hung(mechanism: Members, assembly: Assembly) -> None:
+    """Check that a body on distances alone has a place, unless the mechanism takes its poses from another."""
+    hung = [name for name, joints in mechanism.joints_at.items() if {each.holds for each in joints} == {("distance",)}]
+    placed = placed_poses(mechanism, assembly) if hung and mechanism.cut is None else hung
+    for name in (name for name in hung if name not in {GROUND, *placed}):
+        raise InputError(
+            "distances alone do not give a body its place", field=f"assembly.{assembly.name}.points", value=name,
+            remedy=f'give the place of one of its points: points = {{"{name}.POINT" = [x, y]}}',
+        )  # fmt: skip
 
 
 def check_connected(mechanism: Members) -> None:
@@ -193,7 +205,7 @@ def _check_measured(mechanism: Members, sensor: Sensor) -> None:
         known(sensor.body, mechanism.points, f"{field}.body", "body")
     elif isinstance(sensor, JointForceSensor):
         joint = mechanism.joint(sensor.joint)
-        if sensor.axis == "along" and not joint.slides:
+        if sensor.axis == "along" and not (joint.slides or "distance" in joint.holds):
             raise InputError(
                 f"a {joint.kind} joint has no axis to measure along", field=f"{field}.axis", value=sensor.axis,
                 remedy='give "x", "y", "moment" or an angle in rad',

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from paraflex.arguments import CheckedFields
@@ -15,7 +16,7 @@ PHASE = said(
 
 
 class Relation(CheckedFields):
-    """The coordinate of the second joint is the transmission times that of the first, plus the phase.
+    """A weighted sum of joints' coordinates is the phase; of two joints: second = transmission * first + phase.
 
     A kind of relation is a dataclass derived from this one. It has these fields, in its own words, and says what its
     transmission is; all else asks that.
@@ -41,9 +42,14 @@ class Relation(CheckedFields):
         raise NotImplementedError
 
     @property
-    def joints(self) -> tuple[str, str]:
-        """Names of the first and the second joint."""
-        return self.first_joint, self.second_joint
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints, the first before the second."""
+        return tuple(reversed(self.shares))
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Weights of the joints' coordinates in the sum; the row is in the unit of the first of these."""
+        return {self.second_joint: 1.0, self.first_joint: -self.transmission}
 
 
 @dataclass(frozen=True)
@@ -86,3 +92,35 @@ class Gear(Relation):
     def transmission(self) -> float:
         """The ratio."""
         return self.ratio
+
+
+def _weigh(weights: Mapping[str, float], field: str) -> None:
+    """Check that no weight is zero."""
+    for name, weight in weights.items():
+        not_zero(weight, f"{field}.{name}", "as a weight of the joint's angle or travel, or leave the joint out")
+
+
+@dataclass(frozen=True)
+class SumRelation(Relation):
+    """The sum of joints' coordinates, each times its weight, is constant: of belts, differentials, planetary gears.
+
+    Attributes
+    ----------
+    name : str
+    weights : mapping of str to float
+        By joint; their units are such that the products have one. The row's multiplier is the torque or force on the
+        joint of largest weight, less; that on each other is as its weight to this one.
+    phase : float, optional
+        The sum, by default as the first assembly stands; a mechanism has the number.
+    """
+
+    _table = "relation"
+
+    name: str
+    weights: Mapping[str, float] = field(metadata=said("weights of joints' angles and travels", _weigh, joint="moves"))
+    phase: float | None = field(default=None, metadata=said("the sum, by default that of the first assembly", finite))
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """The weights, the largest first."""
+        return dict(sorted(self.weights.items(), key=lambda one: -abs(one[1])))

@@ -43,7 +43,7 @@ class Group:
 
     @property
     def relates(self) -> bool:
-        """Whether its members relate the coordinates of two joints."""
+        """Whether its members relate the coordinates of joints."""
         return bool(self.kinds) and all(issubclass(kind, Relation) for kind in self.kinds)
 
     @property

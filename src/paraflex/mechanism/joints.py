@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError
 from paraflex.mechanism.laws import AngleLaw, check_motion
-from paraflex.mechanism.quantities import AT_JOINT, JointThat, finite, said
+from paraflex.mechanism.quantities import AT_JOINT, JointThat, finite, positive, said
 
 GROUND = "ground"
 
@@ -92,6 +92,7 @@ class _Directions:
 
     direction: float = 0.0
     angle: float = 0.0
+    length: float | None = 0.0
     at_end: AtEnd = AtEnd.IGNORE
 
 
@@ -111,7 +112,8 @@ class Joint(CheckedFields, _Directions):
         The name in files.
     holds : tuple of str
         "points", which it holds together (two constraints); an "axis" through point a, at `direction` against body a,
-        that it keeps point b on (one); the "angle" of body b against body a, kept at `angle` (one).
+        that it keeps point b on (one); the "angle" of body b against body a, kept at `angle` (one); the "distance" of
+        point b from point a, kept at `length` (one).
     follows_beam : bool
         Whether its axis is the centre line of a's beam, bent as it is; else it turns with the material at a.
     symbol : str
@@ -139,7 +141,7 @@ class Joint(CheckedFields, _Directions):
         super().__init_subclass__()
         cls.kind, cls.holds, cls.follows_beam = kind, holds, follows_beam
         cls.slides = "axis" in holds
-        cls.moves = cls.slides or "angle" not in holds
+        cls.moves = cls.slides or not {"angle", "distance"}.intersection(holds)
         cls.symbol = symbol or _SYMBOLS.get(holds, kind)
         JOINT_KINDS[kind] = cls
 
@@ -154,7 +156,8 @@ class Joint(CheckedFields, _Directions):
         if does == "exists":
             return
         if not self.moves:
-            problem = f"a {self.kind} does not {'move' if 'points' in self.holds else 'turn'}"
+            why = {"points": "does not move", "distance": "joint has no angle or travel to act on"}
+            problem = f"a {self.kind} {why.get(self.holds[0], 'does not turn')}"
             raise InputError(problem, field=field, value=self.name, remedy="name another joint")
         if does != "moves" and self.slides != (does == "slides"):
             has, lacks = ("a travel", "an angle") if self.slides else ("an angle", "a travel")
@@ -177,6 +180,7 @@ class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
 
 
 _DIRECTION = said("the angle of its axis against the first body in rad", finite)
+_LENGTH = said("the distance that it keeps in m, by default as the first assembly stands", positive, "m")
 _ANGLE = said("the angle of the second body against the first in rad", finite)
 
 
@@ -233,6 +237,21 @@ class WeldJoint(Joint, kind="weld", holds=("points", "angle")):
     """Two points coincide, and body b has a constant angle [rad] against body a, slopes of beams included."""
 
     angle: float = field(default=0.0, metadata=_ANGLE)
+
+
+@dataclass(frozen=True)
+class DistanceJoint(Joint, kind="distance", holds=("distance",), symbol="rod"):
+    """A massless rod between pins: points a and b keep their distance, |p_b - p_a| = length.
+
+    The bodies turn freely. The multiplier of its row is the axial force of the rod [N], tension positive.
+
+    Attributes
+    ----------
+    length : float, optional
+        Of the rod [m]. By default as the first assembly stands; a mechanism has the number.
+    """
+
+    length: float | None = field(default=None, metadata=_LENGTH)
 
 
 @dataclass(frozen=True)

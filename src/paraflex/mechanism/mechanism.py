@@ -33,7 +33,8 @@ class Mechanism(Members, Shown):
         Named points fixed in the ground frame [m].
     bodies : tuple of RigidBody, FlexibleBeam, AssumedModesBeam or ModalBody
     joints : tuple of Joint
-        Of any kind: RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint, WeldJoint.
+        Of any kind: RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint, WeldJoint,
+        DistanceJoint.
     motors : tuple of Motor
         Their order is that of the signs in a mode such as "+-+-".
     prescribed : tuple of PrescribedAngle
@@ -48,6 +49,8 @@ class Mechanism(Members, Shown):
         JointForceSensor, DeflectionSensor. They do not act on it.
     gears : tuple of Gear
         Each with its phase.
+    sums : tuple of SumRelation
+        Relations of two joints and more, each with its phase.
     actuators : tuple of Actuator
         What motors are: gears, rotors, windings and amplifiers. Motors without one give torques as they are asked.
     gravity : (x, y)
@@ -81,8 +84,9 @@ class Mechanism(Members, Shown):
         object.__setattr__(self, "bodies", with_meshes(self))
         # The checks have looked bodies up by name.
         self.__dict__.pop("_bodies_by_name", None)
-        for field, relations in with_phases(self).items():
-            object.__setattr__(self, field, relations)
+        for field, members in with_phases(self).items():
+            object.__setattr__(self, field, members)
+        self.__dict__.pop("_joints_by_name", None)
 
     def save(self, path: str | Path) -> None:
         """Write the model file of this mechanism, from which `load` reads an equal one; see `Model.save`."""

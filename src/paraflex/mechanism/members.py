@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.mechanism.actuators import Actuator
 from paraflex.mechanism.bodies import Body
 from paraflex.mechanism.cut import Cut
-from paraflex.mechanism.gears import Gear, Relation
+from paraflex.mechanism.gears import Gear, Relation, SumRelation
 from paraflex.mechanism.groups import Group, group, grouped
 from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
 from paraflex.mechanism.loads import (
@@ -138,6 +138,7 @@ class Members(CheckedFields):
         "linear_spring", "spring between points", LinearSpring, plural="springs between points", resists=True
     )
     gears: tuple[Gear, ...] = group("gear", "gear", Gear, engines=True)
+    sums: tuple[SumRelation, ...] = group("relation", "relation", SumRelation)
     loads: tuple[Load, ...] = group("load", "load", PointForce, AppliedTorque)
     actuators: tuple[Actuator, ...] = group("actuator", "actuator", Actuator, engines=True)
     sensors: tuple[Sensor, ...] = group("sensor", "sensor", *SENSOR_KINDS.values(), engines=True, measures=True)
@@ -184,7 +185,7 @@ class Members(CheckedFields):
 
     @property
     def relations(self) -> tuple[Relation, ...]:
-        """Gears, and all other members that relate the coordinates of two joints."""
+        """Gears, and all other members that relate the coordinates of joints."""
         return tuple(one for group, members in grouped(self) if group.relates for one in members)
 
     @cached_property

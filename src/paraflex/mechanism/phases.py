@@ -1,28 +1,31 @@
-"""Phases of gears and other relations, by the first assembly."""
+"""Phases of relations and lengths of distance joints that are not given, by the first assembly."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from math import cos, sin
+from math import cos, dist, sin
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.mechanism.gears import Relation
 from paraflex.mechanism.groups import Group, groups_of
 from paraflex.mechanism.joints import Joint, PointRef
 from paraflex.mechanism.members import Members
 from paraflex.mechanism.poses import Place, Pose, approximate_poses, local_points, placed_in, placed_poses
+from paraflex.mechanism.quantities import positive
 
 
-def with_phases(mechanism: Members) -> dict[str, tuple[Relation, ...]]:
-    """The relations of a mechanism by the fields that have them, each with its phase.
+def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:
+    """The joints and relations of a mechanism by the fields that have them, each with its length or phase.
 
     Raises
     ------
     InputError
-        One without a phase where there is no assembly to take it from.
+        One without a length or phase where there is no assembly to take it from.
     """
-    found = {}
+    found: dict[str, tuple[Any, ...]] = {
+        "joints": tuple(_with_length(mechanism, one) if one.length is None else one for one in mechanism.joints)
+    }
     for name, group in groups_of(type(mechanism)).items():
         if group.relates:
             members = getattr(mechanism, name)
@@ -30,40 +33,55 @@ def with_phases(mechanism: Members) -> dict[str, tuple[Relation, ...]]:
     return found
 
 
+def _with_length(mechanism: Members, joint: Any) -> Joint:
+    """A joint that keeps a distance, with that of its points in the first assembly."""
+    field = f"joint.{joint.name}.length"
+    a, b = _in_first(mechanism, "the length", field, "give it in m", _place, (joint.a, joint.b))
+    positive(dist(a, b), field, f"m: {joint.a} and {joint.b} coincide in assembly {mechanism.assemblies[0].name}")
+    return replace(joint, length=dist(a, b))
+
+
 def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
     """A relation with its phase in the first assembly."""
-    field = f"{group.table}.{relation.name}.phase"
+    field, shares = f"{group.table}.{relation.name}.phase", relation.shares
+    joints = [mechanism.joint(name) for name in shares]
+    remedy = "give it in rad (in m where the second joint slides)"
+    values = _in_first(mechanism, f"a {group.word}'s phase", field, remedy, joint_value, joints)
+    return replace(relation, phase=sum(weight * value for weight, value in zip(shares.values(), values, strict=True)))
+
+
+def _in_first(mechanism: Members, what: str, field: str, remedy: str, value: Callable[..., Any], of: Any) -> list[Any]:
+    """Values of points or joints in the first assembly, for a field that is not given."""
     if not mechanism.assemblies:
         raise InputError(
-            f"a {group.word}'s phase is not given, and there is no assembly to take it from", field=field,
-            remedy="give it in rad (in m where the second joint slides), or an [assembly.NAME] table",
+            f"{what} is not given, and there is no assembly to take it from", field=field,
+            remedy=f"{remedy}, or an [assembly.NAME] table",
         )  # fmt: skip
     assembly = mechanism.assemblies[0]
     poses = approximate_poses(mechanism, assembly) | placed_poses(mechanism, assembly)
-    first, second = (joint_value(mechanism, mechanism.joint(name), poses) for name in relation.joints)
-    if first is None or second is None:
+    found = [value(mechanism, one, poses) for one in of]
+    if None in found:
         raise InputError(
-            f"a {group.word}'s phase is not given, and assembly {assembly.name} does not determine its joints",
+            f"{what} is not given, and assembly {assembly.name} does not determine it",
             field=field, remedy="give it, or places of points in the assembly",
         )  # fmt: skip
-    return replace(relation, phase=second - relation.transmission * first)
+    return found
+
+
+def _place(mechanism: Members, ref: PointRef, poses: dict[str, Pose]) -> Place | None:
+    """Place of a point at approximate poses of the bodies [m]; None if it is not known."""
+    if ref.on_ground:
+        return mechanism.ground[ref.point]
+    pose = poses[ref.body]
+    return None if pose.position is None else placed_in(pose, local_points(mechanism.body(ref.body))[ref.point])
 
 
 def joint_value(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:
     """A joint's angle or travel at approximate poses of the bodies; None if a place is not known."""
-
-    def angle(ref: PointRef) -> float:
-        return 0.0 if ref.on_ground else poses[ref.body].angle
-
-    def place(ref: PointRef) -> Place | None:
-        if ref.on_ground:
-            return mechanism.ground[ref.point]
-        pose = poses[ref.body]
-        return None if pose.position is None else placed_in(pose, local_points(mechanism.body(ref.body))[ref.point])
-
+    turn_a, turn_b = (0.0 if ref.on_ground else poses[ref.body].angle for ref in (joint.a, joint.b))
     if not joint.slides:
-        return angle(joint.b) - angle(joint.a)
-    a, b, direction = place(joint.a), place(joint.b), angle(joint.a) + joint.direction
+        return turn_b - turn_a
+    a, b, direction = _place(mechanism, joint.a, poses), _place(mechanism, joint.b, poses), turn_a + joint.direction
     if a is None or b is None:
         return None
     return cos(direction) * (b[0] - a[0]) + sin(direction) * (b[1] - a[1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import fields
 from functools import partial
 from typing import Any, Literal, cast
@@ -78,7 +78,9 @@ def joints_named(member: Any) -> Iterator[tuple[str, str, JointThat]]:
     together = joint_pair(member)
     for each in fields(member):
         if does := each.metadata.get("joint"):
-            yield "joints" if together else each.name, getattr(member, each.name), does
+            named = getattr(member, each.name)
+            for name in named if isinstance(named, Mapping) else (named,):
+                yield "joints" if together else each.name, name, does
 
 
 def joint_pair(member: Any) -> list[str]:

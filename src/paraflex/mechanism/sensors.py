@@ -198,8 +198,8 @@ class JointForceSensor(Sensor, kind="joint_force"):
     ----------
     joint : str
     axis : "x", "y", "along", "moment" or float
-        In the ground frame, an angle against its x axis [rad]; "along" the axis of a joint that slides; the "moment"
-        about the point, positive anticlockwise.
+        In the ground frame, an angle against its x axis [rad]; "along" the axis of a joint that slides, or of
+        the rod of a distance joint, its tension; the "moment" about the point, positive anticlockwise.
     """
 
     joint: str = field(metadata=said("the name of a joint", joint="exists"))

@@ -46,6 +46,7 @@ LOOKS = {
     "spring": MarkLook("", "earth", 1.1),
     "rail": MarkLook("", "earth", 1.6),
     "block": MarkLook("ground", "ink", 1.2),
+    "rod": MarkLook("ground", "ink", 1.2),
     "motor": MarkLook("ink", "ink", 0.8),
     "weld": MarkLook("ink", "ink", 0.8),
     "pin": MarkLook("ground", "ink", 1.3),
@@ -233,6 +234,16 @@ def dot(joint: DrawnJoint, _: Limits) -> Array:
     return joint.place[:, None]
 
 
+def rod(joint: DrawnJoint, limits: Limits) -> Array:
+    """A line (f, n, 2) between pins round both ends of a rod; of a sign in a legend one of the size of a block."""
+    half = np.array([0.5 * BLOCK[0] * limits.size, 0.0])
+    both = (joint.place + half, joint.place - half) if joint.rail is None else (joint.place, joint.rail)
+    ends = np.stack(both, axis=1)
+    along = np.arctan2(*(ends[:, 0] - ends[:, 1]).T[::-1])[:, None] + np.linspace(0.0, 2.0 * np.pi, _ROUND)
+    rim = 0.5 * PIN * limits.size * np.stack([np.cos(along), np.sin(along)], axis=-1)
+    return np.concatenate([ends[:, :1] - rim, ends[:, 1:] + rim], axis=1)
+
+
 def zigzag(ends: Array, limits: Limits) -> Array:
     """A spring (f, n, 2) between two ends (f, 2, 2)."""
     a, b = ends[:, 0], ends[:, 1]
@@ -250,6 +261,7 @@ def zigzag(ends: Array, limits: Limits) -> Array:
 SYMBOLS: dict[str, dict[str, Callable[[DrawnJoint, Limits], Array]]] = {
     "pin": {"pin": dot},
     "weld": {"weld": square},
+    "rod": {"rod": rod, "pin": dot},
     "slider": {"block": block},
     "slot": {"block": block, "pin": dot},
     "sliding": {"block": block, "pin": dot},

@@ -45,6 +45,7 @@ _START: dict[str, Any] = {"marker": "s", "markersize": 7.0, "markerfacecolor": "
 # Kinds of joints in the legend by their symbols.
 _KINDS = {
     "pin": "revolute", "weld": "weld", "slider": "prismatic", "slot": "slot", "sliding": "slides along a beam",
+    "rod": "rod without mass",
 }  # fmt: skip
 # Width of dots and lines against those of a film.
 _WIDTH = 0.62

@@ -67,7 +67,7 @@ class DrawnJoint:
     """A joint at the f times of a scene: its kind, whether it is on the ground, places (f, 2), directions (f,).
 
     `driven` is whether a motor is there; `rail` a point (f, 2) of the moving body that carries its axis, None where the
-    ground does or a beam is the axis.
+    ground does or a beam is the axis; of a rod its other end.
     """
 
     name: str

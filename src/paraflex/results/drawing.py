@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
+from paraflex.mechanism.gears import SumRelation
 from paraflex.mechanism.poses import local_points
 from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
 from paraflex.results.stiff import Frames, rigid_frames
@@ -38,7 +40,7 @@ class Drawing:
         Bodies as they are, body after body, and drawn stiff: where something slides along a beam held at three or more
         places in line, in the nearest pose of the rigid mechanism, else between the joints that hold them [m].
     joints, joint_bases : (k, joints, 2) arrays
-        Each on its second body, and on that in the base [m].
+        Each on its second body, a rod on the ground where it is on that, and in the base [m].
     directions, direction_bases : (k, joints) arrays
         Of the axes of joints that slide, NaN of others, and in the base [rad].
     springs : (k, springs, 2, 2) array
@@ -82,7 +84,7 @@ def drawing(
         return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
 
     joined = _joined(mechanism)
-    joints = _second([place(joint.b) for joint in mechanism.joints], samples)
+    joints = _second([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples)
     directions = _directions(mechanism, samples, angle, frame)
     springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
     posed = None
@@ -191,11 +193,12 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     of_gears: dict[str, Any] = {}
     if related := mechanism.relations:
         number = {joint.name: k for k, joint in enumerate(joints)}
-        held = [[number[name] for name in one.joints] for one in related]
+        pairs = [(one, names) for one in related for names in pairwise(one.joints)]
+        held = [[number[name] for name in names] for _, names in pairs]
         of_gears = {
-            "gear": [one.name for one in related],
+            "gear": [one.name if len(one.joints) == 2 else f"{one.name} {'-'.join(names)}" for one, names in pairs],
             "gear_joint": (("gear", "end"), np.array(held, dtype=np.int32)),
-            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, one) for one in related])),
+            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, one) for one, _ in pairs])),
         }
     of_loads: dict[str, Any] = {}
     if mechanism.loads:
@@ -218,9 +221,15 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     }
 
 
+def _drawn_ends(joint: Joint) -> tuple[PointRef, PointRef]:
+    """The point at which a joint is drawn, of a rod that on the ground, and its other point."""
+    return (joint.a, joint.b) if "distance" in joint.holds and joint.a.on_ground else (joint.b, joint.a)
+
+
 def _rail_station(joint: Joint, stations: Mapping[PointRef, int]) -> int:
-    """The station that a joint's rail goes through; the rail of what slides along a beam is the beam."""
-    return stations.get(joint.a, -1) if joint.slides and not joint.follows_beam else -1
+    """The station that a joint's rail or rod goes through; the rail of what slides along a beam is the beam."""
+    drawn = (joint.slides and not joint.follows_beam) or "distance" in joint.holds
+    return stations.get(_drawn_ends(joint)[1], -1) if drawn else -1
 
 
 def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
@@ -231,6 +240,8 @@ def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
     not about a radius from the pinion: a screw's ratio is no radius.
     """
     unknown = np.nan, np.nan
+    if isinstance(one, SumRelation):
+        return unknown
     joints = first, second = [mechanism.joint(name) for name in one.joints]
     carriers = {first.a.body, first.b.body} & {second.a.body, second.b.body}
     kinds = [(joint.slides, set(joint.holds)) for joint in joints]
@@ -279,7 +290,7 @@ def _rigid_bases(
         np.broadcast_to(np.array(mechanism.ground[end.point], dtype=float), (samples, 2))
         if end.on_ground
         else bases[end.body][:, drawn[end.body].points[end.point]]
-        for end in (joint.b for joint in mechanism.joints)
+        for end in (_drawn_ends(joint)[0] for joint in mechanism.joints)
     ]
     directions = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
     return bases, _second(ends, samples), directions
