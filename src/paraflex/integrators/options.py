@@ -24,7 +24,7 @@ from paraflex.limits import SAMPLES, SHORTEST, at_most
 LOOSE = 0.05
 # The default tolerance, as a part of the mechanism's size, which is rounded to a power of two: of flexible bodies, and
 # where all are rigid, as exactness costs little there.
-RELATIVE_TOLERANCE, RELATIVE_TOLERANCE_RIGID = 4e-5, 4e-6
+RELATIVE_TOLERANCE, RELATIVE_TOLERANCE_RIGID = 4e-5, 4e-7
 # Under control of forces, what local errors within a cycle may change a force by, as a part of its largest value.
 FORCE_PART = 0.0025
 _REMEDIES = {
@@ -59,7 +59,7 @@ class IntegrationOptions(CheckedFields):
     ----------
     tolerance : float, optional
         What local errors within a cycle, or the whole run, may add up to [m] (root mean square over the mass); by
-        default 4e-5 of the mechanism's size, or 4e-6 where no body is flexible. With a fixed step it only says how
+        default 4e-5 of the mechanism's size, or 4e-7 where no body is flexible. With a fixed step it only says how
         exactly Newton's iteration solves.
     tolerance_per : TolerancePer, optional
         "cycle" (own methods): the time in which the fastest body so far turns once, or travels 2 pi times the size of
