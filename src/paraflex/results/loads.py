@@ -189,7 +189,7 @@ def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
     """A sentence for each prescribed motion of a run: its largest torque, speed and power."""
     whose = f"mode {mode}: " if mode else ""
     return [
-        f"{whose}drive {name}: {_EFFORTS[one['torque_unit']]} up to "
+        f"{whose}prescribed.{name}: {_EFFORTS[one['torque_unit']]} up to "
         f"{one['torque_max']:.4g}{error_text(one, 'torque')} {one['torque_unit'] or ''}".rstrip()
         + f"{_at(one['torque_time'])}; "
         f"speed up to {speed_text(one['speed_max'], one['speed_unit'] or '').rstrip()}; "
