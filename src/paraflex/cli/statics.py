@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
@@ -21,9 +21,6 @@ from paraflex.files.fields import number_in
 from paraflex.folders import EQUILIBRIA
 from paraflex.results.statics_data import statics_dataset, statics_summary
 
-if TYPE_CHECKING:
-    from paraflex.report import Page
-
 # The options that arguments of `statics` come from.
 _FLAGS = {
     "loads": "--load", "torques": "--torque", "moved": "--move", "held": "--hold", "steps": "--steps",
@@ -35,17 +32,11 @@ _NONE = "none"
 def statics_command(request: StaticsRequest) -> int:
     """Find the equilibria, print them, and write files where that is asked for; the exit code."""
     model = asked_model(request.model)
-    data = _COMMAND.run(request, lambda: _data(model, request))
+    data = _COMMAND.run(request.files, lambda: _data(model, request))
     return COMPLETE if data["status"].item() == "complete" else TROUBLE
 
 
-def _page(data: xr.Dataset) -> Page:
-    from paraflex.report.statics import statics_page
-
-    return statics_page(data)
-
-
-_COMMAND = DatasetCommand(EQUILIBRIA, ("statics.nc", "statics.json"), statics_summary, print_statics, _page)
+_COMMAND = DatasetCommand(EQUILIBRIA, ("statics.nc", "statics.json"), statics_summary, print_statics)
 
 
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:

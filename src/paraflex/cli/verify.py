@@ -89,9 +89,7 @@ def _verify(
     tell(summary, show, as_json=request.json)
     try:
         if data is not None:
-            from paraflex.report import verification_page
-
-            write_drawn(data, folder, (lambda: verification_page(data, summary)) if request.report else None)
+            write_drawn(data, folder, report=request.report)
             if not request.json:
                 say_where(began, "numbers, figures", folder.path, report=request.report)
     finally:

@@ -118,6 +118,19 @@ class FramesChoice:
 
 
 @dataclass(frozen=True)
+class FilesChoice:
+    """What is written and printed of one dataset; no files without a folder."""
+
+    out: Annotated[
+        str | None,
+        Option("--out", "--output", metavar="DIR", help="Folder for data, their summary as JSON, figures and report."),
+    ] = None
+    force: ReplaceOption = False
+    report: ReportOption = True
+    json: Json = False
+
+
+@dataclass(frozen=True)
 class WorkersChoice:
     """Who computes the runs of a study."""
 
