@@ -20,7 +20,7 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import check_stops, model_parameters
 from paraflex.cli.reduced import asked_reduction, kept_coordinates
-from paraflex.cli.request import acting_controllers, at_fault, controllers_said, plan_study
+from paraflex.cli.request import acting_controllers, asked_of, at_fault, controllers_said, plan_study
 from paraflex.cli.tables import (
     below_tolerance,
     failures,
@@ -206,22 +206,17 @@ def _parameters(
     request: RunRequest,
     controllers: Sequence[ControllerDescription],
 ) -> dict:
-    return {
-        "model": dict(model.parameters),
-        "run": {
-            "mechanism": model.source,
-            "set": dict(model.settings),
-            "path": path,
-            "modes": [mode.name for mode in modes],
-            "duration": float(task.motion.t[-1]),
-            "samples": int(task.motion.t.size),
-            "after": task.after.value,
-            "error": model.study.error,
-            "controllers": controllers_said(model, controllers),
-        }
-        | model_parameters(request, task.mechanism, kept_coordinates(request, model.study))
-        | how,
+    run = {
+        "path": path,
+        "modes": [mode.name for mode in modes],
+        "duration": float(task.motion.t[-1]),
+        "samples": int(task.motion.t.size),
+        "after": task.after.value,
+        "error": model.study.error,
+        "controllers": controllers_said(model, controllers),
     }
+    kept = kept_coordinates(request, model.study)
+    return asked_of(model, run | model_parameters(request, task.mechanism, kept) | how)
 
 
 @contextmanager

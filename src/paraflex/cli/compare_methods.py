@@ -12,6 +12,7 @@ from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     asked_model,
+    asked_of,
     at_fault,
     find_mode,
     find_path,
@@ -59,14 +60,9 @@ def _compare(
     else:
         path, name = find_path(model, request.path)
         case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-    asked = {
-        "mechanism": model.source,
-        "set": dict(model.settings),
-        "limit": options.limit,
-        "repetitions": options.repetitions,
-    }
+    asked = {"limit": options.limit, "repetitions": options.repetitions}
     asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
-    study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
+    study = ComparisonStudy(case, methods, options, asked_of(model, asked))
     with counting(console) as report:
         comparison = study.run(on_progress=report)
     summary = comparison.to_dict()

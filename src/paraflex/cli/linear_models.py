@@ -12,7 +12,16 @@ import numpy as np
 from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
-from paraflex.cli.request import asked_model, at_fault, find_modes, find_path, flagged, of_assembly, plan_study
+from paraflex.cli.request import (
+    asked_model,
+    asked_of,
+    at_fault,
+    find_modes,
+    find_path,
+    flagged,
+    of_assembly,
+    plan_study,
+)
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed
@@ -277,10 +286,4 @@ def _parameters(model: Model, modes: Iterable[ActuationMode], request: LinearReq
     asked = {name: getattr(request, name) for name in ("pose", "balanced", "at", "along", "path", "assembly", "forces",
                                                         "prescribed", "coordinates")}  # fmt: skip
     run = {name: value for name, value in asked.items() if value not in (None, False, [], "motors")}
-    return {
-        "model": dict(model.parameters),
-        "run": {
-            "mechanism": model.source, "set": dict(model.settings), command: True,
-            "modes": [mode.name for mode in modes],
-        } | run,
-    }  # fmt: skip
+    return asked_of(model, {command: True, "modes": [mode.name for mode in modes]} | run)

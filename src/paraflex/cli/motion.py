@@ -21,12 +21,7 @@ from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import model_parameters
 from paraflex.cli.reduced import asked_reduction, kept_coordinates
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    acting_controllers,
-    at_fault,
-    controllers_said,
-    of_assembly,
-)
+from paraflex.cli.request import acting_controllers, asked_of, at_fault, controllers_said, of_assembly
 from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
@@ -98,18 +93,12 @@ def _run_held(
         few = asked_reduction(request, full, kept)
         start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
         run = _simulate(console, model, few, options, controllers, start=start)
-    parameters = {
-        "model": dict(model.parameters),
-        "run": {
-            "mechanism": model.source,
-            "set": dict(model.settings),
-            "duration": study.duration,
-            "samples": study.samples,
-            "controllers": controllers_said(model, controllers),
-        }
-        | model_parameters(request, mechanism, kept)
-        | how,
+    asked = {
+        "duration": study.duration,
+        "samples": study.samples,
+        "controllers": controllers_said(model, controllers),
     }
+    parameters = asked_of(model, asked | model_parameters(request, mechanism, kept) | how)
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     if run is not full:

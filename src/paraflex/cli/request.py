@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
+from typing import Any
 
 from paraflex.cli.commands.options import FramesChoice, ModelChoice, PlanChoice
 from paraflex.cli.commands.requests import flags
@@ -28,6 +29,14 @@ def asked_model(choice: ModelChoice) -> Model:
             raise InputError("no field and value", field="--set", value=text, remedy='say "link1.length=0.3"')
         found[name.strip()] = value_of(value.strip())
     return load(choice.name, set=found)
+
+
+def asked_of(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
+    """What was asked for, for provenance: a model, its file, --set and the rest of a run."""
+    return {
+        "model": dict(model.parameters),
+        "run": {"mechanism": model.source, "set": dict(model.settings)} | dict(run),
+    }
 
 
 def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:
@@ -55,9 +64,9 @@ def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
 
 
 def find_paths(model: Model, names: Sequence[str]) -> dict[str, EndEffectorPath]:
-    """Paths of the model or of files by name: those asked for, else those of the study, else its one or the first."""
+    """Paths of the model or of files by name: those asked for, else the study's first, or the model's."""
     found = {}
-    for name in names or model.study.paths or (None,):
+    for name in names or (None,):
         path, called = find_path(model, name)
         if called in found:
             raise InputError("is named twice", field="--path", value=called, remedy="name each path once")

@@ -31,7 +31,7 @@ def run_command(request: RunRequest) -> int:
         mechanism = _without_path(model, request)
         check_stops(mechanism, options, request.stop_at)
         return run_motion(request, model, mechanism, options, plain_console(stderr=True), how)
-    paths, modes = find_paths(model, request.paths), find_modes(model, request.modes)
+    paths, modes = find_paths(model, request.paths or model.study.paths), find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     with ExitStack() as held:
         followed = {

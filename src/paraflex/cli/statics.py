@@ -11,7 +11,7 @@ import xarray as xr
 from paraflex.cli import COMPLETE, TROUBLE
 from paraflex.cli.commands.models import StaticsRequest
 from paraflex.cli.dataset_command import DatasetCommand
-from paraflex.cli.request import asked_model, of_assembly
+from paraflex.cli.request import asked_model, asked_of, of_assembly
 from paraflex.cli.statics_tables import print_statics
 from paraflex.equilibria import Statics, StaticsDefaults, statics
 from paraflex.equilibria.given import coordinate_named
@@ -125,7 +125,4 @@ def _parameters(model: Model, asked: StaticsDefaults, request: StaticsRequest) -
     """What was asked for."""
     given = {name: value for name, value in (vars(asked) | {"assembly": request.assembly}).items()
              if value is not None and value != {}}  # fmt: skip
-    return {
-        "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "set": dict(model.settings), "statics": True} | given,
-    }
+    return asked_of(model, {"statics": True} | given)

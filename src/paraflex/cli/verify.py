@@ -14,6 +14,7 @@ from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     asked_model,
+    asked_of,
     find_mode,
     find_modes,
     find_path,
@@ -62,19 +63,9 @@ def _verify(
             compile_kernels(geometry, console.print)
     began = time.perf_counter()
     task = plan_study(model, mechanism, path, path_name, request.plan)
-    parameters = {
-        "model": dict(model.parameters),
-        "run": {
-            "mechanism": model.source,
-            "set": dict(model.settings),
-            "path": path_name,
-            "modes": [mode.name for mode in modes],
-        }
-        | asdict(request.frames)
-        | asdict(options)
-        | {"method": options.method.name, "method_parameters": options.method.values},
-    }
-    study = VerificationStudy(task, modes, models, options, parameters, model.study.error)
+    asked = {"path": path_name, "modes": [mode.name for mode in modes]} | asdict(request.frames) | asdict(options)
+    asked |= {"method": options.method.name, "method_parameters": options.method.values}
+    study = VerificationStudy(task, modes, models, options, asked_of(model, asked), model.study.error)
     with counting(console) as report:
         verification = study.run(on_progress=report)
     summary = verification.to_dict()
