@@ -10,11 +10,11 @@ from rich.console import Console
 from rich.table import Table
 
 from paraflex.cli import COMPLETE
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import CompareRequest
 from paraflex.cli.ending import say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.tables import plain_table, print_titled
-from paraflex.errors import InputError
 from paraflex.folders import RUN_COMPARISON, ResultsFolder
 from paraflex.results.comparison import MotionPair, NumberPair, RunComparison, compare
 from paraflex.results.metrics import metric_label
@@ -28,12 +28,8 @@ _MOST_SETTINGS, _MOST_LETTERS = 20, 40
 def compare_command(request: CompareRequest) -> int:
     """Compare two runs, print what differs, and write it where that is asked for; the exit code."""
     began = time.perf_counter()
-    try:
+    with flagged(request):
         found = compare(request.first, request.second, request.modes)
-    except InputError as error:
-        if error.field != "modes":
-            raise
-        raise error.at("--mode") from None
     if request.out is None:
         _tell(found, request)
         return COMPLETE

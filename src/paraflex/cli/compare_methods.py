@@ -5,21 +5,13 @@ from __future__ import annotations
 import time
 
 from paraflex.cli.bars import counting
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import CompareMethodsRequest
 from paraflex.cli.compare_methods_tables import print_comparison
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    asked_model,
-    asked_of,
-    at_fault,
-    find_mode,
-    find_path,
-    flagged,
-    of_assembly,
-    plan_study,
-)
+from paraflex.cli.request import asked_model, asked_of, at_fault, find_mode, find_path, of_assembly, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for

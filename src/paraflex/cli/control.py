@@ -10,10 +10,11 @@ from paraflex.checks import check_planned
 from paraflex.cli.bars import counting
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.control import CompareLawsRequest
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.control_tables import print_laws
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, asked_of, find_modes, find_paths, flagged, plan_study
+from paraflex.cli.request import asked_model, asked_of, find_modes, find_paths, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for

@@ -12,16 +12,8 @@ import numpy as np
 from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
-from paraflex.cli.request import (
-    asked_model,
-    asked_of,
-    at_fault,
-    find_modes,
-    find_path,
-    flagged,
-    of_assembly,
-    plan_study,
-)
+from paraflex.cli.commands.requests import flagged
+from paraflex.cli.request import asked_model, asked_of, at_fault, find_modes, find_path, of_assembly, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed

@@ -6,10 +6,10 @@ import xarray as xr
 
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import LineariseRequest
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, moments_along
 from paraflex.cli.linearise_tables import print_linear
-from paraflex.cli.request import flagged
 from paraflex.folders import LINEAR_MODELS
 from paraflex.results.linear_data import linear_dataset
 from paraflex.results.linear_summary import linear_summary

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-import xarray as xr
 from rich.console import Console
 from rich.progress import TimeElapsedColumn
 
@@ -52,7 +51,6 @@ def run_motion(
     model: Model,
     mechanism: Mechanism,
     options: IntegrationOptions,
-    console: Console,
     how: dict[str, Any],
 ) -> int:
     """Run a mechanism's own motion and write its results, how it was integrated among them; the exit code."""
@@ -106,7 +104,7 @@ def _run_held(
         data = beside_full(data, motion_dataset(full, options=options), *sizes)
     summary = motion_summary(data)
     write_numbers(data, summary, folder)
-    tell(summary, lambda out: _report(out, summary, data), as_json=request.json)
+    tell(summary, lambda out: _report(out, summary), as_json=request.json)
     finished = run.solution.status in DONE_STATUSES
     try:
         place = write_drawn_run(data, folder, request, began)
@@ -196,7 +194,7 @@ def _ended(summary: dict) -> str:
     return f"{status}, {steps}; " + ("no sample was reached" if time is None else f"the last sample is t = {time:g} s")
 
 
-def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
+def _report(out: Console, summary: dict) -> None:
     final = summary["final"]
     out.print(f"{summary['mechanism']}: {_ended(summary)}")
     if summary["event"]:

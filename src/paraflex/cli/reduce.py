@@ -6,10 +6,10 @@ import xarray as xr
 
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import ReduceRequest
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, pose_asked
 from paraflex.cli.reduce_tables import print_reduction
-from paraflex.cli.request import flagged
 from paraflex.errors import InputError
 from paraflex.folders import REDUCED_MODELS
 from paraflex.linear import PosesAlong, poses_along

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from paraflex.cli.commands.options import FramesChoice, ModelChoice, PlanChoice
-from paraflex.cli.commands.requests import flags
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.control.described import NONE, ControllerDescription
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
@@ -43,16 +42,6 @@ def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:
     """The mechanism with all beams in the frames and of the curvature asked for; None leaves them as they are."""
     with flagged(frames):
         return mechanism.with_beams(reference=frames.reference, curvature=frames.curvature)
-
-
-@contextmanager
-def flagged(request: object) -> Iterator[None]:
-    """An error that names an option's field, in whatever table, names the option's flag instead."""
-    try:
-        yield
-    except InputError as error:
-        flag = flags(request).get(error.field.rpartition(".")[2])
-        raise (error if flag is None else error.at(flag)) from None
 
 
 def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:

@@ -8,12 +8,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 from paraflex.cli.along import run_along
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, find_modes, find_paths, flagged, with_frames
-from paraflex.cli.tables import plain_console
+from paraflex.cli.request import asked_model, find_modes, find_paths, with_frames
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.folders import RUN
@@ -30,7 +30,7 @@ def run_command(request: RunRequest) -> int:
     if not model.paths and not request.paths:
         mechanism = _without_path(model, request)
         check_stops(mechanism, options, request.stop_at)
-        return run_motion(request, model, mechanism, options, plain_console(stderr=True), how)
+        return run_motion(request, model, mechanism, options, how)
     paths, modes = find_paths(model, request.paths or model.study.paths), find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     with ExitStack() as held:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Any
 
 import xarray as xr
 
 from paraflex.cli import COMPLETE, TROUBLE
 from paraflex.cli.commands.models import StaticsRequest
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.request import asked_model, asked_of, of_assembly
 from paraflex.cli.statics_tables import print_statics
@@ -21,11 +21,6 @@ from paraflex.files.fields import number_in
 from paraflex.folders import EQUILIBRIA
 from paraflex.results.statics_data import statics_dataset, statics_summary
 
-# The options that arguments of `statics` come from.
-_FLAGS = {
-    "loads": "--load", "torques": "--torque", "moved": "--move", "held": "--hold", "steps": "--steps",
-    "stiffness": "--stiffness", "assembly": "--assembly", "buckling": "--buckling",
-}  # fmt: skip
 _NONE = "none"
 
 
@@ -46,7 +41,7 @@ def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
 
 def _found(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> Statics:
     """The equilibria, or those until one is not found."""
-    with _flagged():
+    with flagged(request, first=True):
         try:
             return statics(
                 model, **vars(asked), warning=False,
@@ -64,11 +59,11 @@ def _asked(model: Model, request: StaticsRequest) -> StaticsDefaults:
     """What is given: of loads, torques and travel what options say, if any does; the rest as the model has it."""
     mechanism = model.mechanism
     units = dict(zip([motor.name for motor in mechanism.motors], mechanism.motor_units(), strict=True))
-    with _flagged():
+    with flagged(request, first=True):
         loads, moved = (
-            {name: _number(text, coordinate_named(mechanism, name, f"{field}.{name}"), field)
-             for name, text in _pairs(given, _FLAGS[field]).items()}
-            for field, given in (("loads", request.loads), ("moved", request.moved))
+            {name: _in_unit(text, getattr(coordinate_named(mechanism, name, f"{field}.{name}"), unit), f"{flag} {name}")
+             for name, text in _pairs(getattr(request, field), flag).items()}
+            for field, flag, unit in (("loads", "--load", "effort_unit"), ("moved", "--move", "unit"))
         )  # fmt: skip
         torques = {
             name: _in_unit(text, units.get(name, "N m"), f"--torque {name}")
@@ -99,26 +94,11 @@ def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
     return found
 
 
-def _number(text: str, one: Any, field: str) -> float:
-    unit = one.unit if field == "moved" else one.effort_unit
-    return _in_unit(text, unit, f"{_FLAGS[field]} {one.name}")
-
-
 def _in_unit(text: str, unit: str, field: str) -> float:
     try:
         return number_in(text, unit)
     except InputError as error:
         raise error.at(field) from None
-
-
-@contextmanager
-def _flagged() -> Iterator[None]:
-    """An error that names an argument of `statics` names the option instead."""
-    try:
-        yield
-    except InputError as error:
-        flag = _FLAGS.get(error.field.partition(".")[0])
-        raise (error if flag is None else error.at(flag)) from None
 
 
 def _parameters(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> dict[str, Any]:

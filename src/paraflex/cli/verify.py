@@ -9,19 +9,11 @@ from rich.console import Console
 
 from paraflex.cli.agreement import print_agreement
 from paraflex.cli.bars import counting
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import VerifyRequest
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    asked_model,
-    asked_of,
-    find_mode,
-    find_modes,
-    find_path,
-    flagged,
-    plan_study,
-    with_frames,
-)
+from paraflex.cli.request import asked_model, asked_of, find_mode, find_modes, find_path, plan_study, with_frames
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels

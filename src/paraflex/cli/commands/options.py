@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, BadParameter, Option
@@ -152,8 +151,3 @@ class WorkersChoice:
 
         engine = "dask" if self.cluster is not None and self.engine == "threads" else self.engine
         return Workers(engine, self.workers, self.cluster)
-
-
-def study_folder(study: str, output: str | None) -> Path:
-    """Where results of a study file go: where it is said, else results/ and the file's name."""
-    return Path("results") / Path(study).stem if output is None else Path(output)

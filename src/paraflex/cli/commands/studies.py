@@ -15,7 +15,6 @@ from paraflex.cli.commands.options import (
     ReportOption,
     StudyArgument,
     WorkersChoice,
-    study_folder,
 )
 
 
@@ -27,8 +26,8 @@ class StudyRequest:
 
     @property
     def folder(self) -> Path:
-        """Where results go."""
-        return study_folder(self.study, self.output)
+        """Where results go: where it is said, else results/ and the name of the study's file."""
+        return Path("results") / Path(self.study).stem if self.output is None else Path(self.output)
 
 
 @dataclass(frozen=True, kw_only=True)
