@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -118,6 +118,23 @@ def _run_held(
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 
+def free_run(
+    model: Model,
+    mechanism: Mechanism,
+    options: IntegrationOptions,
+    controllers: Sequence[ControllerDescription],
+    start: State | str | None,
+    on_progress: Callable[[float], None] | None = None,
+) -> MotionRun:
+    """Run a mechanism without a path, as a model's study says, under controllers or under its torques."""
+    study = model.study
+    assert study.duration is not None
+    how: dict[str, Any] = {"samples": study.samples, "start": start, "options": options, "on_progress": on_progress}
+    if controllers:
+        return simulate_controlled_motion(mechanism, study.duration, controllers, **how)
+    return simulate_motion(mechanism, study.duration, torques=study.torques, **how)
+
+
 def _simulate(
     console: Console,
     model: Model,
@@ -129,7 +146,6 @@ def _simulate(
     start: State | None = None,
 ) -> MotionRun:
     study, progress = model.study, bars(console, TimeElapsedColumn())
-    assert study.duration is not None
     bar = progress.add_task(mechanism.name, total=study.duration)
 
     def report(reached: float) -> None:
@@ -142,20 +158,7 @@ def _simulate(
             # The table and the summary say what the run doubts.
             warnings.simplefilter("ignore", ValidityWarning)
             warnings.simplefilter("ignore", ResultWarning)
-            if controllers:
-                return simulate_controlled_motion(
-                    mechanism, study.duration, controllers, samples=study.samples, start=begun, options=options,
-                    on_progress=report,
-                )  # fmt: skip
-            return simulate_motion(
-                mechanism,
-                study.duration,
-                samples=study.samples,
-                torques=study.torques,
-                start=begun,
-                options=options,
-                on_progress=report,
-            )
+            return free_run(model, mechanism, options, controllers, begun, report)
     except (IntegrationError, ControllerError) as error:
         return error.partial
     except AssemblyError as error:
