@@ -43,6 +43,10 @@ PathOption = Annotated[
         "--path", metavar="NAME|FILE", help="A path of the model (square, line, circle, ...) or a TOML file with one."
     ),
 ]
+ToleranceOption = Annotated[
+    float | None,
+    Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 4e-5 of the size."),
+]
 MethodOption = Annotated[str | None, Option(metavar="NAME", help="Method of integration: paraflex methods lists them.")]
 AssemblyOption = Annotated[str | None, Option(metavar="NAME", help="Which way the mechanism is put together.")]
 StudyArgument = Annotated[str, Argument(metavar="STUDY.toml", help="What is free within which bounds, what is run.")]
