@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -30,19 +31,13 @@ def compare_command(request: CompareRequest) -> int:
     began = time.perf_counter()
     with flagged(request):
         found = compare(request.first, request.second, request.modes)
-    if request.out is None:
-        _tell(found, request)
-        return COMPLETE
-    with hold_results(request.out, RUN_COMPARISON, force=request.force) as folder:
-        _write(found, folder)
-    _tell(found, request)
-    if not request.json:
-        say_where(began, "numbers and figures", folder.path)
-    return COMPLETE
-
-
-def _tell(found: RunComparison, request: CompareRequest) -> None:
+    if request.out is not None:
+        with hold_results(request.out, RUN_COMPARISON, force=request.force) as folder:
+            _write(found, folder)
     tell(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, doubts=())
+    if request.out is not None and not request.json:
+        say_where(began, "numbers and figures", Path(request.out))
+    return COMPLETE
 
 
 def _write(found: RunComparison, folder: ResultsFolder) -> None:
