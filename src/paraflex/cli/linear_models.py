@@ -12,7 +12,7 @@ import numpy as np
 from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
-from paraflex.cli.commands.requests import flagged
+from paraflex.cli.commands.requests import conflict, flagged
 from paraflex.cli.request import asked_model, asked_of, at_fault, find_modes, find_path, of_assembly, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
@@ -93,9 +93,7 @@ def _check(request: LinearRequest) -> None:
             continue
         for other, given in (("--pose", request.pose), ("--balanced", request.balanced or None)):
             if given is not None:
-                raise InputError(
-                    f"is about a motion, {other} about rest", field=flag, value=value, remedy="leave one of them out"
-                )
+                raise conflict(f"is about a motion, {other} about rest", flag, value)
     if request.at is not None and not (math.isfinite(request.at) and request.at >= 0.0):
         raise InputError("not a time of the motion", field="--at", value=request.at, remedy="give it in s, from 0 on")
     if request.along is not None and not 2 <= request.along <= _MOST_MOMENTS:
@@ -103,9 +101,7 @@ def _check(request: LinearRequest) -> None:
             "not a number of moments", field="--along", value=request.along, remedy=f"from 2 to {_MOST_MOMENTS}"
         )
     if request.pose is not None and request.assembly is not None:
-        raise InputError(
-            "names the pose as --pose does", field="--assembly", value=request.assembly, remedy="leave one of them out"
-        )
+        raise conflict("names the pose as --pose does", "--assembly", request.assembly)
 
 
 def _modes(model: Model, request: LinearRequest) -> list[ActuationMode]:

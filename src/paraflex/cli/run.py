@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from paraflex.cli.along import run_along
-from paraflex.cli.commands.requests import flagged
+from paraflex.cli.commands.requests import conflict, flagged
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
@@ -64,10 +64,7 @@ def _without_path(model: Model, request: RunRequest) -> Mechanism:
     if request.segments is None:
         return mechanism
     if model.start is not None:
-        raise InputError(
-            "the file's [start] speaks of links that are not cut", field="--segments", value=request.segments,
-            remedy="leave one of them out",
-        )  # fmt: skip
+        raise conflict("the file's [start] speaks of links that are not cut", "--segments", request.segments)
     return finite_segments(mechanism, proportional_segments(mechanism, request.segments)).mechanism
 
 
@@ -83,13 +80,10 @@ def _check_fidelity(request: RunRequest) -> None:
     if len(asked) > 1:
         raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
     if request.reduced and any(flag != "--geometry" for flag in asked):
-        raise InputError(f"means nothing with {asked[0]}", field="--reduced", value=request.reduced,
-                         remedy="leave one of them out")  # fmt: skip
+        raise conflict(f"means nothing with {asked[0]}", "--reduced", request.reduced)
     for name, given in asdict(request.frames).items():
         if given is not None and (request.rigid or request.segments is not None):
-            raise InputError(
-                f"means nothing with {asked[0]}", field=f"--{name}", value=given, remedy="leave one of them out"
-            )
+            raise conflict(f"means nothing with {asked[0]}", f"--{name}", given)
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
     for flag, value in given_flags(request).items():

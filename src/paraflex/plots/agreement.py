@@ -19,7 +19,6 @@ from paraflex.plots.time_series import most_deflected
 from paraflex.plots.workspace import deviated_paths
 
 _MODEL_NAMES = {
-    "rigid": "rigid",
     "ked": "KED",
     "linear": "linear geometry",
     "second-order": "second-order geometry",

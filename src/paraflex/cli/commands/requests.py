@@ -50,6 +50,11 @@ def flagged(request: object, *, first: bool = False) -> Iterator[None]:
         raise (error if flag is None else error.at(flag)) from None
 
 
+def conflict(problem: str, flag: str, value: object) -> InputError:
+    """The error of an option that does not go with another."""
+    return InputError(problem, field=flag, value=value, remedy="leave one of them out")
+
+
 def _parameters(request: Any) -> Iterator[inspect.Parameter]:
     """What a request is given, in order, the fields of requests in the place of these."""
     kinds = get_type_hints(request, include_extras=True)
