@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from paraflex.errors import InputError
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
-from paraflex.files.expressions import ExpressionError, evaluate, names_in
+from paraflex.files.expressions import ExpressionError, evaluate, expressed_in, names_in
 from paraflex.mechanism import JOINT_KINDS
 from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, quantities_in, spelt, unit_named
 
@@ -121,10 +121,8 @@ def check_unit(
     InputError
         Of another dimension, or a sum of unlike quantities.
     """
-    try:
+    with expressed_in(field, text):
         given = dimension_of(text, parameters)
-    except ExpressionError as error:
-        raise InputError(error.problem, field=field, value=text, remedy=error.remedy) from None
     if units is None or given in (None, PLAIN) or given in [unit_named(unit).dimension for unit in units]:
         return
     asked = f"one in {' or '.join(units)}" if units else "a number without a unit"

@@ -12,7 +12,7 @@ from paraflex.control.described import NONE, ControllerDescription, check_togeth
 from paraflex.control.shaped import shape_torques
 from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults, conditions
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, suggestion, within
 from paraflex.files.controllers import read_controllers
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
@@ -389,10 +389,8 @@ def load_path(file: str | FilePath) -> Path:
     with naming(source):
         data = with_rows(read_toml(FilePath(file), source), FilePath(file).parent)
     table = validate(PathFile, data, source)
-    try:
+    with naming(source), within("path"):
         return read_path(table.path)
-    except InputError as error:
-        raise error.within("path").in_file(source) from None
 
 
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
@@ -428,10 +426,8 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
 
 
 def _study_shaper(table: ModelTable) -> Shaper | None:
-    try:
+    with within("study"):
         return None if table.study.shaper is None else read_shaper(table.study.shaper)
-    except InputError as error:
-        raise error.within("study") from None
 
 
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
@@ -439,10 +435,8 @@ def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
     for name in ("held", "stiffness"):
         said[name] = None if said[name] is None else tuple(said[name])
     found = StaticsDefaults(**said)
-    try:
+    with within("statics"):
         conditions(mechanism, found)
-    except InputError as error:
-        raise error.within("statics") from None
     return found
 
 
