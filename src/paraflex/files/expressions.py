@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError, suggestion
 from paraflex.files.jets import FUNCTIONS, Jet
 from paraflex.limits import EXPRESSION_LETTERS, PARAMETER_CHAIN
@@ -67,7 +67,7 @@ def evaluate(text: str, parameters: Mapping[str, float]) -> float:
     return _evaluate(text, lambda name: _look_up(name, parameters))
 
 
-def evaluate_in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Jet:
+def evaluate_in_time(text: str, parameters: Mapping[str, float], t: Array) -> Jet:
     """Value, rate and acceleration at times t of an expression as above in which t is the time [s].
 
     Raises
@@ -151,7 +151,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
     return values
 
 
-def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Any:
+def _in_time(text: str, parameters: Mapping[str, float], t: Array) -> Any:
     if TIME_NAME in parameters:
         raise ExpressionError(
             f'"{TIME_NAME}" is the time in this expression', f'give the parameter "{TIME_NAME}" another name'

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.files.expressions import (
     check_in_time,
@@ -57,7 +57,7 @@ class ExpressionLaw:
         used = {name: value for name, value in self.parameters.items() if name in spoken_of}
         object.__setattr__(self, "parameters", used)
 
-    def evaluate(self, t: NDArray[np.float64]) -> Values:
+    def evaluate(self, t: Array) -> Values:
         """Value, rate and acceleration at times t.
 
         Raises

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array, Complex
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
@@ -18,8 +18,6 @@ from paraflex.mechanism.gears import SumRelation
 from paraflex.mechanism.poses import local_points
 from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
 from paraflex.results.stiff import Frames, rigid_frames
-
-Array = NDArray[np.float64]
 
 # Joints of wheels and of racks: whether they slide, and what they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
@@ -379,7 +377,7 @@ def _direction(
     return joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
 
 
-def _complex(places: Array) -> NDArray[np.complex128]:
+def _complex(places: Array) -> Complex:
     return places[..., 0] + 1j * places[..., 1]
 
 

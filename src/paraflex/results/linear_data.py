@@ -9,17 +9,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array, Complex, Numbers
 from paraflex.errors import InputError
 from paraflex.linear.branches import pole_branches
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import Motions
 from paraflex.results.drawing import Drawing, drawing_coordinates, system_drawing
 from paraflex.results.storage import SCHEMA
-
-Array = NDArray[np.float64]
 
 # Motors turn freely, or those of the mode are held.
 HOLDINGS = ("free", "held")
@@ -129,7 +127,7 @@ def motors_of(model: LinearModel) -> list[str]:
     return [one.name for one in model.inputs if one.name in own]
 
 
-def zero_maps(model: LinearModel) -> dict[str, NDArray[np.complex128]]:
+def zero_maps(model: LinearModel) -> dict[str, Complex]:
     """Zeros of the motors of a mode to their own encoders, and to the end-effector; of all inputs without motors."""
     mechanism = model.minimal.system.mechanism
     motors, outputs = motors_of(model), [one.name for one in model.outputs]
@@ -194,13 +192,13 @@ def _motions(free: Sequence[Motions], held: Sequence[Motions]) -> dict[str, Any]
     }
 
 
-def _zeros(maps: Sequence[dict[str, NDArray[np.complex128]]]) -> dict[str, Any]:
+def _zeros(maps: Sequence[dict[str, Complex]]) -> dict[str, Any]:
     names, none = dict.fromkeys(name for each in maps for name in each), np.zeros(0)
     values = padded([[each.get(name, none) for name in names] for each in maps])
     return {f"zero_{part}": (("mode", "map", "zero"), getattr(values, part)) for part in ("real", "imag")}
 
 
-def padded(rows: Sequence[Sequence[NDArray[Any]]]) -> NDArray[np.complex128]:
+def padded(rows: Sequence[Sequence[Numbers]]) -> Complex:
     """Rows of rows of different lengths as an array, NaN where there is nothing."""
     longest = max((one.size for row in rows for one in row), default=0)
     out = np.full((len(rows), len(rows[0]), longest), complex(np.nan, np.nan))
@@ -210,7 +208,7 @@ def padded(rows: Sequence[Sequence[NDArray[Any]]]) -> NDArray[np.complex128]:
     return out
 
 
-def _frequencies(free: Sequence[Motions], held: Sequence[Motions], zeros: Sequence[NDArray[np.complex128]]) -> Array:
+def _frequencies(free: Sequence[Motions], held: Sequence[Motions], zeros: Sequence[Complex]) -> Array:
     """Frequencies of the response [Hz]: evenly on a logarithmic axis, and near poles and zeros."""
     natural = np.sort(np.concatenate([one.frequencies for one in (*free, *held)]))
     natural = natural[natural > 0.0] / (2.0 * np.pi)

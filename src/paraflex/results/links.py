@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import (
     FrameLoad,
@@ -23,8 +23,6 @@ from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, system_drawing
 from paraflex.results.stress import SectionResult, section_result
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+
+from paraflex.arrays import Array
 
 
 def finite_or_none(value: float) -> float | None:
@@ -13,7 +14,7 @@ def finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def largest(values: NDArray[np.float64]) -> float | None:
+def largest(values: Array) -> float | None:
     """Largest finite magnitude; None if there is none."""
     known = np.abs(values[np.isfinite(values)])
     return float(known.max()) if known.size else None

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
@@ -23,8 +24,6 @@ from paraflex.results.linear_data import HOLDINGS, motors_of
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
 from paraflex.results.storage import SCHEMA
-
-Array = NDArray[np.float64]
 
 FULL = "full"
 # Frequencies of responses, from this part of the highest on and somewhat beyond it.

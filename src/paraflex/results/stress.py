@@ -9,11 +9,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.sections import SectionLoads, Sections, sections_of
 from paraflex.results.numbers import largest
 
-Array = NDArray[np.float64]
 Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
 # The dimensions of stations along beams and of joints that slide along them, and the variable that every run with
 # section forces has.
