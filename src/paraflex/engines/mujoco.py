@@ -19,7 +19,7 @@ from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arrays import Array
 from paraflex.dynamics import System, still_signals
 from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
-from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
+from paraflex.engines.tree import Tree, body_motion, joint_state, spanning_tree
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
@@ -114,10 +114,10 @@ def _model(mujoco: Any, system: System, tree: Tree, step: float) -> Any:
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     bodies = {GROUND: spec.worldbody}
     for link in tree.links:
-        own = place(system, link.own)
+        own = system.marker(link.own).x0
         s = system.body(link.name).integrals
         centre = s.S1 / s.m
-        body = bodies[link.parent].add_body(name=link.name, pos=[*(place(system, link.other) - own), 0.0])
+        body = bodies[link.parent].add_body(name=link.name, pos=[*(system.marker(link.other).x0 - own), 0.0])
         body.mass, body.ipos = s.m, [*centre, 0.0]
         body.inertia = [s.I0 + s.J - s.m * float(centre @ centre)] * 3
         body.explicitinertial = True
@@ -161,7 +161,7 @@ def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, s
     sites = []
     for side, ref in (("a", joint.a), ("b", joint.b)):
         name = f"{joint.name} {side}"
-        bodies[ref.body].add_site(name=name, pos=[*place(system, ref), 0.0])
+        bodies[ref.body].add_site(name=name, pos=[*system.marker(ref).x0, 0.0])
         sites.append(name)
     equality = spec.add_equality(
         name=joint.name,

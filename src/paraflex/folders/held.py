@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from fnmatch import fnmatch
 from importlib.metadata import version
@@ -52,7 +52,7 @@ class ResultsFolder:
         OutputError
             It cannot be written; the results before are all there.
         """
-        with self._changed(lambda name: not _matches(name, but)) as new:
+        with self._changed(lambda name: not any(fnmatch(name, pattern) for pattern in but)) as new:
             yield new
 
     @contextmanager
@@ -171,7 +171,3 @@ def _remove_empty(folder: Path, made: Sequence[Path]) -> None:
             (folder / LOCK).unlink()
         for each in made:
             each.rmdir()
-
-
-def _matches(name: str, patterns: Iterable[str]) -> bool:
-    return any(fnmatch(name, pattern) for pattern in patterns)

@@ -24,14 +24,12 @@ from paraflex.results.stress import (
     COMMENTS as STRESS_COMMENTS,
     MOMENT,
     UNITS as STRESS_UNITS,
+    Variables,
     largest_stresses,
     section_coordinates,
     section_variables,
 )
 from paraflex.results.validity import UNITS as VALIDITY_UNITS
-
-# Dimensions besides time, and values at the samples reached.
-Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
 
 UNITS = (
     {

@@ -19,7 +19,7 @@ from paraflex.results.drawing import system_drawing
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
-from paraflex.results.numbers import finite_or_none
+from paraflex.results.numbers import by_label, finite_or_none, stacked
 from paraflex.results.storage import SCHEMA
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
@@ -183,8 +183,7 @@ def _buckling_shapes(found: Statics) -> dict[str, Any]:
 
 
 def _columns(found: Statics, quantity: Any) -> np.ndarray:
-    columns = [quantity(one.name) for one in found.coordinates]
-    return np.stack(columns, axis=1) if columns else np.zeros((len(found.equilibria), 0))
+    return stacked([quantity(one.name) for one in found.coordinates], len(found.equilibria))
 
 
 def _motors(found: Statics) -> dict[str, Any]:
@@ -285,13 +284,9 @@ def statics_summary(data: xr.Dataset) -> dict[str, Any]:
         },
         **{name: [finite_or_none(float(x)) for x in last[name].values] for name in
            ("natural_frequency", "free_frequency")},
-        **({"stress_max": _of_bodies(data["stress_max"])} if "stress_max" in data else {}),
+        **({"stress_max": by_label(data["stress_max"], "body")} if "stress_max" in data else {}),
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }  # fmt: skip
-
-
-def _of_bodies(values: xr.DataArray) -> dict[str, float | None]:
-    return {str(name): finite_or_none(values.sel(body=name).item()) for name in values["body"].values}
