@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from typing import Any
 
 from paraflex.control.shaped import ShapedPath
@@ -12,6 +12,7 @@ from paraflex.errors import InputError, within
 from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import quantities, read_components, read_law
+from paraflex.files.said import check_fields
 from paraflex.files.schema import (
     AssemblyTable,
     JointTable,
@@ -96,15 +97,9 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
     kind = JOINT_KINDS[entry.type]
     given = {key: getattr(entry, key) for key in entry.model_fields_set - {"type", "points"}}
     own = {each.name: each for each in fields(kind)[3:]}
-    for key, value in given.items():
-        if key not in own:
-            raise InputError(
-                f"a {entry.type} joint has no {key}", field=f"joint.{name}.{key}", value=value, remedy="leave it out"
-            )
-    for key, each in own.items():
-        if each.default is MISSING and key not in given:
-            remedy = f"give {each.metadata.get('description', 'it')}"
-            raise InputError("is missing", field=f"joint.{name}.{key}", remedy=remedy)
+    check_fields(
+        given, own, f"{entry.type} joint", f"joint.{name}", lambda each: each.metadata.get("description", "it")
+    )
     return kind(name, a, b, **given)
 
 

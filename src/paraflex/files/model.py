@@ -444,13 +444,13 @@ def _data(model: Model) -> dict[str, Any]:
     """The data of a file from which a model is read: those it came from as far as they still say so."""
     data = dict(model.parameters)
     if not data:
-        return _checked(model, _tables(model))
+        return _checked(model, model_tables(model))
     if "payload" in data and _carrier(model_from(data, model.source)) != _carrier(model):
         # The body's own numbers, which are written, then include the payload.
         data.pop("payload")
     for each in (False, True, True):
         found = model_from(data, model.source)
-        now, wanted = (_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
+        now, wanted = (model_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
         if same(now, wanted):
             return data
         data = merged(data, now, wanted)
@@ -463,12 +463,6 @@ def _carrier(model: Model) -> tuple[Any, ...]:
     return effector, [body for body in model.mechanism.bodies if effector and body.name == effector.point.body]
 
 
-def _tables(model: Model, **options: Any) -> dict[str, Any]:
-    return model_tables(
-        model.mechanism, model.paths, model.study, model.start, model.statics, model.controllers, **options
-    )
-
-
 def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     """Data that say what they are to say.
 
@@ -477,7 +471,7 @@ def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     InputError
         They do not.
     """
-    wanted, found = (_tables(one) for one in (model, model_from(data, model.source)))
+    wanted, found = (model_tables(one) for one in (model, model_from(data, model.source)))
     for key, value in wanted.items():
         if not same(value, found.get(key)):
             raise InputError(

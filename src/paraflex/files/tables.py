@@ -6,12 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from itertools import count
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from paraflex.control.described import ControllerDescription
 from paraflex.control.shaped import ShapedPath
 from paraflex.control.shaping import Shaper
-from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import InputError, within
 from paraflex.files.controllers import controller_table
 from paraflex.files.laws import components_table, law_parameters, law_table
@@ -42,6 +40,9 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.quantities import joint_pair
 
+if TYPE_CHECKING:
+    from paraflex.files.model import Model
+
 _BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
 # What all beams of a file may have in common at its top, and what they have where it says nothing.
 _SHARED = {"reference": "pinned", "curvature": "separate"}
@@ -50,22 +51,13 @@ _NAMED_TABLES = {"section": "section", "material": "material", "lump": "lumps"}
 
 
 def model_tables(
-    mechanism: Mechanism,
-    paths: Mapping[str, Path],
-    study: StudyDefaults,
-    start: Start | None,
-    statics: StaticsDefaults,
-    controllers: Mapping[str, ControllerDescription],
-    *,
-    file: Mapping[str, Any] | None = None,
-    before: Mechanism | None = None,
-    each: bool = False,
+    model: Model, *, file: Mapping[str, Any] | None = None, before: Mechanism | None = None, each: bool = False
 ) -> dict[str, Any]:
     """What a model file says of a model; what is as it is where a file says nothing is left out.
 
     Parameters
     ----------
-    mechanism, paths, study, start, statics, controllers
+    model : Model
     file : mapping, optional
         Data of a file whose names for sections, materials and lumps are kept.
     before : Mechanism, optional
@@ -78,6 +70,7 @@ def model_tables(
     InputError
         A member that a file has no words for.
     """
+    mechanism, study = model.mechanism, model.study
     if mechanism.bases:
         raise InputError(
             "a file has no words for flexible coordinates that a reduction has chosen", field="bases",
@@ -90,7 +83,7 @@ def model_tables(
         "description": mechanism.description,
         "geometry": "" if mechanism.geometry.value == "second-order" else mechanism.geometry.value,
         **{key: value for key, value in shared.items() if value != _SHARED[key]},
-        "parameters": law_parameters(_laws(mechanism, study, controllers)),
+        "parameters": law_parameters(_laws(model)),
         "section": {name: _section(one, name, file or {}) for name, one in names["section"].values.items()},
         "material": {name: fields_said(material) for name, material in names["material"].values.items()},
         "lump": {name: {"mass": mass, "inertia": inertia} for name, (mass, inertia) in names["lump"].values.items()},
@@ -104,13 +97,13 @@ def model_tables(
         "end_effector": {} if mechanism.end_effector is None else fields_said(mechanism.end_effector),
         "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
         "mode": {mode.name: mode.motors for mode in mechanism.modes},
-        "path": {name: _path(path, name, paths) for name, path in paths.items()},
-        "controller": {name: controller_table(one) for name, one in controllers.items()},
-        "start": {} if start is None else _start(start),
+        "path": {name: _path(path, name, model.paths) for name, path in model.paths.items()},
+        "controller": {name: controller_table(one) for name, one in model.controllers.items()},
+        "start": {} if model.start is None else _start(model.start),
         "study": fields_said(study)
         | ({"torques": _torques(study)} if study.torques else {})
         | ({} if study.shaper is None else {"shaper": _shaper(study.shaper)}),
-        "statics": fields_said(statics),
+        "statics": fields_said(model.statics),
     }
     return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
 
@@ -134,14 +127,13 @@ def _member(member: Any) -> dict[str, Any]:
     return pairs | fields_said(member, "name", *(name for names in together.values() for name in names))
 
 
-def _laws(
-    mechanism: Mechanism, study: StudyDefaults, controllers: Mapping[str, ControllerDescription]
-) -> Iterator[tuple[str, AngleLaw]]:
-    """Laws in time of a mechanism, each with its place in a file."""
-    yield from ((f"prescribed.{one.name}.law", one.law) for one in mechanism.prescribed)
-    yield from ((f"load.{load.name}.{load.kind}", law) for load in mechanism.loads for law in load.laws)
-    yield from ((f"study.torques.{name}", law) for name, law in study.torques.items() if isinstance(law, AngleLaw))
-    for one in controllers.values():
+def _laws(model: Model) -> Iterator[tuple[str, AngleLaw]]:
+    """Laws in time of a model, each with its place in a file."""
+    torques = model.study.torques
+    yield from ((f"prescribed.{one.name}.law", one.law) for one in model.mechanism.prescribed)
+    yield from ((f"load.{load.name}.{load.kind}", law) for load in model.mechanism.loads for law in load.laws)
+    yield from ((f"study.torques.{name}", law) for name, law in torques.items() if isinstance(law, AngleLaw))
+    for one in model.controllers.values():
         for sensor, law in one.reference.items() if isinstance(one.reference, Mapping) else ():
             if isinstance(law, AngleLaw):
                 yield f"controller.{one.name}.reference.{sensor}", law
