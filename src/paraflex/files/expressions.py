@@ -64,7 +64,7 @@ def evaluate(text: str, parameters: Mapping[str, float]) -> float:
         It does not parse, has anything else in it, names an unknown parameter, or has no finite value.
     """
     _refuse_ambiguous(text, parameters)
-    return _evaluate(text, lambda name: _look_up(name, parameters))
+    return _finite(_arithmetic(text, lambda name: _look_up(name, parameters)))
 
 
 def evaluate_in_time(text: str, parameters: Mapping[str, float], t: Array) -> Jet:
@@ -133,7 +133,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
         entry = table[name]
         if isinstance(entry, str):
             _refuse_ambiguous(entry, table)
-            values[name] = _evaluate(entry, lambda other: value_of(other, (*open_names, name)))
+            values[name] = _finite(_arithmetic(entry, lambda other: value_of(other, (*open_names, name))))
         else:
             values[name] = _float(entry)
         return values[name]
@@ -165,10 +165,6 @@ def _in_time(text: str, parameters: Mapping[str, float], t: Array) -> Any:
     # What is not finite has no warning but is reported with its time.
     with np.errstate(all="ignore"):
         return _arithmetic(text, value_of)
-
-
-def _evaluate(text: str, value_of: Callable[[str], float]) -> float:
-    return _finite(_arithmetic(text, value_of))
 
 
 def _finite(value: Any) -> float:

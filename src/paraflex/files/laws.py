@@ -291,11 +291,15 @@ def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
         return TabulatedLaw(times, values)
     if entry.pieces is not None:
         return _pieces(entry.pieces, parameters)
-    field = "angle" if entry.displacement is None else "displacement"
-    given = entry.angle if entry.displacement is None else entry.displacement
+    field, given = _place(entry)
     if given is None:
         return ConstantSpeed(0.0, entry.speed or 0.0, from_assembly=True)
     return _expression(given, parameters, field, entry.speed or 0.0)
+
+
+def _place(table: PrescribedTable | PieceTable) -> tuple[str, Any]:
+    """Name and law of the angle or displacement that a table gives; None of one that gives neither."""
+    return ("angle", table.angle) if table.displacement is None else ("displacement", table.displacement)
 
 
 def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseLaw:
@@ -308,8 +312,7 @@ def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> Piecew
                 field=field,
                 remedy="give its angle, or its displacement where the joint slides",
             )
-        name = "angle" if piece.displacement is None else "displacement"
-        given = piece.angle if piece.displacement is None else piece.displacement
+        name, given = _place(piece)
         assert given is not None
         laws.append(_expression(given, parameters, f"{field}.{name}"))
     return PiecewiseLaw(tuple(laws), tuple(_ends(pieces)))

@@ -145,12 +145,10 @@ def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
 
 def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
     """A drawing at times (k,) as a run: what is drawn, and nothing else."""
-    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
     effector = mechanism.end_effector
     return xr.Dataset(
         {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(one).items()},
-        coords={"time": time, "point": points, "joint": [joint.name for joint in mechanism.joints],
-                **drawing_coordinates(mechanism)},
+        coords={"time": time, **drawing_coordinates(mechanism)},
         attrs={"mechanism": mechanism.name} | ({} if effector is None else {"end_effector_point": str(effector.point)}),
     )  # fmt: skip
 
@@ -170,7 +168,7 @@ def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
 
 
 def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
-    """Labels of these variables: bodies of the stations, stations of the points, kinds of the joints.
+    """Labels of these variables: points, joints, bodies of the stations, stations of the points, kinds of the joints.
 
     Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
     -1, and so has the rail of a joint without one on a moving body.
@@ -209,6 +207,8 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
             "load_station": ("load", np.array(acted, dtype=np.int32)),
         }
     return {
+        "point": [str(ref) for ref in stations],
+        "joint": [joint.name for joint in joints],
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
         "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
         "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
