@@ -61,7 +61,7 @@ def field_at(schema: type[BaseModel], data: Any, place: Sequence[Any]) -> FileFi
             description = info.description or f"a [{part}.NAME] table"
             model = info.annotation
         else:
-            model = _inner(model, data)
+            model = _inner(model)
         model = _resolve(model, data)
     return FileField(owner, description, model)
 
@@ -240,7 +240,7 @@ def _below(data: Any, key: Any) -> Any:
     return data[key] if isinstance(data, list) and isinstance(key, int) and key < len(data) else None
 
 
-def _inner(annotation: Any, data: Any) -> Any:
+def _inner(annotation: Any) -> Any:
     """What a dict or list annotation holds."""
     arguments = typing.get_args(annotation)
     return arguments[-1] if typing.get_origin(annotation) in (dict, list) and arguments else annotation

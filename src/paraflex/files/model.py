@@ -21,6 +21,7 @@ from paraflex.files.merge import merged, same
 from paraflex.files.overlay import plain, with_values
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
 from paraflex.files.rows import with_names, with_rows
+from paraflex.files.said import unsayable
 from paraflex.files.schema import ModelTable, PathFile
 from paraflex.files.start import read_start
 from paraflex.files.study import StudyDefaults, check_study
@@ -474,7 +475,5 @@ def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     wanted, found = (model_tables(one) for one in (model, model_from(data, model.source)))
     for key, value in wanted.items():
         if not same(value, found.get(key)):
-            raise InputError(
-                "a model file cannot say this", field=key, value=value, remedy="make it of what a file has"
-            )
+            raise unsayable(key, value, "make it of what a file has")
     return data

@@ -34,3 +34,8 @@ def check_fields(
     for key, each in own.items():
         if each.default is MISSING and key not in given:
             raise InputError("is missing", field=f"{place}.{key}", remedy=f"give {described(each)}")
+
+
+def unsayable(field: str, value: object, remedy: str) -> InputError:
+    """The error for what a model has and its file has no words for."""
+    return InputError("a model file cannot say this", field=field, value=value, remedy=remedy)

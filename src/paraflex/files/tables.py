@@ -14,7 +14,7 @@ from paraflex.errors import InputError, within
 from paraflex.files.controllers import controller_table
 from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
-from paraflex.files.said import fields_said
+from paraflex.files.said import fields_said, unsayable
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
@@ -156,7 +156,7 @@ def _plain(value: Any, field: str) -> Any:
     try:
         return float(value)
     except (TypeError, ValueError):
-        raise _unwritable(field, value, "give a number") from None
+        raise unsayable(field, value, "give a number") from None
 
 
 def _text(text: str, field: str) -> str:
@@ -165,10 +165,6 @@ def _text(text: str, field: str) -> str:
     except UnicodeEncodeError:
         raise InputError("not text in UTF-8", field=field, value=ascii(text), remedy="write it otherwise") from None
     return text
-
-
-def _unwritable(field: str, value: object, remedy: str) -> InputError:
-    return InputError("a model file cannot say this", field=field, value=value, remedy=remedy)
 
 
 def _agreed(mechanism: Mechanism) -> dict[str, str]:
@@ -218,14 +214,14 @@ def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
         if kind == "lump":
             for lump in given:
                 if (body.name, lump.point) in out:
-                    raise _unwritable(f"body.{body.name}.lumps", lump.point, "make one lump of those at a point")
+                    raise unsayable(f"body.{body.name}.lumps", lump.point, "make one lump of those at a point")
                 out[body.name, lump.point] = (lump.mass, lump.inertia)
         else:
             for k, each in enumerate(given if isinstance(given, tuple) else (given,)):
                 shape = getattr(each, "shape", None)
                 if shape is not None and Section.of(shape) != each:
                     remedy = "give Section.rectangle(...), round(...) or tube(...), or no shape"
-                    raise _unwritable(f"body.{body.name}.section", each, remedy)
+                    raise unsayable(f"body.{body.name}.section", each, remedy)
                 out[body.name, k] = each
     return out
 
@@ -273,7 +269,7 @@ def _functions(functions: Sequence[ShapeFunction], field: str, direction: str) -
     sines = [function.half_waves for function in functions if isinstance(function, Sine)]
     polynomials = [function.coefficients for function in functions[len(sines) :] if isinstance(function, Polynomial)]
     if sines != list(range(1, len(sines) + 1)) or len(sines) + len(polynomials) != len(functions):
-        raise _unwritable(field, functions, "give the sines from 1 on without gaps, then the polynomials")
+        raise unsayable(field, functions, "give the sines from 1 on without gaps, then the polynomials")
     said = {f"{direction}_sines": len(sines), f"{direction}_polynomials": polynomials}
     return {key: value for key, value in said.items() if value}
 
@@ -292,12 +288,12 @@ def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
     if isinstance(path, ShapedPath):
         said = _path(path.path, name, paths)
         if "shaper" in said:
-            raise _unwritable(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
+            raise unsayable(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
         return said | {"shaper": _shaper(path.shaper)}
     if isinstance(path, SequencePath):
         names = [next((other for other, one in paths.items() if one == part), "") for part in path.paths]
         if not all(names):
-            raise _unwritable(f"path.{name}.paths", "a path without a name", "put each of its paths among the model's")
+            raise unsayable(f"path.{name}.paths", "a path without a name", "put each of its paths among the model's")
         return {"type": "sequence", "paths": names} | fields_said(path, "paths")
     if isinstance(path, TabulatedPath):
         columns = [*zip(*path.points, strict=True), *([] if path.times is None else [path.times])]
@@ -305,7 +301,7 @@ def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
     for kind, made in PATHS.items():
         if type(path) is made:
             return {"type": kind} | fields_said(path)
-    raise _unwritable(
+    raise unsayable(
         f"path.{name}",
         type(path).__name__,
         "give a Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath",
@@ -328,7 +324,7 @@ def _torques(study: StudyDefaults) -> dict[str, Any]:
 
 def _assembly(assembly: Assembly) -> dict[str, Any]:
     if "points" in assembly.angles:
-        raise _unwritable(f"assembly.{assembly.name}", "points", 'call the body "points" something else')
+        raise unsayable(f"assembly.{assembly.name}", "points", 'call the body "points" something else')
     return {**assembly.angles} | ({"points": assembly.points} if assembly.points else {})
 
 

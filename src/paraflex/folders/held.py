@@ -11,7 +11,7 @@ from pathlib import Path
 
 from paraflex.errors import InputError, OutputError
 from paraflex.folders.changes import MANIFEST, NEW, READY, REMOVED, check_place, files_in, finish_moves
-from paraflex.folders.lock import LOCK, FolderInUseError, lock_folder, no_folder
+from paraflex.folders.lock import LOCK, FolderInUseError, lock_folder
 from paraflex.folders.manifest import STUDY_OF_RUNS, Manifest, digest_of, files_of, kind_of_folder
 from paraflex.writing import ELSEWHERE, unwritable, write_json
 
@@ -132,7 +132,7 @@ def hold_folder(
                 (path / NEW).mkdir()
                 (path / NEW).rmdir()
             except OSError as error:
-                raise no_folder(path, error, field) from error
+                raise unwritable(error, field, ELSEWHERE, str(path)) from error
             yield ResultsFolder(path, kind, locks=locks, remedy=remedy)
     finally:
         _remove_empty(path, made)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
 from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
-from paraflex.results.storage import SCHEMA
+from paraflex.results.storage import origin
 
 FULL = "full"
 # Frequencies of responses, from this part of the highest on and somewhat beyond it.
@@ -115,9 +114,7 @@ def reduction_dataset(
     attrs = {
         "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about,
         "kept_states": len(few[0][0].states), "full_states": len(models[0].states), "until": until, "accuracy": error,
-        "damping_ratio": DAMPING, "input_unit": ", ".join(units),
-        "parameters": json.dumps(parameters or {}, sort_keys=True), "paraflex_version": version("paraflex"),
-        "schema": SCHEMA,
+        "damping_ratio": DAMPING, "input_unit": ", ".join(units), **origin(parameters),
     }  # fmt: skip
     if along:
         method = _carrying(names)

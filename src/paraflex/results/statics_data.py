@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
 from paraflex.results.numbers import by_label, finite_or_none, stacked
-from paraflex.results.storage import SCHEMA
+from paraflex.results.storage import origin
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 
@@ -110,13 +109,7 @@ def statics_dataset(
             name_units(out[name], [unit for unit in NAMED_UNITS[name] if unit in each] or NAMED_UNITS[name], each)
         if name in _COMMENTS:
             out[name].attrs["comment"] = _COMMENTS[name]
-    out.attrs = {
-        "kind": "statics",
-        "mechanism": mechanism.name,
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
-        "schema": SCHEMA,
-    }
+    out.attrs = {"kind": "statics", "mechanism": mechanism.name, **origin(parameters)}
     beyond = [] if found.validity is None or found.validity.holds else [found.validity.finding()]
     keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *found.doubts])
     return out
