@@ -145,16 +145,10 @@ def _add_relation(mujoco: Any, spec: Any, one: Relation, tree: Tree, step: float
     """Let the hinge of the second joint follow that of the first, by a polynomial of degree one."""
     hinge = {link.joint.name: link for link in tree.links}
     first, second = (hinge[name] for name in one.joints)
-    equality = spec.add_equality(
-        name=one.name,
-        type=mujoco.mjtEq.mjEQ_JOINT,
-        objtype=mujoco.mjtObj.mjOBJ_JOINT,
-        name1=second.name,
-        name2=first.name,
-    )
+    of_joints = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
+    equality = _add_equality(spec, one.name, of_joints, [second.name, first.name], step)
     assert one.phase is not None
     equality.data[:2] = second.sign * one.phase, second.sign * one.transmission * first.sign
-    _stiffen(equality, step)
 
 
 def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, step: float) -> None:
@@ -163,19 +157,15 @@ def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, s
         name = f"{joint.name} {side}"
         bodies[ref.body].add_site(name=name, pos=[*system.marker(ref).x0, 0.0])
         sites.append(name)
-    equality = spec.add_equality(
-        name=joint.name,
-        type=mujoco.mjtEq.mjEQ_CONNECT,
-        objtype=mujoco.mjtObj.mjOBJ_SITE,
-        name1=sites[0],
-        name2=sites[1],
-    )
-    _stiffen(equality, step)
+    _add_equality(spec, joint.name, (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_SITE), sites, step)
 
 
-def _stiffen(equality: Any, step: float) -> None:
+def _add_equality(spec: Any, name: str, kinds: tuple[Any, Any], pair: list[str], step: float) -> Any:
+    """An equality constraint of two objects of one kind, as stiff as steps allow."""
+    equality = spec.add_equality(name=name, type=kinds[0], objtype=kinds[1], name1=pair[0], name2=pair[1])
     equality.solref = [_TIME_CONSTANT * step, 1.0]
     equality.solimp = [_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0]
+    return equality
 
 
 @dataclass(frozen=True)

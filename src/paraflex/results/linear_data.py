@@ -98,9 +98,9 @@ def linear_dataset(
         ((model, ()) for model in models), ((model, motors_of(model)) for model in models)
     ))  # fmt: skip
     maps = [zero_maps(model) for model in models]
-    data = _matrices(models) | _motions(free, held) | _zeros(maps) | _drawings(models, free, held)
-    data["unbalanced"] = ("mode", np.array([model.unbalanced for model in models]))
     names = {key: _names(models, key) for key in ("states", "inputs", "outputs")}
+    data = _matrices(models, names) | _motions(free, held) | _zeros(maps) | _drawings(models, free, held)
+    data["unbalanced"] = ("mode", np.array([model.unbalanced for model in models]))
     frequency = _frequencies(free, held, [zero for each in maps for zero in each.values()])
     data |= _responses(models, frequency, names)
     coordinates: dict[str, Any] = {
@@ -161,9 +161,9 @@ def _names(models: Sequence[LinearModel], key: str) -> dict[str, str]:
     return {one.name: one.unit for model in models for one in getattr(model, key)}
 
 
-def _matrices(models: Sequence[LinearModel]) -> dict[str, Any]:
+def _matrices(models: Sequence[LinearModel], named: dict[str, dict[str, str]]) -> dict[str, Any]:
     """A, B, C and D among the names of all modes."""
-    names = {key: list(_names(models, key)) for key in ("states", "inputs", "outputs")}
+    names = {key: list(own) for key, own in named.items()}
     out = {}
     for matrix, (rows, columns) in {
         "A": ("states", "states"), "B": ("states", "inputs"), "C": ("outputs", "states"), "D": ("outputs", "inputs")
