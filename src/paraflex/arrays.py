@@ -8,5 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 # Real, or complex where a complex step carries a derivative.
 Numbers = NDArray[Any]

@@ -151,12 +151,7 @@ class TrackingTask:
             As `Mechanism.rigid`, `with_beams`, `with_geometry` or `refined` return it.
         """
         system = build_system(mechanism)
-        return replace(
-            self,
-            mechanism=mechanism,
-            system=system,
-            start=_start(system, self.motion),
-        )
+        return replace(self, mechanism=mechanism, system=system, start=_start(system, self.motion))
 
     @checked_arguments()
     def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
@@ -174,15 +169,7 @@ class TrackingTask:
         """
         if self.whole is not None:
             raise InputError("cut into segments already", field="segments", remedy="cut the task it was made from")
-        segmented = finite_segments(self.mechanism, segments)
-        system = build_system(segmented.mechanism)
-        return replace(
-            self,
-            mechanism=segmented.mechanism,
-            system=system,
-            start=_start(system, self.motion),
-            whole=self,
-        )
+        return replace(self.remodelled(finite_segments(self.mechanism, segments).mechanism), whole=self)
 
     @checked_arguments()
     def balanced(self, mode: str | ActuationMode) -> TrackingTask:
@@ -257,7 +244,8 @@ class TrackingRun(Shown):
     @cached_property
     def validity(self) -> Validity | None:
         """Validity of the model in the run; None for rigid bodies and finite segments."""
-        return assess(self.task.system, self.solution, self._following())
+        following = None if self.driven is None else Following(self.driven.deviation, self.driven.condition)
+        return assess(self.task.system, self.solution, following)
 
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
@@ -289,10 +277,6 @@ class TrackingRun(Shown):
             return None
         actual = marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0]
         return task.driven(self.mode.name, self.applied, self.condition[:k], actual)
-
-    def _following(self) -> Following | None:
-        """Deviation from the path and condition number, where torques drive the mechanism along it."""
-        return None if self.driven is None else Following(self.driven.deviation, self.driven.condition)
 
     def warn(self) -> None:
         """Issue a `ValidityWarning` or a `ResultWarning` for each finding."""

@@ -18,6 +18,14 @@ from paraflex.tracking import TrackingTask
 from paraflex.validity.numbers import doubtful_numbers
 
 
+def loaded(model: Model | Mechanism | str | FilePath) -> Model | Mechanism:
+    """A model or mechanism as it is, or the model of a name or file; an `InputError` for anything else."""
+    found = load(model) if isinstance(model, str | FilePath) else model
+    if isinstance(found, Model | Mechanism):
+        return found
+    raise InputError("not a model", field="model", value=model, remedy="give a model, a mechanism, or a file's name")
+
+
 def check(
     model: Model | Mechanism | str | FilePath,
     *,
@@ -51,12 +59,7 @@ def check(
     InputError
         A file that cannot be read, an unknown path, assembly or mode, or nothing to check.
     """
-    if isinstance(model, str | FilePath):
-        model = load(model)
-    if not isinstance(model, Model | Mechanism):
-        raise InputError(
-            "not a model", field="model", value=model, remedy="give a model, a mechanism, or a file's name"
-        )
+    model = loaded(model)
     mechanism = model if isinstance(model, Mechanism) else model.mechanism
     if isinstance(model, Model):
         assembly = assembly or model.study.assembly

@@ -6,8 +6,9 @@ import warnings
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
-from paraflex.errors import InputError, ModelWarning
-from paraflex.files import Model, load
+from paraflex.checks.check import loaded
+from paraflex.errors import ModelWarning
+from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.results.posed import Posed, posed
 
@@ -34,14 +35,9 @@ def pose_of(
     InputError
         A file that cannot be read, an unknown path or assembly, or no assembly at all.
     """
-    if isinstance(model, str | FilePath):
-        model = load(model)
+    model = loaded(model)
     if isinstance(model, Mechanism):
         model = Model(model)
-    if not isinstance(model, Model):
-        raise InputError(
-            "not a model", field="model", value=model, remedy="give a model, a mechanism, or a file's name"
-        )
     followed = None
     if path is not None or (model.paths and model.start is None):
         name = model.path_name(path)

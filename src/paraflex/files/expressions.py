@@ -8,12 +8,13 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError, suggestion
 from paraflex.files.jets import FUNCTIONS, Jet
 from paraflex.limits import EXPRESSION_LETTERS, PARAMETER_CHAIN
@@ -43,6 +44,15 @@ class ExpressionError(ValueError):
         super().__init__(problem)
 
 
+@contextmanager
+def expressed_in(field: str, value: object) -> Iterator[None]:
+    """Context in which what is wrong with an expression is wrong with the value of a field."""
+    try:
+        yield
+    except ExpressionError as error:
+        raise InputError(error.problem, field=field, value=value, remedy=error.remedy) from None
+
+
 def evaluate(text: str, parameters: Mapping[str, float]) -> float:
     """Value of an expression of numbers, parameters, pi, + - * / **, brackets and the functions of `jets`.
 
@@ -54,10 +64,10 @@ def evaluate(text: str, parameters: Mapping[str, float]) -> float:
         It does not parse, has anything else in it, names an unknown parameter, or has no finite value.
     """
     _refuse_ambiguous(text, parameters)
-    return _evaluate(text, lambda name: _look_up(name, parameters))
+    return _finite(_arithmetic(text, lambda name: _look_up(name, parameters)))
 
 
-def evaluate_in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Jet:
+def evaluate_in_time(text: str, parameters: Mapping[str, float], t: Array) -> Jet:
     """Value, rate and acceleration at times t of an expression as above in which t is the time [s].
 
     Raises
@@ -123,7 +133,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
         entry = table[name]
         if isinstance(entry, str):
             _refuse_ambiguous(entry, table)
-            values[name] = _evaluate(entry, lambda other: value_of(other, (*open_names, name)))
+            values[name] = _finite(_arithmetic(entry, lambda other: value_of(other, (*open_names, name))))
         else:
             values[name] = _float(entry)
         return values[name]
@@ -134,16 +144,14 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
             raise InputError("not usable as a name", field=field, value=name, remedy="letters, digits and _; not pi")
         if isinstance(entry, bool) or not isinstance(entry, (int, float, str)):
             raise InputError("neither a number nor an expression", field=field, value=entry, remedy="give one of them")
-        try:
+        with expressed_in(field, entry):
             value = value_of(name, ())
-        except ExpressionError as error:
-            raise InputError(error.problem, field=field, value=entry, remedy=error.remedy) from None
         if not math.isfinite(value):
             raise InputError("not a finite number", field=field, value=entry, remedy="give a number")
     return values
 
 
-def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Any:
+def _in_time(text: str, parameters: Mapping[str, float], t: Array) -> Any:
     if TIME_NAME in parameters:
         raise ExpressionError(
             f'"{TIME_NAME}" is the time in this expression', f'give the parameter "{TIME_NAME}" another name'
@@ -157,10 +165,6 @@ def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64])
     # What is not finite has no warning but is reported with its time.
     with np.errstate(all="ignore"):
         return _arithmetic(text, value_of)
-
-
-def _evaluate(text: str, value_of: Callable[[str], float]) -> float:
-    return _finite(_arithmetic(text, value_of))
 
 
 def _finite(value: Any) -> float:

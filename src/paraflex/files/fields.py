@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from paraflex.errors import InputError
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
-from paraflex.files.expressions import ExpressionError, evaluate, names_in
+from paraflex.files.expressions import ExpressionError, evaluate, expressed_in, names_in
 from paraflex.mechanism import JOINT_KINDS
 from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, quantities_in, spelt, unit_named
 
@@ -61,7 +61,7 @@ def field_at(schema: type[BaseModel], data: Any, place: Sequence[Any]) -> FileFi
             description = info.description or f"a [{part}.NAME] table"
             model = info.annotation
         else:
-            model = _inner(model, data)
+            model = _inner(model)
         model = _resolve(model, data)
     return FileField(owner, description, model)
 
@@ -121,10 +121,8 @@ def check_unit(
     InputError
         Of another dimension, or a sum of unlike quantities.
     """
-    try:
+    with expressed_in(field, text):
         given = dimension_of(text, parameters)
-    except ExpressionError as error:
-        raise InputError(error.problem, field=field, value=text, remedy=error.remedy) from None
     if units is None or given in (None, PLAIN) or given in [unit_named(unit).dimension for unit in units]:
         return
     asked = f"one in {' or '.join(units)}" if units else "a number without a unit"
@@ -242,7 +240,7 @@ def _below(data: Any, key: Any) -> Any:
     return data[key] if isinstance(data, list) and isinstance(key, int) and key < len(data) else None
 
 
-def _inner(annotation: Any, data: Any) -> Any:
+def _inner(annotation: Any) -> Any:
     """What a dict or list annotation holds."""
     arguments = typing.get_args(annotation)
     return arguments[-1] if typing.get_origin(annotation) in (dict, list) and arguments else annotation

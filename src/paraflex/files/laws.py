@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.files.expressions import (
-    ExpressionError,
     check_in_time,
     evaluate,
     evaluate_in_time,
+    expressed_in,
     is_constant,
     names_in,
 )
@@ -51,15 +51,13 @@ class ExpressionLaw:
     knots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        try:
+        with expressed_in(self.field, self.text):
             check_in_time(self.text, self.parameters)
-        except ExpressionError as error:
-            raise InputError(error.problem, field=self.field, value=self.text, remedy=error.remedy) from None
         spoken_of = names_in(self.text)
         used = {name: value for name, value in self.parameters.items() if name in spoken_of}
         object.__setattr__(self, "parameters", used)
 
-    def evaluate(self, t: NDArray[np.float64]) -> Values:
+    def evaluate(self, t: Array) -> Values:
         """Value, rate and acceleration at times t.
 
         Raises
@@ -67,10 +65,8 @@ class ExpressionLaw:
         InputError
             One of them is no finite number at some time.
         """
-        try:
+        with expressed_in(self.field, self.text):
             jet = evaluate_in_time(self.text, self.parameters, t)
-        except ExpressionError as error:
-            raise InputError(error.problem, field=self.field, value=self.text, remedy=error.remedy) from None
         return jet.value, jet.rate, jet.acceleration
 
 
@@ -295,11 +291,15 @@ def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
         return TabulatedLaw(times, values)
     if entry.pieces is not None:
         return _pieces(entry.pieces, parameters)
-    field = "angle" if entry.displacement is None else "displacement"
-    given = entry.angle if entry.displacement is None else entry.displacement
+    field, given = _place(entry)
     if given is None:
         return ConstantSpeed(0.0, entry.speed or 0.0, from_assembly=True)
     return _expression(given, parameters, field, entry.speed or 0.0)
+
+
+def _place(table: PrescribedTable | PieceTable) -> tuple[str, Any]:
+    """Name and law of the angle or displacement that a table gives; None of one that gives neither."""
+    return ("angle", table.angle) if table.displacement is None else ("displacement", table.displacement)
 
 
 def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseLaw:
@@ -312,8 +312,7 @@ def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> Piecew
                 field=field,
                 remedy="give its angle, or its displacement where the joint slides",
             )
-        name = "angle" if piece.displacement is None else "displacement"
-        given = piece.angle if piece.displacement is None else piece.displacement
+        name, given = _place(piece)
         assert given is not None
         laws.append(_expression(given, parameters, f"{field}.{name}"))
     return PiecewiseLaw(tuple(laws), tuple(_ends(pieces)))

@@ -12,7 +12,7 @@ from paraflex.control.described import NONE, ControllerDescription, check_togeth
 from paraflex.control.shaped import shape_torques
 from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults, conditions
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, suggestion, within
 from paraflex.files.controllers import read_controllers
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
@@ -21,6 +21,7 @@ from paraflex.files.merge import merged, same
 from paraflex.files.overlay import plain, with_values
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
 from paraflex.files.rows import with_names, with_rows
+from paraflex.files.said import unsayable
 from paraflex.files.schema import ModelTable, PathFile
 from paraflex.files.start import read_start
 from paraflex.files.study import StudyDefaults, check_study
@@ -389,10 +390,8 @@ def load_path(file: str | FilePath) -> Path:
     with naming(source):
         data = with_rows(read_toml(FilePath(file), source), FilePath(file).parent)
     table = validate(PathFile, data, source)
-    try:
+    with naming(source), within("path"):
         return read_path(table.path)
-    except InputError as error:
-        raise error.within("path").in_file(source) from None
 
 
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
@@ -428,10 +427,8 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
 
 
 def _study_shaper(table: ModelTable) -> Shaper | None:
-    try:
+    with within("study"):
         return None if table.study.shaper is None else read_shaper(table.study.shaper)
-    except InputError as error:
-        raise error.within("study") from None
 
 
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
@@ -439,10 +436,8 @@ def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
     for name in ("held", "stiffness"):
         said[name] = None if said[name] is None else tuple(said[name])
     found = StaticsDefaults(**said)
-    try:
+    with within("statics"):
         conditions(mechanism, found)
-    except InputError as error:
-        raise error.within("statics") from None
     return found
 
 
@@ -450,13 +445,13 @@ def _data(model: Model) -> dict[str, Any]:
     """The data of a file from which a model is read: those it came from as far as they still say so."""
     data = dict(model.parameters)
     if not data:
-        return _checked(model, _tables(model))
+        return _checked(model, model_tables(model))
     if "payload" in data and _carrier(model_from(data, model.source)) != _carrier(model):
         # The body's own numbers, which are written, then include the payload.
         data.pop("payload")
     for each in (False, True, True):
         found = model_from(data, model.source)
-        now, wanted = (_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
+        now, wanted = (model_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
         if same(now, wanted):
             return data
         data = merged(data, now, wanted)
@@ -469,12 +464,6 @@ def _carrier(model: Model) -> tuple[Any, ...]:
     return effector, [body for body in model.mechanism.bodies if effector and body.name == effector.point.body]
 
 
-def _tables(model: Model, **options: Any) -> dict[str, Any]:
-    return model_tables(
-        model.mechanism, model.paths, model.study, model.start, model.statics, model.controllers, **options
-    )
-
-
 def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     """Data that say what they are to say.
 
@@ -483,10 +472,8 @@ def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     InputError
         They do not.
     """
-    wanted, found = (_tables(one) for one in (model, model_from(data, model.source)))
+    wanted, found = (model_tables(one) for one in (model, model_from(data, model.source)))
     for key, value in wanted.items():
         if not same(value, found.get(key)):
-            raise InputError(
-                "a model file cannot say this", field=key, value=value, remedy="make it of what a file has"
-            )
+            raise unsayable(key, value, "make it of what a file has")
     return data

@@ -159,7 +159,10 @@ def _followed(data: Mapping[str, Any], parts: Sequence[str]) -> Place:
     inside: Any = data
     for part in parts:
         key: str | int = int(part) if isinstance(inside, list) and part.isdigit() else part
-        if not ((isinstance(inside, dict) and key in inside) or (isinstance(inside, list) and _has(inside, key))):
+        if not (
+            (isinstance(inside, dict) and key in inside)
+            or (isinstance(inside, list) and isinstance(key, int) and key < len(inside))
+        ):
             break
         inside = inside[key]  # pyright: ignore[reportArgumentType, reportCallIssue]
         place.append(key)
@@ -219,10 +222,6 @@ def _parts(field: str) -> list[str]:
         if found[4] == "":
             return parts
     raise InputError("not the name of a field", field=field, remedy='say "body.link1.length"')
-
-
-def _has(inside: list, key: str | int) -> bool:
-    return isinstance(key, int) and key < len(inside)
 
 
 def _is_number(value: Any, data: Mapping[str, Any]) -> bool:

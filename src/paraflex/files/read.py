@@ -99,27 +99,22 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     InputError
         It is not TOML.
     """
-    if _DEEP_KEY.search(text):
-        raise InputError(
-            "not valid TOML: a name of too many parts", field="file", remedy=f"at most {KEY_PARTS} between dots",
-            source=source,
-        )  # fmt: skip
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise _not_toml(str(error), source) from error
-    except (ValueError, RecursionError):
-        raise InputError(
-            "not valid TOML: a number of too many digits, or too many brackets in one another",
-            field="file",
-            remedy="name a model file",
-            source=source,
-        ) from None
-    _check_names(data, source)
-    return data
+    with naming(source):
+        if _DEEP_KEY.search(text):
+            remedy = f"at most {KEY_PARTS} between dots"
+            raise InputError("not valid TOML: a name of too many parts", field="file", remedy=remedy)
+        try:
+            data = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise _not_toml(str(error)) from error
+        except (ValueError, RecursionError):
+            problem = "not valid TOML: a number of too many digits, or too many brackets in one another"
+            raise InputError(problem, field="file", remedy="name a model file") from None
+        _check_names(data)
+        return data
 
 
-def _check_names(data: dict[str, Any], source: str) -> None:
+def _check_names(data: dict[str, Any]) -> None:
     """Names are none too long, at whatever depth."""
     left: list[tuple[str, Any]] = [("", data)]
     while left:
@@ -127,26 +122,22 @@ def _check_names(data: dict[str, Any], source: str) -> None:
         inner = value.items() if isinstance(value, dict) else [("", each) for each in value]
         for name, each in inner:
             if len(name) > NAME_LETTERS:
-                raise InputError(
-                    f"a name of {len(name)} letters", field=table or "file", value=name,
-                    remedy=f"at most {NAME_LETTERS}", source=source,
-                )  # fmt: skip
+                remedy = f"at most {NAME_LETTERS}"
+                raise InputError(f"a name of {len(name)} letters", field=table or "file", value=name, remedy=remedy)
             if isinstance(each, dict | list):
                 left.append((f"{table}.{name}".strip("."), each))
 
 
-def _not_toml(reason: str, source: str) -> InputError:
+def _not_toml(reason: str) -> InputError:
     """What the parser says, with the name of a table that stands twice."""
     twice = re.match(r"Cannot declare \((.*?),?\) twice \((.*)\)", reason)
     if twice is None:
         problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "mend that line"
         if re.search("overwrite|mutate|uplicate", reason):
             remedy += "; a name may stand only once"
-        return InputError(problem, field="file", remedy=remedy, source=source)
+        return InputError(problem, field="file", remedy=remedy)
     table = ".".join(part.strip(" '") for part in twice[1].split(","))
-    return InputError(
-        f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out", source=source
-    )
+    return InputError(f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out")
 
 
 @contextmanager
@@ -187,28 +178,28 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
     model, description = place.owner, place.description
     kind, value = problem["type"], problem.get("input")
     if kind == "missing":
-        return InputError("is missing", field=field, remedy=f"give {description}", source=source)
+        return InputError("is missing", field=field, remedy=f"give {description}")
     if kind == "extra_forbidden":
         known = sorted(model.model_fields) if model is not None else []
         near = get_close_matches(str(location[-1]), known, n=1)
         remedy = f'did you mean "{near[0]}"?' if near else f"known here: {listed(known)}"
-        return InputError("unknown field", field=field, value=value, remedy=remedy, source=source)
+        return InputError("unknown field", field=field, value=value, remedy=remedy)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        return _tag_problem(_tags(schema, problem["loc"]), field, value, source)
+        return _tag_problem(_tags(schema, problem["loc"]), field, value)
     if kind == "expression":
         said = problem.get("ctx", {})
         remedy = f"give {description}; {said.get('remedy')}"
-        return InputError(said.get("problem", ""), field=field, value=value, remedy=remedy, source=source)
+        return InputError(said.get("problem", ""), field=field, value=value, remedy=remedy)
     if kind in _NO_TABLE:
-        return InputError("should be a table", field=field, value=value, remedy=f"give {description}", source=source)
+        return InputError("should be a table", field=field, value=value, remedy=f"give {description}")
     if kind == "literal_error":
         allowed = problem.get("ctx", {}).get("expected", "")
         near = get_close_matches(str(value), re.findall("'([^']*)'", allowed), n=1)
         remedy = f'did you mean "{near[0]}"?' if near else f"give {description}"
-        return InputError(f"should be {allowed}", field=field, value=value, remedy=remedy, source=source)
+        return InputError(f"should be {allowed}", field=field, value=value, remedy=remedy)
     message = problem["msg"].removeprefix("Input ").replace(" after validation", "")
     text = message[0].lower() + message[1:]
-    return InputError(text, field=field, value=value, remedy=f"give {description}", source=source)
+    return InputError(text, field=field, value=value, remedy=f"give {description}")
 
 
 def _other_kind(schema: type[BaseModel], data: dict[str, Any], source: str) -> InputError | None:
@@ -217,28 +208,26 @@ def _other_kind(schema: type[BaseModel], data: dict[str, Any], source: str) -> I
     if "mechanism" in fields and "body" in data and "mechanism" not in data:
         name = f'mechanism = "{source}"'
         remedy = f"write a study file with {name} and what it is to vary, and name that"
-        return InputError("this is a model file, not a study file", field="file", remedy=remedy, source=source)
+        return InputError("this is a model file, not a study file", field="file", remedy=remedy)
     if "body" in fields and "body" not in data and isinstance(data.get("mechanism"), str):
         remedy = f"name its mechanism, {data['mechanism']}, or give it to the command of its study"
-        return InputError("this is a study file, not a model file", field="file", remedy=remedy, source=source)
+        return InputError("this is a study file, not a model file", field="file", remedy=remedy)
     return None
 
 
-def _tag_problem(tags: list[str], table: str, value: Any, source: str) -> InputError:
+def _tag_problem(tags: list[str], table: str, value: Any) -> InputError:
     """What is wrong with the field that says of which kind a table is."""
     choice = " or ".join([", ".join(f'"{tag}"' for tag in tags[:-1]), f'"{tags[-1]}"'])
     given = value if isinstance(value, dict) else {}
     if _TAG in given:
         near = get_close_matches(str(given[_TAG]), tags, n=1)
         remedy = f'did you mean "{near[0]}"? it may be {choice}' if near else f"it may be {choice}"
-        return InputError("unknown type", field=f"{table}.{_TAG}", value=given[_TAG], remedy=remedy, source=source)
+        return InputError("unknown type", field=f"{table}.{_TAG}", value=given[_TAG], remedy=remedy)
     near = get_close_matches(_TAG, given, n=1)
     if near:
         remedy = f'did you mean "{_TAG}"?'
-        return InputError(
-            "unknown field", field=f"{table}.{near[0]}", value=given[near[0]], remedy=remedy, source=source
-        )
-    return InputError("is missing", field=f"{table}.{_TAG}", remedy=f"it may be {choice}", source=source)
+        return InputError("unknown field", field=f"{table}.{near[0]}", value=given[near[0]], remedy=remedy)
+    return InputError("is missing", field=f"{table}.{_TAG}", remedy=f"it may be {choice}")
 
 
 def _tags(schema: type[BaseModel], location: tuple) -> list[str]:

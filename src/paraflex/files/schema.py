@@ -111,10 +111,13 @@ class _Table(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
 
 
-_UNTIL = Field(default=None, description="the time in s at which the next piece takes over")
-_INTERPOLATION = Field(
-    default=None, description='how a table is interpolated: "spline", smoothly, by default, or "linear"'
-)
+def _optional(description: str, default: Any = None) -> Any:
+    """A field that a file may leave out."""
+    return Field(default=default, description=description)
+
+
+_UNTIL = _optional("the time in s at which the next piece takes over")
+_INTERPOLATION = _optional('how a table is interpolated: "spline", smoothly, by default, or "linear"')
 InterpolationName = Literal["spline", "linear"]
 _PAIR_IN_TIME = Annotated[list[FunctionOfTime], Field(min_length=2, max_length=2)]
 
@@ -150,10 +153,10 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
     return {
         name: (
             written | None,
-            Field(default=None, description=f"{description}, numbers or expressions of the time t"),
+            _optional(f"{description}, numbers or expressions of the time t"),
         ),
-        "pieces": (pieces | None, Field(default=None, description=example)),
-        "table": (rows | None, Field(default=None, description=f"a list of {columns} such columns")),
+        "pieces": (pieces | None, _optional(example)),
+        "table": (rows | None, _optional(f"a list of {columns} such columns")),
         "interpolation": (InterpolationName | None, _INTERPOLATION),
     }
 
@@ -254,18 +257,16 @@ def _joint_table() -> Any:
 class SectionTable(_Table):
     """A cross-section, by its shape or by its properties: what one shape needs others do not have."""
 
-    shape: Literal["rectangle", "round", "tube"] | None = Field(
-        default=None, description='"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
+    shape: Literal["rectangle", "round", "tube"] | None = _optional(
+        '"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
     )
-    width: Number | None = Field(default=None, description="the width out of the plane of motion in m")
-    thickness: Number | None = Field(default=None, description="the thickness in the plane of motion in m")
-    diameter: Number | None = Field(default=None, description="the outer diameter in m")
-    wall: Number | None = Field(default=None, description="the thickness of the wall of a hollow section in m")
-    area: Number | None = Field(default=None, description="the area in m^2")
-    second_moment: Number | None = Field(default=None, description="the second moment of area in m^4")
-    outer_fibre: Number | None = Field(
-        default=None, description="the distance of the outermost fibre from the neutral axis in m"
-    )
+    width: Number | None = _optional("the width out of the plane of motion in m")
+    thickness: Number | None = _optional("the thickness in the plane of motion in m")
+    diameter: Number | None = _optional("the outer diameter in m")
+    wall: Number | None = _optional("the thickness of the wall of a hollow section in m")
+    area: Number | None = _optional("the area in m^2")
+    second_moment: Number | None = _optional("the second moment of area in m^4")
+    outer_fibre: Number | None = _optional("the distance of the outermost fibre from the neutral axis in m")
 
 
 class MaterialTable(_Table):
@@ -273,29 +274,28 @@ class MaterialTable(_Table):
 
     youngs_modulus: Number = Field(description="Young's modulus in Pa")
     density: Number = Field(description="the density in kg/m^3")
-    strength: Number | None = Field(default=None, description="the largest stress that it bears in Pa")
+    strength: Number | None = _optional("the largest stress that it bears in Pa")
 
 
 class LumpTable(_Table):
     """A lumped mass."""
 
     mass: Number = Field(description="the mass in kg")
-    inertia: Number = Field(default=0.0, description="the moment of inertia in kg m^2")
+    inertia: Number = _optional("the moment of inertia in kg m^2", 0.0)
 
 
 class DampingTable(_Table):
     """Structural damping of a body: by ratios, by a loss factor, or in proportion to mass and stiffness."""
 
-    ratios: list[Number] = Field(
-        default=[],
-        description="the damping ratio of each mode of the body as its joints hold it; the last serves the rest",
+    ratios: list[Number] = _optional(
+        "the damping ratio of each mode of the body as its joints hold it; the last serves the rest", []
     )
-    loss_factor: Number = Field(
-        default=0.0, description="twice the damping ratio of a vibration at the frequency, in proportion to stiffness"
+    loss_factor: Number = _optional(
+        "twice the damping ratio of a vibration at the frequency, in proportion to stiffness", 0.0
     )
-    frequency: Number = Field(default=0.0, description="the frequency in Hz that the loss factor is meant for")
-    mass: Number = Field(default=0.0, description="the part in proportion to mass in 1/s, of the body as it is held")
-    stiffness: Number = Field(default=0.0, description="the part in proportion to stiffness in s")
+    frequency: Number = _optional("the frequency in Hz that the loss factor is meant for", 0.0)
+    mass: Number = _optional("the part in proportion to mass in 1/s, of the body as it is held", 0.0)
+    stiffness: Number = _optional("the part in proportion to stiffness in s", 0.0)
 
 
 ReferenceName = Literal["pinned", "cantilever", "free"]
@@ -310,32 +310,27 @@ class BeamTable(_Table):
     length: Number = Field(description="the length in m")
     section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one a span")
     material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one a span")
-    points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
-    elements: Count | list[Count] | None = Field(
-        default=None,
-        description="elements per span, one number or one a span; by default 1, and where a joint slides along "
-        "the beam so many that none is longer than a third of it",
+    points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
+    elements: Count | list[Count] | None = _optional(
+        "elements per span, one number or one a span; by default 1, and where a joint slides along "
+        "the beam so many that none is longer than a third of it"
     )
-    lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
-    reference: ReferenceName | None = Field(
-        default=None,
-        description='how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default',
+    lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
+    reference: ReferenceName | None = _optional(
+        'how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default'
     )
-    curvature: CurvatureName | None = Field(
-        default=None,
-        description='curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default',
+    curvature: CurvatureName | None = _optional(
+        'curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default'
     )
-    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
-    reduction: ReductionName = Field(
-        default="modal",
-        description='what is kept with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
+    modes: Count | None = _optional("how many modes of lowest frequency to keep")
+    reduction: ReductionName = _optional(
+        'what is kept with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
         "held, and static shapes of these",
+        "modal",
     )
-    damping: DampingTable | None = Field(default=None, description="a damping table")
-    flexible: Yes = Field(default=True, description="false for a rigid beam")
-    frames: Count = Field(
-        default=1, description="floating frames of equal length, joined rigidly: more of them for large deflections"
-    )
+    damping: DampingTable | None = _optional("a damping table")
+    flexible: Yes = _optional("false for a rigid beam", True)
+    frames: Count = _optional("floating frames of equal length, joined rigidly: more of them for large deflections", 1)
 
 
 class RigidTable(_Table):
@@ -344,8 +339,8 @@ class RigidTable(_Table):
     type: Literal["rigid"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     mass: Number = Field(description="the mass in kg")
     inertia: Number = Field(description="the moment of inertia about the centre of mass in kg m^2")
-    centre_of_mass: Pair = Field(default=[0.0, 0.0], description="[x, y] in the body frame in m")
-    points: dict[str, Pair] = Field(default={}, description="[x, y] of each named point in the body frame in m")
+    centre_of_mass: Pair = _optional("[x, y] in the body frame in m", [0.0, 0.0])
+    points: dict[str, Pair] = _optional("[x, y] of each named point in the body frame in m", {})
 
 
 if TYPE_CHECKING:
@@ -372,15 +367,15 @@ class AssumedModesTable(_Table):
     length: Number = Field(description="the length in m")
     section: Text = Field(description="the name of a [section.NAME] table")
     material: Text = Field(description="the name of a [material.NAME] table")
-    transverse_sines: Count = Field(default=0, description="how many sin(n pi z), from n = 1 on")
-    transverse_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
-    axial_sines: Count = Field(default=0, description="how many sin(n pi z), from n = 1 on")
-    axial_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
-    points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
-    lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
-    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
-    damping: DampingTable | None = Field(default=None, description="a damping table")
-    flexible: Yes = Field(default=True, description="false for a rigid bar")
+    transverse_sines: Count = _optional("how many sin(n pi z), from n = 1 on", 0)
+    transverse_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
+    axial_sines: Count = _optional("how many sin(n pi z), from n = 1 on", 0)
+    axial_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
+    points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
+    lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
+    modes: Count | None = _optional("how many modes of lowest frequency to keep")
+    damping: DampingTable | None = _optional("a damping table")
+    flexible: Yes = _optional("false for a rigid bar", True)
 
 
 class ModalPointTable(_Table):
@@ -404,41 +399,37 @@ class ModalTable(_Table):
     I1: list[Number] = Field(description="int s0^T N dm")
     G1: list[Number] = Field(description="int (x N_y - y N_x) dm")
     G2: list[list[Number]] = Field(description="rows of the skew int (N_x^T N_y - N_y^T N_x) dm")
-    I2: list[list[Number]] | None = Field(default=None, description="rows of int N^T N dm")
-    points: dict[str, ModalPointTable] = Field(default={}, description="position, shape and slope of each named point")
-    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
-    damping: DampingTable | None = Field(default=None, description="a damping table")
-    flexible: Yes = Field(default=True, description="false for a rigid body")
+    I2: list[list[Number]] | None = _optional("rows of int N^T N dm")
+    points: dict[str, ModalPointTable] = _optional("position, shape and slope of each named point", {})
+    modes: Count | None = _optional("how many modes of lowest frequency to keep")
+    damping: DampingTable | None = _optional("a damping table")
+    flexible: Yes = _optional("false for a rigid body", True)
 
 
 class PieceTable(_Table):
     """One of the pieces of a law."""
 
     until: Number | None = _UNTIL
-    angle: FunctionOfTime | None = Field(default=None, description="the angle in rad, an expression of the time t")
-    displacement: FunctionOfTime | None = Field(
-        default=None, description="the displacement in m, an expression of the time t"
-    )
+    angle: FunctionOfTime | None = _optional("the angle in rad, an expression of the time t")
+    displacement: FunctionOfTime | None = _optional("the displacement in m, an expression of the time t")
 
 
 class PrescribedTable(_Table):
     """A joint's angle, or where it slides its displacement, given in time."""
 
     joint: Text = Field(description="the name of a joint")
-    angle: FunctionOfTime | None = Field(
-        default=None,
-        description="the angle at t = 0 in rad, by default that of the assembly, or an expression of the time t",
+    angle: FunctionOfTime | None = _optional(
+        "the angle at t = 0 in rad, by default that of the assembly, or an expression of the time t"
     )
-    displacement: FunctionOfTime | None = Field(
-        default=None,
-        description="the displacement at t = 0 in m, by default that of the assembly, or an expression of the time t",
+    displacement: FunctionOfTime | None = _optional(
+        "the displacement at t = 0 in m, by default that of the assembly, or an expression of the time t"
     )
-    speed: Number | None = Field(default=None, description="the speed in rad/s or m/s, from a constant start")
-    pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = Field(
-        default=None, description='a list of { until = s, angle = "..." }, the last without until'
+    speed: Number | None = _optional("the speed in rad/s or m/s, from a constant start")
+    pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = _optional(
+        'a list of { until = s, angle = "..." }, the last without until'
     )
-    table: Rows | None = Field(
-        default=None, description="a list of [t, value] in s and rad or m, or the name of a file with two such columns"
+    table: Rows | None = _optional(
+        "a list of [t, value] in s and rad or m, or the name of a file with two such columns"
     )
 
 
@@ -450,7 +441,7 @@ class AssemblyTable(BaseModel):
 
     extra_description: ClassVar[str] = "the angle of the body in rad"
 
-    points: dict[str, Pair] = Field(default={}, description='[x, y] in m for each "body.point"')
+    points: dict[str, Pair] = _optional('[x, y] in m for each "body.point"', {})
 
     @property
     def angles(self) -> dict[str, float]:
@@ -461,9 +452,9 @@ class AssemblyTable(BaseModel):
 class DeflectionTable(_Table):
     """How far a point of a beam is off its place in the body frame."""
 
-    axial: Number | None = Field(default=None, description="the stretch along the beam in m")
-    transverse: Number | None = Field(default=None, description="the displacement across the beam in m")
-    slope: Number | None = Field(default=None, description="the slope in rad")
+    axial: Number | None = _optional("the stretch along the beam in m")
+    transverse: Number | None = _optional("the displacement across the beam in m")
+    slope: Number | None = _optional("the slope in rad")
 
 
 class CoordinatesTable(_Table):
@@ -472,9 +463,7 @@ class CoordinatesTable(_Table):
     x: Number = Field(description="x of the body frame's origin in m")
     y: Number = Field(description="y of the body frame's origin in m")
     phi: Number = Field(description="the angle of the body frame in rad")
-    flexible: list[Number] | None = Field(
-        default=None, description="the body's own flexible coordinates; zeros by default"
-    )
+    flexible: list[Number] | None = _optional("the body's own flexible coordinates; zeros by default")
 
 
 class RatesTable(_Table):
@@ -483,45 +472,42 @@ class RatesTable(_Table):
     x: Number = Field(description="the rate of x of the body frame's origin in m/s")
     y: Number = Field(description="the rate of y of the body frame's origin in m/s")
     phi: Number = Field(description="the rate of the angle of the body frame in rad/s")
-    flexible: list[Number] | None = Field(
-        default=None, description="the rates of the body's own flexible coordinates; zeros by default"
-    )
+    flexible: list[Number] | None = _optional("the rates of the body's own flexible coordinates; zeros by default")
 
 
 class VelocityTable(_Table):
     """Velocities at the start; the rest follows."""
 
-    angular: dict[str, Number] = Field(default={}, description="the rate of each body's angle in rad/s")
-    point: dict[str, Pair] = Field(default={}, description='[x, y] in m/s for each "body.point"')
+    angular: dict[str, Number] = _optional("the rate of each body's angle in rad/s", {})
+    point: dict[str, Pair] = _optional('[x, y] in m/s for each "body.point"', {})
 
 
 class StartTable(_Table):
     """How a model without a path starts."""
 
-    deflection: dict[str, dict[str, Pair | DeflectionTable]] = Field(
-        default={}, description="[axial, transverse] in m, or a table of axial, transverse, slope, for points of beams"
+    deflection: dict[str, dict[str, Pair | DeflectionTable]] = _optional(
+        "[axial, transverse] in m, or a table of axial, transverse, slope, for points of beams", {}
     )
     velocity: VelocityTable = VelocityTable()
-    coordinates: dict[str, CoordinatesTable] = Field(default={}, description="x, y, phi and flexible of bodies")
-    rates: dict[str, RatesTable] = Field(default={}, description="rates of x, y, phi and flexible of bodies")
+    coordinates: dict[str, CoordinatesTable] = _optional("x, y, phi and flexible of bodies", {})
+    rates: dict[str, RatesTable] = _optional("rates of x, y, phi and flexible of bodies", {})
 
 
 class EndEffectorTable(_Table):
     """The point that is to follow a path."""
 
     point: Text = Field(description='"body.point"')
-    coordinates: list[Text] = Field(default=["x", "y"], description='task coordinates from "x", "y", "angle"')
+    coordinates: list[Text] = _optional('task coordinates from "x", "y", "angle"', ["x", "y"])
 
 
 class PayloadTable(_Table):
     """What the end-effector carries, fixed to its point."""
 
     mass: Number = Field(description="the mass in kg")
-    inertia: Number = Field(default=0.0, description="the moment of inertia about its centre of mass in kg m^2")
-    offset: Pair = Field(
-        default=[0.0, 0.0],
-        description="[x, y] in m from the end-effector's point to its centre of mass, in the frame of the body that "
-        "carries it",
+    inertia: Number = _optional("the moment of inertia about its centre of mass in kg m^2", 0.0)
+    offset: Pair = _optional(
+        "[x, y] in m from the end-effector's point to its centre of mass, in the frame of the body that carries it",
+        [0.0, 0.0],
     )
 
 
@@ -532,16 +518,12 @@ class ShaperTable(_Table):
     frequencies: Number | list[Number] = Field(
         description="the undamped natural frequencies of the modes in Hz, one number or a list"
     )
-    damping: Number | list[Number] = Field(
-        default=0.0, description="the damping ratio of all modes, or a list with one for each"
-    )
-    tolerance: Number | None = Field(
-        default=None, description='of "ei", the residual at its frequency as a fraction, by default 0.05'
-    )
+    damping: Number | list[Number] = _optional("the damping ratio of all modes, or a list with one for each", 0.0)
+    tolerance: Number | None = _optional('of "ei", the residual at its frequency as a fraction, by default 0.05')
 
 
 class _PathTable(_Table):
-    shaper: ShaperTable | None = Field(default=None, description="the input shaper of the path: none by default")
+    shaper: ShaperTable | None = _optional("the input shaper of the path: none by default")
 
 
 class PolygonTable(_PathTable):
@@ -550,7 +532,7 @@ class PolygonTable(_PathTable):
     type: Literal["polygon"]
     corners: list[Pair] = Field(description="a list of [x, y] in m")
     max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
-    closed: Yes = Field(default=True, description="whether the path returns to start")
+    closed: Yes = _optional("whether the path returns to start", True)
 
 
 class LineTable(_PathTable):
@@ -569,8 +551,8 @@ class CircleTable(_PathTable):
     centre: Pair = Field(description="[x, y] in m")
     radius: Number = Field(description="the radius in m")
     max_acceleration: Number = Field(description="the largest acceleration along the path in m/s^2")
-    start_angle: Number = Field(default=0.0, description="the angle of the first point in rad")
-    sweep: Number = Field(default=6.283185307179586, description="the angle swept in rad, positive counter-clockwise")
+    start_angle: Number = _optional("the angle of the first point in rad", 0.0)
+    sweep: Number = _optional("the angle swept in rad, positive counter-clockwise", 6.283185307179586)
 
 
 class PointsTable(_PathTable):
@@ -590,11 +572,9 @@ class TabulatedPathTable(_PathTable):
     table: PathRows = Field(
         description="a list of [x, y] in m, or of [x, y, t] in m and s, or the name of a file with such columns"
     )
-    motion_time: Number | None = Field(default=None, description="the time from the first point to the last in s")
-    max_acceleration: Number | None = Field(
-        default=None, description="the largest acceleration along the path in m/s^2"
-    )
-    max_speed: Number | None = Field(default=None, description="the largest speed along the path in m/s")
+    motion_time: Number | None = _optional("the time from the first point to the last in s")
+    max_acceleration: Number | None = _optional("the largest acceleration along the path in m/s^2")
+    max_speed: Number | None = _optional("the largest speed along the path in m/s")
 
 
 class SequenceTable(_PathTable):
@@ -602,7 +582,7 @@ class SequenceTable(_PathTable):
 
     type: Literal["sequence"]
     paths: list[Text] = Field(description="names of other [path.NAME] tables, in order")
-    dwell: Number = Field(default=0.0, description="the rest between two of them in s")
+    dwell: Number = _optional("the rest between two of them in s", 0.0)
 
 
 PathTable = Annotated[
@@ -614,13 +594,11 @@ PathTable = Annotated[
 class TorqueTable(_Table):
     """A motor's torque in time, by pieces or a table."""
 
-    torque: FunctionOfTime | None = Field(default=None, description="the torque in N m, an expression of the time t")
-    pieces: Annotated[list[TorquePiece], Field(min_length=1)] | None = Field(
-        default=None, description="a list of { until = s, torque = ... }, the last without until"
+    torque: FunctionOfTime | None = _optional("the torque in N m, an expression of the time t")
+    pieces: Annotated[list[TorquePiece], Field(min_length=1)] | None = _optional(
+        "a list of { until = s, torque = ... }, the last without until"
     )
-    table: Rows | None = Field(
-        default=None, description="a list of [t, torque] in s and N m, or the name of a file with two such columns"
-    )
+    table: Rows | None = _optional("a list of [t, torque] in s and N m, or the name of a file with two such columns")
     interpolation: InterpolationName | None = _INTERPOLATION
 
 
@@ -647,34 +625,28 @@ class ControllerTable(_Table):
     """A sampled controller: what stands around its law."""
 
     period: Number = Field(description="the time between samples in s")
-    delay: Number = Field(default=0.0, description="the time from a sample until its torques act in s")
-    inputs: list[Text] = Field(
-        default=[],
-        description='sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the '
+    delay: Number = _optional("the time from a sample until its torques act in s", 0.0)
+    inputs: list[Text] = _optional(
+        'sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the '
         "encoders of its motors",
+        [],
     )
-    outputs: list[Text] = Field(default=[], description="motors; by default all of a mode")
-    reference: ReferenceEntry | None = Field(
-        default=None,
-        description='what is taken off the readings: "plan", the planned motion; "open-loop", what sensors read where '
+    outputs: list[Text] = _optional("motors; by default all of a mode", [])
+    reference: ReferenceEntry | None = _optional(
+        'what is taken off the readings: "plan", the planned motion; "open-loop", what sensors read where '
         "the planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the "
-        'unit of the sensor; by default "plan" with "pid", "open-loop" with "lqg", nothing with others',
+        'unit of the sensor; by default "plan" with "pid", "open-loop" with "lqg", nothing with others'
     )
-    limits: Number | Pair | dict[str, Number | Pair] | None = Field(
-        default=None,
-        description="the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all "
-        "motors or by motor",
+    limits: Number | Pair | dict[str, Number | Pair] | None = _optional(
+        "the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all "
+        "motors or by motor"
     )
-    rates: NumbersOf | None = Field(
-        default=None, description="the largest change of torques in N m/s or N/s, of all motors or by motor"
-    )
-    quantise: NumbersOf | None = Field(
-        default=None, description="the resolution of readings, in the unit of the sensor, of all or by sensor"
-    )
-    filters: dict[str, Number | list[list[Number]]] = Field(
-        default={},
-        description="by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients "
+    rates: NumbersOf | None = _optional("the largest change of torques in N m/s or N/s, of all motors or by motor")
+    quantise: NumbersOf | None = _optional("the resolution of readings, in the unit of the sensor, of all or by sensor")
+    filters: dict[str, Number | list[list[Number]]] = _optional(
+        "by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients "
         "of numerator and denominator in descending powers of s",
+        {},
     )
 
 
@@ -683,14 +655,10 @@ class PIDTable(ControllerTable):
 
     type: Literal["pid"]
     stiffness: NumbersOf = Field(description="the proportional gain in N m/rad or N/m, of all motors or by motor")
-    damping: NumbersOf = Field(
-        default=0.0, description="the derivative gain in N m s/rad or N s/m, of all motors or by motor"
-    )
-    integral: NumbersOf = Field(
-        default=0.0, description="the integral gain in N m/rad/s or N/m/s, of all motors or by motor"
-    )
-    project: Yes = Field(default=True, description="whether torques that only strain links are taken out")
-    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+    damping: NumbersOf = _optional("the derivative gain in N m s/rad or N s/m, of all motors or by motor", 0.0)
+    integral: NumbersOf = _optional("the integral gain in N m/rad/s or N/m/s, of all motors or by motor", 0.0)
+    project: Yes = _optional("whether torques that only strain links are taken out", True)
+    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
 class StateSpaceTable(ControllerTable):
@@ -698,9 +666,9 @@ class StateSpaceTable(ControllerTable):
 
     type: Literal["state-space"]
     D: Matrix = Field(description="rows of the matrix from readings to torques")
-    A: Matrix = Field(default=[], description="rows of the matrix of states; none without states")
-    B: Matrix = Field(default=[], description="rows of the matrix from readings to states")
-    C: Matrix = Field(default=[], description="rows of the matrix from states to torques")
+    A: Matrix = _optional("rows of the matrix of states; none without states", [])
+    B: Matrix = _optional("rows of the matrix from readings to states", [])
+    C: Matrix = _optional("rows of the matrix from states to torques", [])
 
 
 class ComputedTorqueTable(ControllerTable):
@@ -708,8 +676,8 @@ class ComputedTorqueTable(ControllerTable):
 
     type: Literal["computed-torque"]
     frequency: Number = Field(description="the frequency of the end-effector's error, as of an oscillator, in Hz")
-    damping_ratio: Number = Field(default=0.7, description="the damping ratio of the end-effector's error")
-    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+    damping_ratio: Number = _optional("the damping ratio of the end-effector's error", 0.7)
+    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
 class RateFeedbackTable(ControllerTable):
@@ -720,7 +688,7 @@ class RateFeedbackTable(ControllerTable):
         description="by motor and sensor the torque or force over the rate of the reading, in N m s or N s by the unit "
         "of the sensor"
     )
-    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
 class LQGTable(ControllerTable):
@@ -733,31 +701,24 @@ class LQGTable(ControllerTable):
     effort: NumbersOf = Field(
         description="the largest torque in N m or N, of all motors or by motor; those not named are not used"
     )
-    noise: NumbersOf | None = Field(
-        default=None,
-        description="the standard deviation of readings, in the unit of the sensor, of all or by sensor; by default of "
-        "rounding to quantise",
+    noise: NumbersOf | None = _optional(
+        "the standard deviation of readings, in the unit of the sensor, of all or by sensor; by default of "
+        "rounding to quantise"
     )
-    disturbance: NumbersOf | None = Field(
-        default=None,
-        description="the standard deviation of random torques in N m or N, of all motors or by motor; by default a "
-        "tenth of effort",
+    disturbance: NumbersOf | None = _optional(
+        "the standard deviation of random torques in N m or N, of all motors or by motor; by default a tenth of effort"
     )
-    integrators: dict[str, Number] = Field(
-        default={}, description="by sensor the time constant in s with which its error under constant loads decays"
+    integrators: dict[str, Number] = _optional(
+        "by sensor the time constant in s with which its error under constant loads decays", {}
     )
-    coloured: dict[str, tuple[Number, Number | list[list[Number]]]] = Field(
-        default={},
-        description='disturbances that last, by motor or as "link.tip.x" by point and axis: the standard deviation in '
+    coloured: dict[str, tuple[Number, Number | list[list[Number]]]] = _optional(
+        'disturbances that last, by motor or as "link.tip.x" by point and axis: the standard deviation in '
         "N m or N and the cut-off frequency in Hz, or lists of the coefficients of numerator and denominator of a "
         "filter in descending powers of s",
+        {},
     )
-    states: Count | None = Field(
-        default=None, description="the states of the reduced model, by default 16, or all of fewer"
-    )
-    at: Number | None = Field(
-        default=None, description="the time of the planned motion that it is designed about in s, by default its start"
-    )
+    states: Count | None = _optional("the states of the reduced model, by default 16, or all of fewer")
+    at: Number | None = _optional("the time of the planned motion that it is designed about in s, by default its start")
 
 
 AnyControllerTable = Annotated[
@@ -768,52 +729,45 @@ AnyControllerTable = Annotated[
 class StudyDefaultsTable(_Table):
     """What `paraflex run` does unless asked otherwise."""
 
-    path: Text | None = Field(default=None, description="the name of a [path.NAME] table")
-    paths: list[Text] = Field(
-        default=[],
-        description="in its place several names: runs and studies of many designs take all, others the first",
+    path: Text | None = _optional("the name of a [path.NAME] table")
+    paths: list[Text] = _optional(
+        "in its place several names: runs and studies of many designs take all, others the first", []
     )
-    modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
-    duration: Number | None = Field(default=None, description="the duration in s, dwell included")
-    samples: Count = Field(default=701, description="the number of samples kept")
-    assembly: Text | None = Field(default=None, description="the name of an [assembly.NAME] table")
-    torques: dict[str, TorqueEntry] = Field(
-        default={},
-        description="torques of motors in N m, without a path: numbers, expressions of the time t, or tables",
+    modes: list[Text] = _optional("actuation modes by name, signs or motor names", [])
+    duration: Number | None = _optional("the duration in s, dwell included")
+    samples: Count = _optional("the number of samples kept", 701)
+    assembly: Text | None = _optional("the name of an [assembly.NAME] table")
+    torques: dict[str, TorqueEntry] = _optional(
+        "torques of motors in N m, without a path: numbers, expressions of the time t, or tables", {}
     )
-    controllers: list[Text] = Field(
-        default=[], description="names of [controller.NAME] tables that act, beside the torques planned along a path"
+    controllers: list[Text] = _optional(
+        "names of [controller.NAME] tables that act, beside the torques planned along a path", []
     )
-    shaper: ShaperTable | None = Field(
-        default=None,
-        description="the input shaper of torques planned along a path, as "
-        '{ type = "zvd", frequencies = ["9 Hz"] }: none by default',
+    shaper: ShaperTable | None = _optional(
+        'the input shaper of torques planned along a path, as { type = "zvd", frequencies = ["9 Hz"] }: none by default'
     )
-    orientation: Number | None = Field(
-        default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
+    orientation: Number | None = _optional(
+        "the end-effector's angle along the path in rad, where it is a task coordinate"
     )
-    method: Text | None = Field(
-        default=None, description="the method of integration, by default esdirk5: see paraflex methods"
+    method: Text | None = _optional("the method of integration, by default esdirk5: see paraflex methods")
+    tolerance: Number | None = _optional(
+        "the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
     )
-    tolerance: Number | None = Field(
-        default=None, description="the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
+    tolerance_per: Literal["cycle", "run"] | None = _optional(
+        'the time in which errors may add up to it: a "cycle" of the motion or the "run"'
     )
-    tolerance_per: Literal["cycle", "run"] | None = Field(
-        default=None, description='the time in which errors may add up to it: a "cycle" of the motion or the "run"'
+    control: Literal["positions", "forces"] | None = _optional(
+        'whose errors choose the steps: "positions", or "forces", the default of rigid bodies'
     )
-    control: Literal["positions", "forces"] | None = Field(
-        default=None, description='whose errors choose the steps: "positions", or "forces", the default of rigid bodies'
+    step: Number | None = _optional("a fixed step in s, with methods that take one")
+    after: Literal["free", "hold"] = _optional(
+        'what the active motors do after the path: "free" or "hold", by brakes', "free"
     )
-    step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
-    after: Literal["free", "hold"] = Field(
-        default="free", description='what the active motors do after the path: "free" or "hold", by brakes'
+    reduced: Count | None = _optional(
+        "flexible coordinates that runs keep, all bodies together; all by default, or with 0"
     )
-    reduced: Count | None = Field(
-        default=None,
-        description="flexible coordinates that runs keep, all bodies together; all by default, or with 0",
-    )
-    error: Literal["motion", "whole"] = Field(
-        default="motion", description='which tracking error ranks modes: of the "motion", or the "whole" run with dwell'
+    error: Literal["motion", "whole"] = _optional(
+        'which tracking error ranks modes: of the "motion", or the "whole" run with dwell', "motion"
     )
 
 
@@ -831,49 +785,43 @@ NumbersByName = Annotated[dict[str, Number], BeforeValidator(_quoted, json_schem
 class StaticsTable(_Table):
     """What `paraflex statics` finds unless asked otherwise."""
 
-    loads: NumbersByName = Field(
-        default={}, description='the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"'
+    loads: NumbersByName = _optional(
+        'the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"', {}
     )
-    torques: NumbersByName = Field(default={}, description="the torque of each motor in N m")
-    moved: NumbersByName = Field(
-        default={}, description='the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start'
+    torques: NumbersByName = _optional("the torque of each motor in N m", {})
+    moved: NumbersByName = _optional(
+        'the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start', {}
     )
-    held: list[Text] | None = Field(
-        default=None, description="coordinates that stay; by default the joints of motors without a torque"
-    )
-    steps: Count = Field(default=STEPS, description="how many equal steps of all that is given")
-    stiffness: list[Text] | None = Field(
-        default=None, description="coordinates with a stiffness; by default those loaded or moved"
-    )
-    buckling: Count = Field(default=FACTORS, description="how many factors of buckling about every equilibrium")
+    held: list[Text] | None = _optional("coordinates that stay; by default the joints of motors without a torque")
+    steps: Count = _optional("how many equal steps of all that is given", STEPS)
+    stiffness: list[Text] | None = _optional("coordinates with a stiffness; by default those loaded or moved")
+    buckling: Count = _optional("how many factors of buckling about every equilibrium", FACTORS)
 
 
 class _Parts(_Table):
     name: Text = Field(description="a name for the mechanism")
-    description: Text = Field(default="", description="a sentence or two")
-    geometry: Literal["linear", "second-order"] = Field(
-        default="second-order", description='the shape of beams: "second-order", or "linear" as in the paper'
+    description: Text = _optional("a sentence or two", "")
+    geometry: Literal["linear", "second-order"] = _optional(
+        'the shape of beams: "second-order", or "linear" as in the paper', "second-order"
     )
-    reference: ReferenceName = Field(
-        default="pinned",
-        description='how frames are fixed to beams: "pinned" (along the chord), "cantilever" (the paper\'s) or "free"',
+    reference: ReferenceName = _optional(
+        'how frames are fixed to beams: "pinned" (along the chord), "cantilever" (the paper\'s) or "free"', "pinned"
     )
-    curvature: CurvatureName = Field(
-        default="separate",
-        description='curvature of beams at lumped moments of inertia: "separate", or "shared" as in the paper',
+    curvature: CurvatureName = _optional(
+        'curvature of beams at lumped moments of inertia: "separate", or "shared" as in the paper', "separate"
     )
-    parameters: dict[str, Any] = Field(default={}, description="numbers by name, for expressions of them in quotes")
+    parameters: dict[str, Any] = _optional("numbers by name, for expressions of them in quotes", {})
     section: dict[str, SectionTable] = {}
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}
-    ground: dict[str, Pair] = Field(default={}, description="[x, y] of each ground point in m")
+    ground: dict[str, Pair] = _optional("[x, y] of each ground point in m", {})
     body: dict[str, Annotated[BeamTable | RigidTable | AssumedModesTable | ModalTable, Field(discriminator="type")]] = (
         Field(description="at least one [body.NAME] table")
     )
-    joint: dict[str, JointEntry] = Field(
-        default={}, description='["body.point", "body.point"] for each revolute joint, a table for others'
+    joint: dict[str, JointEntry] = _optional(
+        '["body.point", "body.point"] for each revolute joint, a table for others', {}
     )
-    motor: dict[str, Text] = Field(default={}, description="the joint of each motor")
+    motor: dict[str, Text] = _optional("the joint of each motor", {})
     prescribed: dict[str, PrescribedTable] = {}
 
 
@@ -886,13 +834,13 @@ _WithGroups = create_model("_WithGroups", __base__=_Parts, **_GROUPS)
 class ModelTable(_WithGroups):
     """A model file."""
 
-    gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
+    gravity: Pair = _optional("[x, y] of free fall in m/s^2", [0.0, 0.0])
     end_effector: EndEffectorTable | None = None
     payload: PayloadTable | None = None
-    assembly: dict[str, AssemblyTable] = Field(
-        default={}, description="approximate angles of all bodies in rad for each assembly, or places of points in m"
+    assembly: dict[str, AssemblyTable] = _optional(
+        "approximate angles of all bodies in rad for each assembly, or places of points in m", {}
     )
-    mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
+    mode: dict[str, list[Text]] = _optional("the motors of each actuation mode", {})
     path: dict[str, PathTable] = Field(default={})
     controller: dict[str, AnyControllerTable] = Field(default={})
     start: StartTable | None = None

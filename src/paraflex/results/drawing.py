@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array, Complex
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
 from paraflex.mechanism.gears import SumRelation
 from paraflex.mechanism.poses import local_points
+from paraflex.results.numbers import stacked
 from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
-from paraflex.results.stiff import Frames, rigid_frames
-
-Array = NDArray[np.float64]
+from paraflex.results.stiff import rigid_frames
 
 # Joints of wheels and of racks: whether they slide, and what they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
@@ -78,13 +77,13 @@ def drawing(
     drawn = {one.body: one for one in outlines(mechanism)}
     samples = len(next(iter(shapes.values())))
 
-    def place(ref: PointRef) -> Array:
+    def place(ref: PointRef, of: Mapping[str, Array] = shapes) -> Array:
         if ref.on_ground:
             return np.broadcast_to(np.array(mechanism.ground[ref.point], dtype=float), (samples, 2))
-        return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
+        return of[ref.body][:, drawn[ref.body].points[ref.point]]
 
     joined = _joined(mechanism)
-    joints = _second([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples)
+    joints = stacked([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples, 2)
     directions = _directions(mechanism, samples, angle, frame)
     springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
     posed = None
@@ -98,7 +97,9 @@ def drawing(
         }
         joint_bases, direction_bases = joints, directions
     else:
-        bases, joint_bases, direction_bases = _rigid_bases(mechanism, drawn, posed, samples)
+        bases = {name: turned(*posed[name], one.places) for name, one in drawn.items()}
+        joint_bases = stacked([place(_drawn_ends(joint)[0], bases) for joint in mechanism.joints], samples, 2)
+        direction_bases = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
     return Drawing(
         shape=np.concatenate([shapes[name] for name in drawn], axis=1),
         base=np.concatenate([bases[name] for name in drawn], axis=1),
@@ -144,12 +145,10 @@ def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
 
 def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
     """A drawing at times (k,) as a run: what is drawn, and nothing else."""
-    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
     effector = mechanism.end_effector
     return xr.Dataset(
         {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(one).items()},
-        coords={"time": time, "point": points, "joint": [joint.name for joint in mechanism.joints],
-                **drawing_coordinates(mechanism)},
+        coords={"time": time, **drawing_coordinates(mechanism)},
         attrs={"mechanism": mechanism.name} | ({} if effector is None else {"end_effector_point": str(effector.point)}),
     )  # fmt: skip
 
@@ -169,7 +168,7 @@ def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
 
 
 def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
-    """Labels of these variables: bodies of the stations, stations of the points, kinds of the joints.
+    """Labels of these variables: points, joints, bodies of the stations, stations of the points, kinds of the joints.
 
     Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
     -1, and so has the rail of a joint without one on a moving body.
@@ -208,6 +207,8 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
             "load_station": ("load", np.array(acted, dtype=np.int32)),
         }
     return {
+        "point": [str(ref) for ref in stations],
+        "joint": [joint.name for joint in joints],
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
         "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
         "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
@@ -281,21 +282,6 @@ def _joined(mechanism: Mechanism) -> dict[str, list[tuple[Joint, PointRef]]]:
     return joined
 
 
-def _rigid_bases(
-    mechanism: Mechanism, drawn: Mapping[str, Outline], posed: Frames, samples: int
-) -> tuple[dict[str, Array], Array, Array]:
-    """Stations of all bodies, joints and directions of their axes of the rigid mechanism."""
-    bases = {name: turned(*posed[name], one.places) for name, one in drawn.items()}
-    ends = [
-        np.broadcast_to(np.array(mechanism.ground[end.point], dtype=float), (samples, 2))
-        if end.on_ground
-        else bases[end.body][:, drawn[end.body].points[end.point]]
-        for end in (_drawn_ends(joint)[0] for joint in mechanism.joints)
-    ]
-    directions = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
-    return bases, _second(ends, samples), directions
-
-
 def _bends_between_holds(body: Body, one: Outline, joined: list[tuple[Joint, PointRef]]) -> bool:
     """Whether joints hold a flexible beam at three or more places in line, one of which slides along it."""
     if isinstance(body, RigidBody) or not body.flexible:
@@ -366,22 +352,12 @@ def _directions(
     """Of the axes of joints that slide (k, joints), NaN of others [rad]."""
     out = np.full((samples, len(mechanism.joints)), np.nan)
     for i, joint in enumerate(mechanism.joints):
-        if joint.slides:
-            out[:, i] = _direction(joint, angle, frame)
+        if joint.slides and joint.follows_beam:
+            out[:, i] = frame(joint.a.body)[1]
+        elif joint.slides:
+            out[:, i] = joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
     return out
 
 
-def _direction(
-    joint: Joint, angle: Callable[[PointRef], Array], frame: Callable[[str], tuple[Array, Array]]
-) -> Array | float:
-    if joint.follows_beam:
-        return frame(joint.a.body)[1]
-    return joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
-
-
-def _complex(places: Array) -> NDArray[np.complex128]:
+def _complex(places: Array) -> Complex:
     return places[..., 0] + 1j * places[..., 1]
-
-
-def _second(parts: list[Array], samples: int) -> Array:
-    return np.stack(parts, axis=1) if parts else np.zeros((samples, 0, 2))

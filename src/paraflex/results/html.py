@@ -122,6 +122,7 @@ def _last_places(run: MotionRun) -> list[tuple]:
 
 
 def _solver(solution: Solution, method: str) -> list[tuple[str, Any]]:
+    imbalance = solution.energy_balance_max
     return [
         ("method", method),
         ("steps", f"{solution.steps}, {solution.rejected} more rejected"),
@@ -129,9 +130,5 @@ def _solver(solution: Solution, method: str) -> list[tuple[str, Any]]:
         ("factorisations", solution.factorisations),
         ("wall time", f"{solution.wall_time:.3g} s"),
         ("largest violation of constraints", f"{solution.constraint_position_max:.2g} m"),
-        ("largest imbalance of energy", _joules(solution.energy_balance_max)),
+        ("largest imbalance of energy", f"{imbalance:.2g} J" if np.isfinite(imbalance) else None),
     ]
-
-
-def _joules(value: float) -> str | None:
-    return f"{value:.2g} J" if np.isfinite(value) else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from typing import Any
@@ -19,19 +18,17 @@ from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.sensors import READING, SENSOR
-from paraflex.results.storage import SCHEMA
+from paraflex.results.storage import origin
 from paraflex.results.stress import (
     COMMENTS as STRESS_COMMENTS,
     MOMENT,
     UNITS as STRESS_UNITS,
+    Variables,
     largest_stresses,
     section_coordinates,
     section_variables,
 )
 from paraflex.results.validity import UNITS as VALIDITY_UNITS
-
-# Dimensions besides time, and values at the samples reached.
-Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
 
 UNITS = (
     {
@@ -232,9 +229,7 @@ def link_coordinates(system: System, links: Links) -> dict[str, Any]:
         "axis": ["x", "y"],
         "body": [body.name for body in mechanism.bodies],
         "motor": [motor.name for motor in mechanism.motors],
-        "joint": [joint.name for joint in mechanism.joints],
         "row": list(system.described_rows),
-        "point": [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points],
         **drawing_coordinates(mechanism),
         **({SENSOR: sensors} if sensors and links.sensors is not None else {}),
         **({"drive": drives} if drives and links.drive_torque is not None else {}),
@@ -299,9 +294,7 @@ def provenance(
         "baumgarte_beta": options.beta,
         "method": method,
         **ours,
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
+        **origin(parameters),
         "numba_version": version("numba"),
         "numpy_version": version("numpy"),
-        "schema": SCHEMA,
     }

@@ -9,17 +9,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array, Complex, Numbers
 from paraflex.errors import InputError
 from paraflex.linear.branches import pole_branches
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import Motions
 from paraflex.results.drawing import Drawing, drawing_coordinates, system_drawing
-from paraflex.results.storage import SCHEMA
-
-Array = NDArray[np.float64]
+from paraflex.results.storage import origin
 
 # Motors turn freely, or those of the mode are held.
 HOLDINGS = ("free", "held")
@@ -100,16 +98,16 @@ def linear_dataset(
         ((model, ()) for model in models), ((model, motors_of(model)) for model in models)
     ))  # fmt: skip
     maps = [zero_maps(model) for model in models]
-    data = _matrices(models) | _motions(free, held) | _zeros(maps) | _drawings(models, free, held)
-    data["unbalanced"] = ("mode", np.array([model.unbalanced for model in models]))
     names = {key: _names(models, key) for key in ("states", "inputs", "outputs")}
+    data = _matrices(models, names) | _motions(free, held) | _zeros(maps) | _drawings(models, free, held)
+    data["unbalanced"] = ("mode", np.array([model.unbalanced for model in models]))
     frequency = _frequencies(free, held, [zero for each in maps for zero in each.values()])
     data |= _responses(models, frequency, names)
     coordinates: dict[str, Any] = {
         "mode": [model.mode for model in models], "holding": list(HOLDINGS), "frequency": frequency,
         "map": list(dict.fromkeys(name for each in maps for name in each)), "axis": ["x", "y"],
         "state_of": [*names["states"]],
-        **_labels(first),
+        **drawing_coordinates(first.minimal.system.mechanism),
     }  # fmt: skip
     for key, own in names.items():
         coordinates[key[:-1]] = [*own]
@@ -129,7 +127,7 @@ def motors_of(model: LinearModel) -> list[str]:
     return [one.name for one in model.inputs if one.name in own]
 
 
-def zero_maps(model: LinearModel) -> dict[str, NDArray[np.complex128]]:
+def zero_maps(model: LinearModel) -> dict[str, Complex]:
     """Zeros of the motors of a mode to their own encoders, and to the end-effector; of all inputs without motors."""
     mechanism = model.minimal.system.mechanism
     motors, outputs = motors_of(model), [one.name for one in model.outputs]
@@ -163,9 +161,9 @@ def _names(models: Sequence[LinearModel], key: str) -> dict[str, str]:
     return {one.name: one.unit for model in models for one in getattr(model, key)}
 
 
-def _matrices(models: Sequence[LinearModel]) -> dict[str, Any]:
+def _matrices(models: Sequence[LinearModel], named: dict[str, dict[str, str]]) -> dict[str, Any]:
     """A, B, C and D among the names of all modes."""
-    names = {key: list(_names(models, key)) for key in ("states", "inputs", "outputs")}
+    names = {key: list(own) for key, own in named.items()}
     out = {}
     for matrix, (rows, columns) in {
         "A": ("states", "states"), "B": ("states", "inputs"), "C": ("outputs", "states"), "D": ("outputs", "inputs")
@@ -194,13 +192,13 @@ def _motions(free: Sequence[Motions], held: Sequence[Motions]) -> dict[str, Any]
     }
 
 
-def _zeros(maps: Sequence[dict[str, NDArray[np.complex128]]]) -> dict[str, Any]:
+def _zeros(maps: Sequence[dict[str, Complex]]) -> dict[str, Any]:
     names, none = dict.fromkeys(name for each in maps for name in each), np.zeros(0)
     values = padded([[each.get(name, none) for name in names] for each in maps])
     return {f"zero_{part}": (("mode", "map", "zero"), getattr(values, part)) for part in ("real", "imag")}
 
 
-def padded(rows: Sequence[Sequence[NDArray[Any]]]) -> NDArray[np.complex128]:
+def padded(rows: Sequence[Sequence[Numbers]]) -> Complex:
     """Rows of rows of different lengths as an array, NaN where there is nothing."""
     longest = max((one.size for row in rows for one in row), default=0)
     out = np.full((len(rows), len(rows[0]), longest), complex(np.nan, np.nan))
@@ -210,7 +208,7 @@ def padded(rows: Sequence[Sequence[NDArray[Any]]]) -> NDArray[np.complex128]:
     return out
 
 
-def _frequencies(free: Sequence[Motions], held: Sequence[Motions], zeros: Sequence[NDArray[np.complex128]]) -> Array:
+def _frequencies(free: Sequence[Motions], held: Sequence[Motions], zeros: Sequence[Complex]) -> Array:
     """Frequencies of the response [Hz]: evenly on a logarithmic axis, and near poles and zeros."""
     natural = np.sort(np.concatenate([one.frequencies for one in (*free, *held)]))
     natural = natural[natural > 0.0] / (2.0 * np.pi)
@@ -283,12 +281,6 @@ def _change(name: str, one: Drawing, other: Drawing) -> Array:
     return np.arctan2(np.sin(values), np.cos(values)) if name == "directions" else values
 
 
-def _labels(model: LinearModel) -> dict[str, Any]:
-    mechanism = model.minimal.system.mechanism
-    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
-    return {"point": points, "joint": [joint.name for joint in mechanism.joints], **drawing_coordinates(mechanism)}
-
-
 def _provenance(model: LinearModel, parameters: dict[str, Any] | None) -> dict[str, Any]:
     mechanism = model.minimal.system.mechanism
     motors = {motor.name: motor.joint for motor in mechanism.motors}
@@ -300,8 +292,6 @@ def _provenance(model: LinearModel, parameters: dict[str, Any] | None) -> dict[s
         "motor_joints": json.dumps(motors),
         "end_effector_outputs": json.dumps(end_effector_outputs(model)),
         **({} if mechanism.end_effector is None else {"end_effector_point": str(mechanism.end_effector.point)}),
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
+        **origin(parameters),
         "numpy_version": version("numpy"),
-        "schema": SCHEMA,
     }

@@ -16,6 +16,9 @@ from paraflex.units import STRESS, speed_text
 Figures = dict[str, float | str | None]
 # Of the rate of a joint that a torque or a force drives.
 _RATES = {"N m": "rad/s", "N": "m/s"}
+# Variables of beams, and those that have another name here.
+OF_BEAMS = ("stress_max", "stress_place", "stress_time", "bending_stress_max", "axial_stress_max", "safety_factor")
+_NAMES = {"stress_place": "place", "stress_time": "time"}
 
 
 def load_figures(run: xr.Dataset) -> dict[str, Any]:
@@ -40,7 +43,7 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
     if "stress_max" in run:
         bent = set(map(str, run["section_body"].values))
         out["beams"] = {
-            body: {key: finite_or_none(run[name].values[b]) for key, name in _OF_BEAMS.items()}
+            body: {_NAMES.get(name, name): finite_or_none(run[name].values[b]) for name in OF_BEAMS}
             for b, body in enumerate(map(str, run["body"].values))
             if body in bent or np.isfinite(run["stress_max"].values[b])
         }
@@ -104,16 +107,6 @@ def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
         return [unit] * number
     each = str(efforts.attrs.get("units_each", "")).split(", ")
     return list(each) if len(each) == number and set(each) <= set(_RATES) else [None] * number
-
-
-_OF_BEAMS = {
-    "stress_max": "stress_max",
-    "place": "stress_place",
-    "time": "stress_time",
-    "bending_stress_max": "bending_stress_max",
-    "axial_stress_max": "axial_stress_max",
-    "safety_factor": "safety_factor",
-}
 
 
 def _joint(one: xr.Dataset, *, slides: bool) -> Figures:

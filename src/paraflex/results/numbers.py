@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from paraflex.arrays import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def finite_or_none(value: float) -> float | None:
@@ -13,7 +19,17 @@ def finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def largest(values: NDArray[np.float64]) -> float | None:
+def largest(values: Array) -> float | None:
     """Largest finite magnitude; None if there is none."""
     known = np.abs(values[np.isfinite(values)])
     return float(known.max()) if known.size else None
+
+
+def by_label(values: xr.DataArray, dim: str) -> dict[str, float | None]:
+    """Numbers of an array by the labels of its dimension, for JSON."""
+    return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}
+
+
+def stacked(parts: Sequence[Any], samples: int, *rest: int) -> Any:
+    """Arrays (samples, ...) side by side along a second axis, of which there may be none."""
+    return np.stack(parts, axis=1) if parts else np.zeros((samples, 0, *rest))

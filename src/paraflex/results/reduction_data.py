@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
@@ -20,11 +20,9 @@ from paraflex.linear.reduction import CARRIED, reduce
 from paraflex.linear.states_needed import DAMPING, states_needed
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
-from paraflex.results.numbers import finite_or_none
+from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
-from paraflex.results.storage import SCHEMA
-
-Array = NDArray[np.float64]
+from paraflex.results.storage import origin
 
 FULL = "full"
 # Frequencies of responses, from this part of the highest on and somewhat beyond it.
@@ -116,9 +114,7 @@ def reduction_dataset(
     attrs = {
         "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about,
         "kept_states": len(few[0][0].states), "full_states": len(models[0].states), "until": until, "accuracy": error,
-        "damping_ratio": DAMPING, "input_unit": ", ".join(units),
-        "parameters": json.dumps(parameters or {}, sort_keys=True), "paraflex_version": version("paraflex"),
-        "schema": SCHEMA,
+        "damping_ratio": DAMPING, "input_unit": ", ".join(units), **origin(parameters),
     }  # fmt: skip
     if along:
         method = _carrying(names)
@@ -195,10 +191,10 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
         run = data.sel(mode=mode, reduction=name)
         frequencies = data["natural_frequency"].sel(mode=mode, variant=name)
         return {
-            "states_needed": _numbers(run["states"], "output"),
-            "largest_error": _numbers(run["largest_error"], "output"),
+            "states_needed": by_label(run["states"], "output"),
+            "largest_error": by_label(run["largest_error"], "output"),
             "bound": finite_or_none(float(run["bound"])),
-            "held_frequency_by_states": _numbers(run["held_frequency"], "kept"),
+            "held_frequency_by_states": by_label(run["held_frequency"], "kept"),
             **{f"frequencies_{holding}": _list(frequencies.sel(holding=holding)) for holding in HOLDINGS},
         }
 
@@ -229,10 +225,6 @@ def percent_off(value: float, exact: float) -> str:
     """How far a number is off another one, in percent; rounding is none."""
     part = value / exact - 1.0
     return "0 %" if abs(part) < _ROUNDING else f"{100.0 * part:+{'.2g' if abs(part) < 1.0 else '.0f'}} %"
-
-
-def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:
-    return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}
 
 
 def _list(values: xr.DataArray) -> list[float]:

@@ -21,6 +21,7 @@ from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
 from paraflex.motion import MotionRun
 from paraflex.results.formulas import length
+from paraflex.results.numbers import stacked
 from paraflex.results.outlines import deflections
 from paraflex.results.stress import SectionResult, section_result
 from paraflex.results.traces import Trace, Traces
@@ -88,8 +89,7 @@ class SolutionTraces(Generic[R]):
         ]
         names = [joint.name for joint in system.described.joints]
         shared = undetermined_loads(system, names, solution.q.real, solution.acting).force.any(axis=2)
-        known = np.stack([length(each) for each in forces], axis=1) if forces else np.zeros((len(solution.q), 0))
-        return np.where(shared, np.nan, known)
+        return np.where(shared, np.nan, stacked([length(each) for each in forces], len(solution.q)))
 
     @cached_property
     def joint_speed(self) -> Trace:
@@ -105,7 +105,7 @@ class SolutionTraces(Generic[R]):
         """Rates of joints by name (k, joints)."""
         solution = self.solution
         rates = [joint_coordinate(self.system, name, solution.q, solution.v).rate for name in names]
-        return np.stack(rates, axis=1) if rates else np.zeros((len(solution.q), 0))
+        return stacked(rates, len(solution.q))
 
 
 @dataclass(frozen=True)
@@ -246,8 +246,7 @@ class StaticsTraces(SolutionTraces[Statics]):
         return int(np.sum(~self.run.stable & ~self.run.limit))
 
     def _columns(self, quantity: Callable[[str], Trace], of: Sequence[Coordinate]) -> Trace:
-        columns = [quantity(one.name) for one in of]
-        return np.stack(columns, axis=1) if columns else np.zeros((len(self.run.equilibria), 0))
+        return stacked([quantity(one.name) for one in of], len(self.run.equilibria))
 
 
 @overload

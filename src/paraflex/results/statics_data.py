@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +18,8 @@ from paraflex.results.drawing import system_drawing
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
-from paraflex.results.numbers import finite_or_none
-from paraflex.results.storage import SCHEMA
+from paraflex.results.numbers import by_label, finite_or_none, stacked
+from paraflex.results.storage import origin
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 
@@ -110,13 +109,7 @@ def statics_dataset(
             name_units(out[name], [unit for unit in NAMED_UNITS[name] if unit in each] or NAMED_UNITS[name], each)
         if name in _COMMENTS:
             out[name].attrs["comment"] = _COMMENTS[name]
-    out.attrs = {
-        "kind": "statics",
-        "mechanism": mechanism.name,
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
-        "schema": SCHEMA,
-    }
+    out.attrs = {"kind": "statics", "mechanism": mechanism.name, **origin(parameters)}
     beyond = [] if found.validity is None or found.validity.holds else [found.validity.finding()]
     keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *found.doubts])
     return out
@@ -183,8 +176,7 @@ def _buckling_shapes(found: Statics) -> dict[str, Any]:
 
 
 def _columns(found: Statics, quantity: Any) -> np.ndarray:
-    columns = [quantity(one.name) for one in found.coordinates]
-    return np.stack(columns, axis=1) if columns else np.zeros((len(found.equilibria), 0))
+    return stacked([quantity(one.name) for one in found.coordinates], len(found.equilibria))
 
 
 def _motors(found: Statics) -> dict[str, Any]:
@@ -285,13 +277,9 @@ def statics_summary(data: xr.Dataset) -> dict[str, Any]:
         },
         **{name: [finite_or_none(float(x)) for x in last[name].values] for name in
            ("natural_frequency", "free_frequency")},
-        **({"stress_max": _of_bodies(data["stress_max"])} if "stress_max" in data else {}),
+        **({"stress_max": by_label(data["stress_max"], "body")} if "stress_max" in data else {}),
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }  # fmt: skip
-
-
-def _of_bodies(values: xr.DataArray) -> dict[str, float | None]:
-    return {str(name): finite_or_none(values.sel(body=name).item()) for name in values["body"].values}

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System, build_system
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
@@ -21,7 +22,6 @@ from paraflex.kernel.packed import CONSTRAINT, make_scratch
 from paraflex.mechanism import Mechanism
 from paraflex.results.outlines import Outline
 
-Array = NDArray[np.float64]
 # Positions (k, 2) and angles (k,) of body frames.
 Frames = dict[str, tuple[Array, Array]]
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +34,12 @@ _PIECE = 1 << 20
 # First bytes of what netCDF files are: HDF5, or the classic formats.
 _NETCDF = (NETCDF, b"CDF\x01", b"CDF\x02", b"CDF\x05")
 _AGAIN = "copy it again, or delete it and run the same command again"
+
+
+def origin(parameters: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Attributes of a dataset that tell what was asked for and what wrote it."""
+    asked = json.dumps(parameters or {}, sort_keys=True)
+    return {"parameters": asked, "paraflex_version": version("paraflex"), "schema": SCHEMA}
 
 
 @checked_arguments()
