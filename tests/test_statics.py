@@ -412,6 +412,19 @@ def test_a_run_marks_what_redundant_constraints_share() -> None:
     assert data["joint_force"].sel(joint="slope").values == pytest.approx(np.array([wanted] * 5), rel=1e-8)
 
 
+def test_two_drives_of_one_freedom_share_its_torque() -> None:
+    standing = cranks(1.0)
+    drives = [pf.PrescribedAngle(name, name, pf.ConstantSpeed(1.0, 2.0)) for name in ("A0", "A1")]
+    one, both = (replace(standing, prescribed=tuple(drives[:n]), motors=(), modes=()) for n in (1, 2))
+    data = pf.motion_dataset(pf.simulate_motion(one, 0.1, samples=5, warning=False))
+    assert np.isfinite(data["drive_torque"].values).all()
+    with pytest.warns(pf.ResultWarning, match="torques or forces of prescribed.A0, prescribed.A1 are not determined"):
+        run = pf.simulate_motion(both, 0.1, samples=5)
+    assert np.isnan(pf.motion_dataset(run)["drive_torque"].values).all()
+    assert math.isnan(measure(run, ["drive_torque_max"])["drive_torque_max.A0"])
+    assert "prescribed.A0" in coarseness(run, ["drive_torque_max"])
+
+
 # Errors
 
 

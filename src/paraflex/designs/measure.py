@@ -44,6 +44,7 @@ _OF_RUNS = {PATH: "runs along a path", MOTION: "runs without a path", STATICS: "
 _LARGEST_LOADS = (
     "stress_max", "safety_factor_min", "section_moment_max", "drive_torque_max", "drive_power_max", "joint_force_max",
 )  # fmt: skip
+_SHARED_LOADS = _LARGEST_LOADS[3:]
 # Metrics that have derivatives.
 SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)
 
@@ -164,7 +165,7 @@ def measure(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
 def coarseness(run: Runs, names: Sequence[str]) -> str:
     """Why metrics of loads may not be the largest, between samples, or are not determined; empty otherwise."""
     found = [one for one in run.solution.findings if one.code == COARSE] if set(names) & set(_LARGEST_LOADS) else []
-    found += shared_loads(run_traces(run).system, run.solution) if "joint_force_max" in names else []
+    found += shared_loads(run_traces(run).system, run.solution) if set(names) & set(_SHARED_LOADS) else []
     return "; ".join(f"{one.text}; {one.remedy}" for one in found)
 
 

@@ -116,23 +116,44 @@ def load_in(
     return force, moment
 
 
+class Undetermined(NamedTuple):
+    """Components of loads that redundant constraints share in any way.
+
+    Attributes
+    ----------
+    force, moment : (k, joints, 2) and (k, joints) arrays of bool
+        Of joints.
+    drive : (k, drives) array of bool
+        Of prescribed motions.
+    """
+
+    force: NDArray[np.bool_]
+    moment: NDArray[np.bool_]
+    drive: NDArray[np.bool_]
+
+
 def undetermined_loads(
     system: System, names: Sequence[str], q: Array, acting: NDArray[np.int64] | None = None
-) -> JointLoads:
-    """Components of forces (k, joints, 2) and moments (k, joints) that redundant rows, of those acting, share anyhow.
+) -> Undetermined:
+    """What redundant rows, of those acting, share of the loads of joints by name and of all drives.
 
     Rows are redundant in all poses (k, n) or in none that is looked at: the first one shows it.
     """
-    force, moment = np.zeros((len(q), len(names), 2), dtype=bool), np.zeros((len(q), len(names)), dtype=bool)
+    drives = system.mechanism.prescribed
+    shapes = (len(names), 2), (len(names),), (len(drives),)
+    found = Undetermined(*(np.zeros((len(q), *shape), dtype=bool) for shape in shapes))
+    arms = np.where([system.mechanism.slides(one.joint) for one in drives], system.size, 1.0)
     for k, pose in enumerate(q):
         free = dependence(system, pose, acting=acting).self_stresses(system.row_units)
         if not len(free):
             break
         still = np.zeros((len(free), len(system.mechanism.motors)))
         loads = joint_loads(system, names, np.repeat(pose[None], len(free), axis=0), free, still)
-        force[k] = np.any(np.abs(loads.force) * system.size > NO_PART, axis=0)
-        moment[k] = np.any(np.abs(loads.moment) > NO_PART, axis=0)
-    return JointLoads(force, moment)
+        found.force[k] = np.any(np.abs(loads.force) * system.size > NO_PART, axis=0)
+        found.moment[k] = np.any(np.abs(loads.moment) > NO_PART, axis=0)
+        torques = drive_torques(system, free)
+        found.drive[k] = np.any(np.abs(torques) * arms > NO_PART, axis=0)
+    return found
 
 
 def drive_torques(system: System, multipliers: Array) -> Array:

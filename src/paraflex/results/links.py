@@ -144,7 +144,7 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         drawing=drawn,
         joint_coordinate=stacked([each.value for each in coordinates.values()], samples),
         joint_speed=stacked([each.rate for each in coordinates.values()], samples),
-        drive_torque=drive_torques(system, multipliers)[:, : len(mechanism.prescribed)],
+        drive_torque=np.where(shared.drive, np.nan, drive_torques(system, multipliers))[:, : len(mechanism.prescribed)],
         drive_speed=stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
         load_errors=None if errors is None else load_errors(system, joints, errors),
         frame_load=frame_load(system, drawn.joints, loads, q, v),

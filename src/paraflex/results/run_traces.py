@@ -70,8 +70,10 @@ class SolutionTraces(Generic[R]):
 
     @cached_property
     def drive_torque(self) -> Trace:
-        """Torque [N m] or force [N] of every prescribed motion (k, drives)."""
-        return drive_torques(self.system, self.solution.multipliers)
+        """Torque [N m] or force [N] of every prescribed motion (k, drives); NaN where not determined."""
+        torques = drive_torques(self.system, self.solution.multipliers)
+        shared = undetermined_loads(self.system, (), self.solution.q.real, self.solution.acting).drive
+        return np.where(shared, np.nan, torques)
 
     @cached_property
     def drive_power(self) -> Trace:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -149,17 +150,19 @@ def doubtful_stresses(system: System, solution: Solution) -> list[Finding]:
 
 
 def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
-    """Findings about forces and moments of joints that redundant constraints share in any way."""
+    """Findings about loads of joints and drives that redundant constraints share in any way."""
     names = [joint.name for joint in system.described.joints]
     found = undetermined_loads(system, names, solution.q, solution.acting)
-    kinds = {"forces": found.force.any(axis=(0, 2)), "moments": found.moment.any(axis=0)}
-    parts = [f"{kind} in {', '.join(np.array(names)[at])}" for kind, at in kinds.items() if at.any()]
+    drives = [f"prescribed.{one.name}" for one in system.described.prescribed]
+    kinds = [("forces in", names, found.force.any(axis=(0, 2))), ("moments in", names, found.moment.any(axis=0)),
+             ("torques or forces of", drives, found.drive.any(axis=0)[: len(drives)])]  # fmt: skip
+    parts = [f"{kind} {', '.join(itertools.compress(whose, at))}" for kind, whose, at in kinds if at.any()]
     if parts:
         yield Finding(
             "loads-undetermined", "", f"{' and '.join(parts)} are not determined: redundant constraints share them in "
             "any way, and tables have none of them",
-            "leave out what holds twice, with `slot` or `revolute` joints in place of `prismatic` or `weld` ones, or "
-            "make links flexible in what they share",
+            "leave out what holds or drives twice, with `slot` or `revolute` joints in place of `prismatic` or `weld` "
+            "ones, or make links flexible in what they share",
         )  # fmt: skip
 
 
