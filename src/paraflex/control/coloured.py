@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +14,9 @@ from paraflex.control.sampled import NamedMatrices, SampledPlant, discretise, na
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import known, positive
+
+# Names of the inputs of filters.
+_NOISE = "{} noise".format
 
 
 class DisturbedPlant(NamedTuple):
@@ -30,19 +32,6 @@ class DisturbedPlant(NamedTuple):
 
     plant: SampledPlant
     noise: Array
-
-
-@dataclass(frozen=True)
-class _Filtered:
-    """A continuous model with states of filters, whose noises are its last inputs."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
 
 
 def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[str, Any]) -> DisturbedPlant:
@@ -63,23 +52,15 @@ def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[s
         See `discretise`; an unknown input, no pair, a deviation that is not positive, what is no stable filter.
     """
     named = named_matrices(model)
-    filters = [_scaled(*_pair(name, given, named), period) for name, given in coloured.items()]
+    for name in coloured:
+        known(name, named.inputs, "coloured", "name")
+    filters = [_scaled(*deviation_and_filter(name, given), period) for name, given in coloured.items()]
     both = discretise(_filtered(named, list(coloured), filters), period, delay)
-    noises = [both.inputs.index(_noise(name)) for name in coloured]
+    noises = [both.inputs.index(_NOISE(name)) for name in coloured]
     plant = both.select(named.inputs)
     noise = np.zeros((len(plant.states), len(coloured)))
     noise[: plant.own] = both.G[: plant.own, noises]
     return DisturbedPlant(plant, noise)
-
-
-def _noise(name: str) -> str:
-    return f"{name} noise"
-
-
-def _pair(name: str, given: Any, named: NamedMatrices) -> tuple[float, StateSpace]:
-    """Standard deviation and filter of an input's disturbance."""
-    known(name, named.inputs, "coloured", "name")
-    return deviation_and_filter(name, given)
 
 
 def deviation_and_filter(name: str, given: Any) -> tuple[float, StateSpace]:
@@ -111,7 +92,7 @@ def _scaled(deviation: float, through: StateSpace, period: float) -> StateSpace:
     return StateSpace(through.A, through.B, gain * through.C, gain * through.D)
 
 
-def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) -> _Filtered:
+def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) -> NamedMatrices:
     """The model with filters before some inputs: x' = A x + B (u + F w)."""
     A, B, C, D = named.matrices
     own = scipy.linalg.block_diag(*(one.A for one in filters))
@@ -120,9 +101,9 @@ def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) ->
     places = [named.inputs.index(name) for name in at]
     B_d, D_d = B[:, places], D[:, places]
     states = [f"{name} disturbance {k + 1}" for name, one in zip(at, filters, strict=True) for k in range(len(one.A))]
-    return _Filtered(
+    matrices = StateSpace(
         np.block([[A, B_d @ made], [np.zeros((len(own), len(A))), own]]),
         np.block([[B, B_d @ direct], [np.zeros((len(own), B.shape[1])), into]]),
         np.hstack([C, D_d @ made]), np.hstack([D, D_d @ direct]),
-        (*named.states, *states), (*named.inputs, *map(_noise, at)), named.outputs,
     )  # fmt: skip
+    return NamedMatrices(matrices, (*named.states, *states), (*named.inputs, *map(_NOISE, at)), named.outputs)

@@ -169,12 +169,9 @@ class StateSpaceDescription(CheckedFields):
         return self._model(period)
 
     def _model(self, period: float) -> DiscreteModel:
-        from paraflex.control.discrete import DiscreteModel
+        from paraflex.control.discrete import DiscreteModel, matrices_of
 
-        D, n = np.array(self.D), len(self.A)
-        A, B, C = (np.reshape(rows, shape) if n else np.zeros(shape) for rows, shape in (
-            (self.A, (n, n)), (self.B, (n, D.shape[1])), (self.C, (D.shape[0], n))))  # fmt: skip
-        return DiscreteModel(A, B, C, D, period, (), ())
+        return DiscreteModel(*matrices_of(self), period, (), ())
 
 
 @given_as("a law", "a description of a law such as PIDDescription")

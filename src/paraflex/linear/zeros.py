@@ -13,7 +13,7 @@ and outputs loses rank is one of the system.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -43,6 +43,14 @@ class StateSpace(NamedTuple):
     B: Array
     C: Array
     D: Array
+
+    @classmethod
+    def of(cls, *given: Any) -> StateSpace:
+        """A, B, C and D from what is taken for arrays; an A without entries stands for no states."""
+        A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in given)
+        if not A.size:
+            A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
+        return cls(A, B, C, D)
 
 
 class Vibrating(NamedTuple):
