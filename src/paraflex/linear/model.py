@@ -25,7 +25,7 @@ from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
 from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
-from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
+from paraflex.linear.zeros import StateSpace, Vibrating, by_size, vibrating_zeros, zeros
 
 Complex = NDArray[np.complex128]
 # Stiffness is symmetric at rest but for this part of it.
@@ -323,8 +323,8 @@ class LinearModel(NamedModel):
         vibrates = self.at_rest and uneven <= _SYMMETRIC * scipy.sparse.linalg.norm(whole.stiffness)
         if vibrates and not np.any(whole.damping.data):
             root = np.sqrt(-slow.squares.astype(complex))
-            return _by_size(np.concatenate([np.zeros(2 * driven, dtype=complex), root, -root]))[:count]
-        found = _by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
+            return by_size(np.concatenate([np.zeros(2 * driven, dtype=complex), root, -root]))[:count]
+        found = by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
         free = (slow.squares == 0.0) & ~np.any(whole.damping @ slow.shapes, axis=0) & vibrates
         found[: 2 * (int(free.sum()) + (driven if vibrates else 0))] = 0.0
         return found[:count]
@@ -416,7 +416,3 @@ class LinearModel(NamedModel):
     @property
     def _attributes(self) -> dict[str, Any]:
         return {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}
-
-
-def _by_size(values: Complex) -> Complex:
-    return values[np.argsort(np.abs(values), kind="stable")]

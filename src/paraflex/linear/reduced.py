@@ -20,7 +20,7 @@ from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import SecondOrder, motions
 from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
-from paraflex.linear.zeros import StateSpace, zeros
+from paraflex.linear.zeros import StateSpace, by_size, zeros
 
 Complex = NDArray[np.complex128]
 
@@ -149,8 +149,7 @@ class ReducedModel(NamedModel):
 
     def poles(self) -> Complex:
         """Poles, by magnitude [rad/s]."""
-        found = np.asarray(scipy.linalg.eigvals(self.A), dtype=complex)
-        return found[np.argsort(np.abs(found), kind="stable")]
+        return by_size(np.asarray(scipy.linalg.eigvals(self.A), dtype=complex))
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
         """Transmission zeros between some inputs and some outputs, by default all: see `LinearModel.zeros`."""

@@ -155,7 +155,7 @@ class VaryingModel:
         size = np.linalg.norm(there @ self.B[0], axis=0)
         size = np.where(size > 0.0, size, 1.0)
         found = transitions(self.times, there @ self.A @ back, there @ self.B / size, times, hold)
-        C, D = (_interpolated(self.times, each, times) for each in (self.C, self.D))
+        C, D = (make_interp_spline(self.times, each, k=3)(times) for each in (self.C, self.D))
         return SampledModel(
             self.states, self.inputs, self.outputs, times, hold, Phi=back @ found.Phi @ there,
             Gamma=back @ found.Gamma * size, Gamma_next=back @ found.Gamma_next * size, C=C, D=D, error=found.error,
@@ -332,7 +332,3 @@ def _every(period: float, times: Array) -> Array:
                          remedy=f"give one up to {duration:.6g} s")  # fmt: skip
     periods = math.floor(duration / period + _SAME)
     return np.minimum(times[0] + period * np.arange(periods + 1), times[-1])
-
-
-def _interpolated(times: Array, values: Array, at: Array) -> Array:
-    return make_interp_spline(times, values, k=3)(at)

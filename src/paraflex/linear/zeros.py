@@ -85,12 +85,12 @@ def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
         if not np.any(modes.damping):
             squares = _shifted(-_pencil(stiffness + shift**2 * mass, mass), shift**2)
             root = np.sqrt(squares)
-            return _sorted(np.concatenate([root, -root]))
+            return by_size(np.concatenate([root, -root]))
         whole = stiffness + shift * damping + shift**2 * mass
         n = len(whole)
         slopes = scipy.linalg.solve(whole, np.hstack([2.0 * shift * mass + damping, mass])) if n else np.zeros((0, 0))
         companion = np.vstack([-slopes, np.eye(n, 2 * n)])
-        return _sorted(_shifted(scipy.linalg.eigvals(companion), shift))
+        return by_size(_shifted(scipy.linalg.eigvals(companion), shift))
 
     # Null spaces leave as many rows and columns fewer as B and C have rank.
     more = sum(matrix(shift).shape) - modes.squares.size
@@ -132,7 +132,7 @@ def zeros(system: StateSpace, shift: float) -> Complex:
     def squared(left: Array, right: Array) -> Complex:
         pencil = np.asarray(matrix(shift, B @ right, left @ C, left @ D @ right), dtype=float)
         found = _shifted(_pencil(pencil, np.eye(*pencil.shape) * (np.arange(len(pencil)) < n)), shift)
-        return _sorted(found[np.abs(found) < _FURTHEST * fastest])
+        return by_size(found[np.abs(found) < _FURTHEST * fastest])
 
     return _common(squared, even, D.shape, n, shift)
 
@@ -188,6 +188,6 @@ def _sizes(matrix: Numbers, axis: int) -> Array:
     return np.where(size > 0.0, size, 1.0)
 
 
-def _sorted(values: Complex) -> Complex:
-    """By magnitude."""
+def by_size(values: Complex) -> Complex:
+    """Complex numbers by magnitude, those of one in their order."""
     return values[np.argsort(np.abs(values), kind="stable")]
