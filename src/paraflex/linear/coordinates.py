@@ -189,7 +189,7 @@ class Coordinates:
     def tangency(self) -> Tangency:
         """Of the system with a row for every coordinate of `measured`, which holds nothing."""
         mechanism, held = self.system.mechanism, {one.joint for one in self.system.mechanism.prescribed}
-        more = tuple(PrescribedAngle(_row(joint), joint, ConstantSpeed(0.0, 0.0))
+        more = tuple(PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0))
                      for joint in (*self.joints, *([_TASK] if "angle" in self.task else [])) if joint not in held
                      )  # fmt: skip
         if not (more or self.task):
@@ -349,10 +349,6 @@ def coordinates_of(
         task = mechanism.end_effector.coordinates
     joints = dict.fromkeys(motor.joint for motor in mechanism.motors if motor.joint not in set(known.values()))
     return Coordinates(system, (*joints, *(known[name] for name in driven)), driven, task)
-
-
-def _row(joint: str) -> str:
-    return f"coordinate of {joint}"
 
 
 def unit_in(rows: csr_matrix, scale: Array) -> csr_matrix:

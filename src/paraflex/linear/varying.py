@@ -24,18 +24,9 @@ from paraflex.dynamics import sensor_readings
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, coordinates_of, named_axes
+from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, named_axes
 from paraflex.linear.discrete import InputHold, Predicted, SampledModel, transitions
-from paraflex.linear.linearise import (
-    Moving,
-    Ports,
-    linear_model,
-    mechanism_of,
-    mode_of,
-    moving,
-    nearest_sample,
-    ports_of,
-)
+from paraflex.linear.linearise import Moving, Ports, charted, linear_model, moving, nearest_sample
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.model import LinearModel
 from paraflex.mechanism import ActuationMode
@@ -225,16 +216,13 @@ def linearise_along(
     SingularPositionError
         A singular position, at which no coordinates describe the motion.
     """
-    mechanism = mechanism_of(source)
-    ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
-    motion = moving(source, ports.mode)
+    motion, ports, choice = charted(source, mode, forces, prescribed, coordinates)
     given = range(motion.times.size) if times is None else [nearest_sample(motion.times, at) for at in times]
     samples = np.unique(given).tolist()
     if len(samples) < _FEWEST:
         raise InputError("too few samples of the motion", field="times", value=len(samples),
                          remedy=f"give at least {_FEWEST} different ones")  # fmt: skip
     points = [motion.point(k) for k in samples]
-    choice = coordinates_of(motion.system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
     return _model(motion, points, choice, ports)
 
 
