@@ -13,7 +13,7 @@ from paraflex.control.filters import transfer_function
 from paraflex.control.sampled import NamedMatrices, SampledPlant, discretise, named_matrices
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
-from paraflex.mechanism.quantities import known, positive
+from paraflex.mechanism.quantities import all_known, positive
 
 # Names of the inputs of filters.
 _NOISE = "{} noise".format
@@ -52,8 +52,7 @@ def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[s
         See `discretise`; an unknown input, no pair, a deviation that is not positive, what is no stable filter.
     """
     named = named_matrices(model)
-    for name in coloured:
-        known(name, named.inputs, "coloured", "name")
+    all_known(coloured, named.inputs, "coloured", "name")
     filters = [_scaled(*deviation_and_filter(name, given), period) for name, given in coloured.items()]
     both = discretise(_filtered(named, list(coloured), filters), period, delay)
     noises = [both.inputs.index(_NOISE(name)) for name in coloured]

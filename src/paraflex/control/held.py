@@ -16,7 +16,7 @@ from paraflex.dynamics import InputSignals, State, System, constant_signals, pac
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import Mechanism
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import all_known
 from paraflex.tracking import path_stops
 
 Torques = Sequence[float] | Mapping[str, float] | Array
@@ -95,8 +95,7 @@ class HeldTorques:
             Unknown motors, other numbers of torques, none that are finite.
         """
         if isinstance(torques, Mapping):
-            for name in torques:
-                known(name, self.motors, "torques", "motor")
+            all_known(torques, self.motors, "torques", "motor")
             torques = [torques.get(name, 0.0) for name in self.motors]
         try:
             given = np.asarray(torques, dtype=float)
@@ -126,7 +125,7 @@ class HeldTorques:
         if self.limited.any():
             torques = self._within_limits(torques, state())
         changed = not np.array_equal(torques, self.held)
-        if changed or not self.log.begun:
+        if changed or not len(self.log):
             self.note(t, torques)
         if changed:
             self._write()

@@ -13,7 +13,7 @@ from paraflex.control.discrete import DiscreteModel
 from paraflex.control.estimators import BackwardDifference, checked_cutoff
 from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import finite, known
+from paraflex.mechanism.quantities import all_known, finite
 
 
 class RateFeedback:
@@ -52,8 +52,7 @@ class RateFeedback:
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
         for names, own, what in ((plant.inputs, self.inputs, "inputs"), (plant.outputs, self.outputs, "outputs")):
-            for name in names:
-                known(name, own, what, "name")
+            all_known(names, own, what, "name")
         self._K = self._gains[np.ix_([self.outputs.index(name) for name in plant.outputs],
                                      [self.inputs.index(name) for name in plant.inputs])]  # fmt: skip
         self._rates = BackwardDifference(plant.period, self._cutoff)

@@ -16,7 +16,7 @@ from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import Encoder, Mechanism, PointSensor, Tachometer
 from paraflex.mechanism.measured import measured_sensors
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import all_known
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
@@ -44,8 +44,7 @@ def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, 
         return list(planned_readings(plant))
     if isinstance(given, TrackingRun | MotionRun):
         return list(readings_in(given, plant))
-    for name in given:
-        known(name, plant.inputs, "reference", "sensor")
+    all_known(given, plant.inputs, "reference", "sensor")
     return [_reference(given[name], f"reference.{name}") if name in given else None for name in plant.inputs]
 
 
@@ -123,8 +122,7 @@ def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:
     """
     system, solution = (run.task.system if isinstance(run, TrackingRun) else run.system), run.solution
     sensors = {sensor.name: sensor for sensor in measured_sensors(system.mechanism)}
-    for name in plant.inputs:
-        known(name, sensors, "reference", "sensor")
+    all_known(plant.inputs, sensors, "reference", "sensor")
     k = solution.t.size
     reader = SensorReader(system, [sensors[name] for name in plant.inputs])
     values = reader(solution.q, solution.v, solution.a, solution.multipliers, run.applied[:k])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +16,10 @@ from paraflex.control.estimators import kalman_filter, riccati
 from paraflex.control.lqg_law import LQGDesign, Regulator
 from paraflex.control.reach import check_reach
 from paraflex.control.sampled import SampledPlant, as_sampled, places
-from paraflex.control.together import by_name, checked_number
+from paraflex.control.together import numbers_by_name
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel
-from paraflex.mechanism.quantities import not_negative, positive
+from paraflex.mechanism.quantities import not_negative
 
 # Random torques by default, as a part of the largest ones.
 _OF_EFFORT = 0.1
@@ -121,7 +120,7 @@ def lqg(
     for name in regulator.integrated:
         if name not in measured:
             raise InputError("is not measured", field="integrators", value=name, remedy="name it in measured, too")
-    given = _by_name(noise, measured, "noise", "the unit of the reading")
+    given = numbers_by_name(noise, measured, "noise", "the unit of the reading")
     missing = [name for name in measured if name not in given]
     if missing:
         raise InputError("has no noise", field="noise", value=missing[0], remedy="give its standard deviation, say "
@@ -168,9 +167,9 @@ def _regulator(
     plant: SampledPlant, deviations: Mapping[str, float], effort: Any, integrators: Mapping[str, float], extra: Any
 ) -> Regulator:
     usable = plant.inputs if isinstance(effort, Mapping) else [name for name in plant.inputs if not _is_force(name)]
-    efforts = _by_name(effort, usable, "effort", "N m or N")
-    largest = _by_name(deviations, plant.outputs, "deviations", "the unit of the output")
-    times = _by_name(integrators, plant.outputs, "integrators", "s")
+    efforts = numbers_by_name(effort, usable, "effort", "N m or N")
+    largest = numbers_by_name(deviations, plant.outputs, "deviations", "the unit of the output")
+    times = numbers_by_name(integrators, plant.outputs, "integrators", "s")
     for name in times:
         if name not in largest:
             raise InputError("has no deviation", field="integrators", value=name, remedy="name it in deviations, too")
@@ -223,11 +222,11 @@ def _riccati(A: Array, B: Array, cost: _Cost) -> Array:
 def _disturbances(plant: SampledPlant, regulator: Regulator, given: Any, effort: Any) -> Array:
     """Covariance (n, n) of what disturbs the states from sample to sample."""
     if given is None:
-        efforts = _by_name(effort, regulator.motors, "effort", "N m or N")
+        efforts = numbers_by_name(effort, regulator.motors, "effort", "N m or N")
         given = {name: _OF_EFFORT * value for name, value in efforts.items()}
     # By name also of points of forces; one number is for the motors.
     names = plant.inputs if isinstance(given, Mapping) else regulator.motors
-    sizes = _by_name(given, names, "disturbance", "N m or N", not_negative)
+    sizes = numbers_by_name(given, names, "disturbance", "N m or N", not_negative)
     G = plant.G[:, [plant.inputs.index(name) for name in sizes]] * np.array(list(sizes.values()))
     return G @ G.T
 
@@ -268,8 +267,3 @@ def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
                          remedy="give such a matrix, say X.T @ X")  # fmt: skip
     whole[: len(matrix), : len(matrix)] = matrix
     return whole
-
-
-def _by_name(given: Any, names: Sequence[str], field: str, unit: str, check: Any = positive) -> dict[str, float]:
-    """Numbers by name, of all names where one number is given."""
-    return by_name(given, names, field, "name", partial(checked_number, unit=unit, check=check))
