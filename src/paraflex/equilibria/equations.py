@@ -24,13 +24,13 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System
 from paraflex.dynamics.constraints import coordinate_kind
-from paraflex.dynamics.signals import acting_loads, moment_signals
+from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
 from paraflex.equilibria.given import Conditions, Coordinate
-from paraflex.kernel.packed import CONSTRAINT, Signals
+from paraflex.kernel.packed import CONSTRAINT
 from paraflex.linear.coordinates import Coordinates, unit_in
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, PointRef, PrescribedAngle, RevoluteJoint
@@ -115,7 +115,7 @@ class Equations:
         return np.array([number[name] for name in self.system.rows], dtype=int)
 
     @cached_property
-    def _row_numbers(self) -> dict[Coordinate, int]:
+    def number(self) -> dict[Coordinate, int]:
         """The row of every named coordinate in the extended system."""
         mechanism, names = self.extended.mechanism, {name: k for k, name in enumerate(self.extended.rows)}
         law = {one.joint: one.name for one in mechanism.prescribed}
@@ -128,15 +128,11 @@ class Equations:
                 numbers[one] = names[f"{law[joint]} {coordinate_kind(mechanism.joint(joint))}"]
         return numbers
 
-    def number(self, coordinate: Coordinate) -> int:
-        """The row of a coordinate in the extended system."""
-        return self._row_numbers[coordinate]
-
     @cached_property
     def holding(self) -> NDArray[np.int64]:
         """Rows that must keep their value or follow a change: constraints, and coordinates held or moved."""
         own = [k for k in self.own.tolist() if self.extended.packed.rows["kind"][k] == CONSTRAINT]
-        extra = [self.number(one) for one in (*self.given.held, *self.given.moved)]
+        extra = [self.number[one] for one in (*self.given.held, *self.given.moved)]
         return np.array(list(dict.fromkeys([*own, *extra])), dtype=int)
 
     @cached_property
@@ -144,27 +140,19 @@ class Equations:
         """Change of the rows `holding` with all that is given (rows,)."""
         change, place = np.zeros(self.holding.size), {row: k for k, row in enumerate(self.holding.tolist())}
         for one, value in self.given.moved.items():
-            change[place[self.number(one)]] = value
+            change[place[self.number[one]]] = value
         return change
 
     @cached_property
     def _loaded(self) -> tuple[NDArray[np.int64], Array]:
         """Rows at which forces act, and the forces."""
-        rows = np.array([self.number(one) for one in self.given.loads], dtype=int)
+        rows = np.array([self.number[one] for one in self.given.loads], dtype=int)
         return rows, np.array(list(self.given.loads.values()), dtype=float)
-
-    @cached_property
-    def _signals(self) -> Signals:
-        return moment_signals(self.extended.mechanism, self.start.time)
-
-    @cached_property
-    def _acting(self) -> Array:
-        return acting_loads(self.extended.mechanism, np.array([self.start.time]))[0]
 
     @cached_property
     def _forces(self) -> RestingForces:
         forces = RestingForces(self.extended, self.start.time)
-        forces.torques = self._acting
+        forces.torques = acting_loads(self.extended.mechanism, np.array([self.start.time]))[0]
         return forces
 
     @cached_property
@@ -191,7 +179,7 @@ class Equations:
 
     def values(self, q: Array) -> Array:
         """Values (rows,) of all rows of the extended system at coordinates (n,): of named coordinates their own."""
-        return self.extended.constraints(self._signals, self.start.time, q)[0]
+        return self.extended.constraints(self._forces.signals, self.start.time, q)[0]
 
     @cached_property
     def at_start(self) -> Array:
@@ -216,7 +204,7 @@ class Equations:
     def matrices(self, at: Unknowns) -> Matrices:
         """Derivatives at a point."""
         still = np.zeros(self.system.n)
-        point = MotionPoint(self.start.time, at.q, still, still, self.multipliers(at), self._acting)
+        point = MotionPoint(self.start.time, at.q, still, still, self.multipliers(at), self._forces.torques)
         found = self._tangency.at(point)
         rows, efforts = self._loaded
         held, loaded = (rows_of(np.searchsorted(found.rows, wanted), found.jacobian)[0]
@@ -227,7 +215,7 @@ class Equations:
     def rows_named(self, coordinates: Sequence[Coordinate], q: Array) -> csr_matrix:
         """Derivatives (coordinates, n) of named coordinates."""
         jacobian = self._tangency.inertia(self.start.time, q)[1]
-        return rows_of(np.array([self.number(one) for one in coordinates], dtype=int), jacobian)[0]
+        return rows_of(np.array([self.number[one] for one in coordinates], dtype=int), jacobian)[0]
 
     def guess(self) -> Unknowns:
         """The start, with the multipliers that would hold it best."""
