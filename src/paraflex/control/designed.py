@@ -9,6 +9,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.coloured import deviation_and_filter
 from paraflex.control.controllers import Plant
+from paraflex.control.described_laws import Numbers
 from paraflex.control.estimators import quantisation_noise
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.references import OPEN_LOOP
@@ -18,8 +19,6 @@ from paraflex.errors import InputError
 from paraflex.linear import LinearModel, linearise, reduce
 from paraflex.mechanism import mode_of_motors
 from paraflex.mechanism.quantities import finite, not_negative, positive
-
-Numbers = float | Mapping[str, float]
 
 
 class DesignedLQG:

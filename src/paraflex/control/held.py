@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,13 +19,6 @@ from paraflex.mechanism.quantities import all_known
 from paraflex.tracking import path_stops
 
 Torques = Sequence[float] | Mapping[str, float] | Array
-
-
-class SavedTorques(NamedTuple):
-    """Torques held (motors,), and which acted before."""
-
-    held: Array
-    log: TorqueLog
 
 
 class HeldTorques:
@@ -142,13 +134,13 @@ class HeldTorques:
         self.log.note(t, torques)
         self.held = torques
 
-    def saved(self) -> SavedTorques:
-        """What `restore` goes back to."""
-        return SavedTorques(self.held.copy(), self.log.copy())
+    def saved(self) -> tuple[Array, TorqueLog]:
+        """Torques held (motors,), and which acted before: what `restore` goes back to."""
+        return self.held.copy(), self.log.copy()
 
-    def restore(self, saved: SavedTorques) -> None:
+    def restore(self, saved: tuple[Array, TorqueLog]) -> None:
         """Go back to what `saved` gave."""
-        self.held, self.log = saved.held.copy(), saved.log.copy()
+        self.held, self.log = saved[0].copy(), saved[1].copy()
         self._write()
 
     def _within_limits(self, torques: Array, now: State) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
@@ -151,13 +151,6 @@ def _disturbed(model: Any, period: float, delay: float, coloured: Mapping[str, A
     return DisturbedPlant(plant, np.zeros((len(plant.states), 0)))
 
 
-class _Cost(NamedTuple):
-    """Weights Q (n, n) and R (motors, motors) of states with integrals."""
-
-    Q: Array
-    R: Array
-
-
 def _is_force(name: str) -> bool:
     """Whether an input is a force at a point of a linear model, and no motor."""
     return name.count(".") > 1 and name.endswith((".x", ".y"))
@@ -185,7 +178,7 @@ def _regulator(
     Q[n:, n:] = np.diag([1.0 / (largest[name] * time) ** 2 for name, time in times.items()])
     R = np.diag([1.0 / efforts[name] ** 2 for name in motors])
     check_reach(used, used.B, "effort", "is not reached by the motors", "choose other motors")
-    P = _riccati(A, B, _Cost(Q, R))
+    P = _riccati(A, B, Q, R)
     gain = scipy.linalg.solve(R + B.T @ P @ B, B.T @ P @ A, assume_a="pos")
     poles = np.linalg.eigvals(A - B @ gain)
     return Regulator(plant, motors, _of_all(gain, plant, used), tuple(times), poles)
@@ -208,9 +201,9 @@ def _with_integrals(plant: SampledPlant, names: Sequence[str]) -> tuple[Array, A
     return A, np.vstack([plant.B, np.zeros((more, plant.B.shape[1]))])
 
 
-def _riccati(A: Array, B: Array, cost: _Cost) -> Array:
+def _riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
     try:
-        return riccati(A, B, *cost)
+        return riccati(A, B, Q, R)
     except (np.linalg.LinAlgError, ValueError):
         raise InputError(
             "no feedback is the best one", field="deviations",

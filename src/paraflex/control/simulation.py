@@ -13,11 +13,11 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.described import ControllerDescription
-from paraflex.control.held import HeldTorques, SavedTorques, Torques
+from paraflex.control.held import HeldTorques, Torques
 from paraflex.control.inside import sampled_law
 from paraflex.control.loop import LawFailure, Loop
 from paraflex.control.readings import Readings
-from paraflex.control.runs import ControlledMotion, ControlledTracking
+from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
 from paraflex.control.together import SAME, is_number
 from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
@@ -50,7 +50,7 @@ class Saved:
 
     time: float
     kept: Kept
-    torques: SavedTorques
+    torques: tuple[Array, TorqueLog]
     loop: Loop | None
     controllers: Any
 
