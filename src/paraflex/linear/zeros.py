@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from paraflex.arrays import Array, Numbers
 from paraflex.limits import solvable
-from paraflex.linear.independent import unit_rows
+from paraflex.linear.independent import sizes, unit_rows
 
 Complex = NDArray[np.complex128]
 # Zeros of two squared systems that agree this well are one.
@@ -121,11 +121,11 @@ def zeros(system: StateSpace, shift: float) -> Complex:
     n, fastest = len(A), np.linalg.norm(A, 2)
 
     def matrix(s: complex, B: Array = B, C: Array = C, D: Array = D) -> Numbers:
-        columns, rows = _sizes(B, 0), _sizes(np.hstack([C, D]), 1)
+        columns, rows = sizes(B, 0), sizes(np.hstack([C, D]), 1)
         return np.block([[A - s * np.eye(n), B / columns], [C / rows, D / rows / columns]])
 
     def even(s: complex) -> Numbers:
-        size = np.pad(1.0 / np.sqrt(_sizes(A - s * np.eye(n), 1).ravel()), (0, sum(D.shape)), constant_values=1.0)
+        size = np.pad(1.0 / np.sqrt(sizes(A - s * np.eye(n), 1).ravel()), (0, sum(D.shape)), constant_values=1.0)
         whole = matrix(s)
         return whole * size[: whole.shape[1]] * size[: len(whole), None]
 
@@ -173,7 +173,7 @@ def _pencil(whole: Array, mass: Array) -> Complex:
     """Eigenvalues theta of mass x = theta whole x."""
     if not whole.size:
         return np.zeros(0, dtype=complex)
-    size = _sizes(whole, 1)
+    size = sizes(whole, 1)
     return np.asarray(scipy.linalg.eigvals(scipy.linalg.solve(whole / size, mass / size)), dtype=complex)
 
 
@@ -181,11 +181,6 @@ def _shifted(theta: Complex, shift: float) -> Complex:
     """What lies 1 / theta from a shift, but not at infinity."""
     kept = theta[np.abs(theta) > _INFINITE * np.max(np.abs(theta), initial=0.0)]
     return shift + 1.0 / kept
-
-
-def _sizes(matrix: Numbers, axis: int) -> Array:
-    size = np.linalg.norm(matrix, axis=axis, keepdims=True)
-    return np.where(size > 0.0, size, 1.0)
 
 
 def by_size(values: Complex) -> Complex:
