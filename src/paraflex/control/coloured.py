@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
 
 from paraflex.arrays import Array
 from paraflex.control.filters import transfer_function
-from paraflex.control.sampled import NamedMatrices, SampledPlant, discretise, named_matrices
+from paraflex.control.sampled import NamedMatrices, SampledPlant, as_sampled, discretise, named_matrices
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import all_known, positive
@@ -19,22 +19,7 @@ from paraflex.mechanism.quantities import all_known, positive
 _NOISE = "{} noise".format
 
 
-class DisturbedPlant(NamedTuple):
-    """A sampled plant with states of filters, and the noise that drives these, of unit variance.
-
-    Attributes
-    ----------
-    plant : SampledPlant
-        Its own states are the model's and then the filters'.
-    noise : (n, filters) array
-        What noise adds to the states from sample to sample.
-    """
-
-    plant: SampledPlant
-    noise: Array
-
-
-def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[str, Any]) -> DisturbedPlant:
+def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[str, Any]) -> tuple[SampledPlant, Array]:
     """A sampled model whose inputs are disturbed by what filters make of noise.
 
     Noise is constant from sample to sample; the filters, as the model, are sampled exactly.
@@ -42,15 +27,25 @@ def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[s
     Parameters
     ----------
     model, period, delay
-        See `discretise`.
+        See `as_sampled`.
     coloured : mapping of str to (float, Filter)
         By input: standard deviation of the disturbance [N m, N], and the filter that noise comes through.
+
+    Returns
+    -------
+    SampledPlant
+        Its own states are the model's and then the filters'.
+    (n, filters) array
+        What noise of unit variance adds to the states from sample to sample.
 
     Raises
     ------
     InputError
         See `discretise`; an unknown input, no pair, a deviation that is not positive, what is no stable filter.
     """
+    if not coloured:
+        plant = as_sampled(model, period, delay)
+        return plant, np.zeros((len(plant.states), 0))
     named = named_matrices(model)
     all_known(coloured, named.inputs, "coloured", "name")
     filters = [_scaled(*deviation_and_filter(name, given), period) for name, given in coloured.items()]
@@ -59,7 +54,7 @@ def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[s
     plant = both.select(named.inputs)
     noise = np.zeros((len(plant.states), len(coloured)))
     noise[: plant.own] = both.G[: plant.own, noises]
-    return DisturbedPlant(plant, noise)
+    return plant, noise
 
 
 def deviation_and_filter(name: str, given: Any) -> tuple[float, StateSpace]:

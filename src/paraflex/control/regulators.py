@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.coloured import DisturbedPlant, disturbed_plant
+from paraflex.control.coloured import disturbed_plant
 from paraflex.control.estimators import kalman_filter, riccati
 from paraflex.control.lqg_law import LQGDesign, Regulator
 from paraflex.control.reach import check_reach
@@ -113,7 +113,7 @@ def lqg(
     InputError
         See `lqr`; readings that do not show a motion without friction or a vibration, which it names.
     """
-    plant, lasting = _disturbed(model, period, delay, coloured)
+    plant, lasting = disturbed_plant(model, period, delay, coloured or {})
     regulator = _regulator(plant, deviations, effort, integrators or {}, state_weights)
     measured = tuple(measured)
     C = plant.rows(measured, "measured")
@@ -142,13 +142,6 @@ def _holding(model: Any, motors: Sequence[str]) -> Array:
         return np.zeros(len(motors))
     point, own = full.minimal.point, [motor.name for motor in full.minimal.system.mechanism.motors]
     return np.array([point.torques[own.index(name)] if name in own else 0.0 for name in motors])
-
-
-def _disturbed(model: Any, period: float, delay: float, coloured: Mapping[str, Any] | None) -> DisturbedPlant:
-    if coloured:
-        return disturbed_plant(model, period, delay, coloured)
-    plant = as_sampled(model, period, delay)
-    return DisturbedPlant(plant, np.zeros((len(plant.states), 0)))
 
 
 def _is_force(name: str) -> bool:
