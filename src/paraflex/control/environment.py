@@ -157,6 +157,8 @@ class Environment(Env[Array, NDArray[Any]]):
         method: Method | str | None = None,
         options: IntegrationOptions | None = None,
     ) -> None:
+        from gymnasium.spaces import Box
+
         task = source if isinstance(source, TrackingTask) else None
         if task is None and reward is None:
             raise InputError("there is no plan to follow", field="reward",
@@ -189,11 +191,6 @@ class Environment(Env[Array, NDArray[Any]]):
         self._desired = None if task is None else task.plan.follow(self._times).desired.position
         self._step: int | None = None
         self._seen: Array = np.zeros(len(self.observed))
-        self._set_spaces()
-
-    def _set_spaces(self) -> None:
-        from gymnasium.spaces import Box
-
         self.action_space: Space[Any] = Box(-1.0, 1.0, (len(self.motors),), np.float32)
         self.observation_space: Space[Any] = Box(-WIDEST, WIDEST, (len(self.observed),), np.float64)
 

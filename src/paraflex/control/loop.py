@@ -36,15 +36,6 @@ class Due(NamedTuple):
     torques: Array
 
 
-class Done(NamedTuple):
-    """What a controller did at a sample: its time, readings, torques wanted and given."""
-
-    t: float
-    readings: Array
-    wanted: Array
-    given: Array
-
-
 @dataclass(frozen=True)
 class ControllerRecord:
     """What a controller did in a run.
@@ -160,7 +151,8 @@ class Loop:
         self.acting: Array = np.zeros((len(self.controllers), len(motors)))
         for k, each in enumerate(self.controllers):
             self.acting[k, self._outputs[k]] = getattr(each, "holding_torques", 0.0)
-        self.kept: list[list[Done]] = [[] for _ in self.controllers]
+        # Of each its samples: times, readings, torques wanted and given.
+        self.kept: list[list[tuple[float, Array, Array, Array]]] = [[] for _ in self.controllers]
         # Where the compiled time loop runs the controller.
         self.inside: SampledLaw | None = None
 
@@ -244,7 +236,7 @@ class Loop:
             raise _not_finite(name, wrong)
         last = getattr(controller, "last", None)
         record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
-        self.kept[k].append(Done(t, record.readings, record.wanted, torques))
+        self.kept[k].append((t, record.readings, record.wanted, torques))
         return torques
 
     def keep_last(self) -> None:
