@@ -27,18 +27,15 @@ from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
 from paraflex.dynamics.stiffness import RestingForces
-from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
 from paraflex.equilibria.given import Conditions, Coordinate
 from paraflex.kernel.packed import CONSTRAINT
-from paraflex.linear.coordinates import Coordinates, unit_in
+from paraflex.linear.coordinates import Coordinates, unit_in, with_coordinates
 from paraflex.linear.independent import independent_dense, independent_sparse
-from paraflex.mechanism import GROUND, ConstantSpeed, PointRef, PrescribedAngle, RevoluteJoint
-from paraflex.mechanism.cut import Cut
+from paraflex.mechanism import PointRef
 
 # A matrix of fewer entries has its independent rows found by a QR factorisation, others by elimination.
 _DENSE_ENTRIES = 400_000
-_ORIGIN = "origin of named coordinates"
 
 
 class Unknowns(NamedTuple):
@@ -90,23 +87,14 @@ class Equations:
     @cached_property
     def extended(self) -> System:
         """The system with a row for every named coordinate."""
-        mechanism = self.system.mechanism
-        prescribed = {one.joint for one in mechanism.prescribed}
-        origin, pins, more = PointRef(GROUND, _ORIGIN), {}, []
-        cut = mechanism.cut or Cut(mechanism, {}, {})
+        cut = self.system.mechanism.cut
+        joints, pins = [], {}
         for one in self.given.coordinates:
             if one.point is not None:
-                pins[_pin(one.point)] = RevoluteJoint(_pin(one.point), origin, cut.points.get(one.point, one.point))
-            if one.point is None and one.name not in prescribed:
-                more.append(one.name)
-            elif one.point is not None and one.axis == "angle":
-                more.append(_pin(one.point))
-        laws = (PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0)) for joint in more)
-        extended = replace(
-            mechanism, ground={**mechanism.ground, _ORIGIN: (0.0, 0.0)}, joints=(*mechanism.joints, *pins.values()),
-            prescribed=(*mechanism.prescribed, *laws), cut=cut,
-        )  # fmt: skip
-        return with_constraints_of(self.system, extended)
+                pins[_pin(one.point)] = one.point if cut is None else cut.points.get(one.point, one.point)
+            if one.point is None or one.axis == "angle":
+                joints.append(one.name if one.point is None else _pin(one.point))
+        return with_coordinates(self.system, joints, pins)
 
     @cached_property
     def own(self) -> NDArray[np.int64]:
