@@ -26,7 +26,7 @@ from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, named_axes
 from paraflex.linear.discrete import InputHold, Predicted, SampledModel, transitions
-from paraflex.linear.linearise import Moving, Ports, charted, linear_model, moving, nearest_sample
+from paraflex.linear.linearise import Ports, charted, linear_model, moving, nearest_sample
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.model import LinearModel
 from paraflex.mechanism import ActuationMode
@@ -223,18 +223,12 @@ def linearise_along(
         raise InputError("too few samples of the motion", field="times", value=len(samples),
                          remedy=f"give at least {_FEWEST} different ones")  # fmt: skip
     points = [motion.point(k) for k in samples]
-    return _model(motion, points, choice, ports)
-
-
-def _model(motion: Moving, points: Sequence[MotionPoint], coordinates: Coordinates, ports: Ports) -> VaryingModel:
-    """The model at points of a motion."""
-    about = motion.about
-    chosen, found = in_one_chart(points, coordinates, ports, about, lambda model: model.state_space)
-    first, (A, B, C, D) = linear_model(coordinates, points[0], ports, about, chosen=chosen), zip(*found, strict=True)
+    chosen, found = in_one_chart(points, choice, ports, motion.about, lambda model: model.state_space)
+    first, (A, B, C, D) = linear_model(choice, points[0], ports, motion.about, chosen=chosen), zip(*found, strict=True)
     return VaryingModel(
-        mechanism=first.mechanism, mode=first.mode, about=about, states=first.states, inputs=first.inputs,
+        mechanism=first.mechanism, mode=first.mode, about=first.about, states=first.states, inputs=first.inputs,
         outputs=first.outputs, times=np.array([point.time for point in points]), A=np.array(A), B=np.array(B),
-        C=np.array(C), D=np.array(D), nominal=_along(points, coordinates, chosen, ports), coordinates=coordinates,
+        C=np.array(C), D=np.array(D), nominal=_along(points, choice, chosen, ports), coordinates=choice,
         chosen=chosen, ports=ports, modal=first.modal_states,
     )  # fmt: skip
 
