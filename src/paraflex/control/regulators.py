@@ -231,13 +231,7 @@ def _first_estimate(plant: SampledPlant, C: Array, spread: Array) -> Array:
 
 
 def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
-    """A symmetric matrix (n, n) of all states from one of all, or of the model's own.
-
-    Raises
-    ------
-    InputError
-        Another size, numbers that are not finite, a matrix that is not symmetric and positive semidefinite.
-    """
+    """A positive semidefinite matrix (n, n) of all states from one of all, or of the model's own."""
     size = len(plant.states)
     whole = np.zeros((size, size))
     if given is None:
