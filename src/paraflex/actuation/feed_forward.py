@@ -184,7 +184,7 @@ def plan_torques(follow: Callable[[Array], RigidMotion], knots: Array) -> Torque
         np.linspace(a, b, max(_FEWEST_POINTS, int(np.ceil((b - a) / _LONGEST_SPACING)) + 1)) for a, b in pairwise(knots)
     ]
     times = np.unique(np.concatenate(intervals))
-    fine = required_effort(follow(_with_middles(times)))
+    fine = required_effort(follow(_alternating(times, 0.5 * (times[1:] + times[:-1]))))
     return TorquePlan(fine, np.asarray(knots), follow, _before(fine.motion, knots))
 
 
@@ -194,10 +194,6 @@ def _before(motion: RigidMotion, knots: Array) -> Effort | None:
         return None
     at = np.searchsorted(motion.t, knots)
     return required_effort(replace(motion, **{name: getattr(motion, name)[at] for name in _IN_TIME}), before=True)
-
-
-def _with_middles(t: Array) -> Array:
-    return _alternating(t, 0.5 * (t[1:] + t[:-1]))
 
 
 def _alternating(a: Array, b: Array) -> Array:

@@ -59,8 +59,7 @@ class Amplifiers:
 
     def rates(self, system: System, q: Array, v: Array) -> Array:
         """Rates of the joints of all motors (motors,) at coordinates and velocities (n,) [rad/s, m/s]."""
-        each = [joint_coordinate(system, name, q[None], v[None]).rate[0] for name in self._joints]
-        return np.array(each)
+        return np.array([joint_coordinate(system, name, q[None], v[None]).rate[0] for name in self._joints])
 
     def limits(self, rates: Array) -> tuple[Array, Array]:
         """Lowest and highest commands (motors,) at rates of the joints [N m, N].

@@ -50,27 +50,6 @@ class ChainSample(NamedTuple):
     given: Array
 
 
-class Chain(NamedTuple):
-    """What stands around a law, of each sensor and motor; None where there is nothing.
-
-    Attributes
-    ----------
-    resolution : list of float or None
-        Of readings.
-    filters : list of pair of arrays or None
-        Coefficients of numerator and denominator.
-    limits : list of pair of float or None
-        Lowest and highest torque [N m, N].
-    rates : list of float or None
-        [N m/s, N/s]
-    """
-
-    resolution: list[Any]
-    filters: list[Any]
-    limits: list[Any]
-    rates: list[Any]
-
-
 class SampledController:
     """A control law with what a real controller has around it: a `Controller`.
 
@@ -143,10 +122,8 @@ class SampledController:
         self.delay: float = checked_number(delay, "delay", "s", not_negative)
         self.inputs: tuple[str, ...] = tuple(getattr(self.law, "inputs", ()) if inputs is None else inputs)
         self.outputs: tuple[str, ...] = tuple(getattr(self.law, "outputs", ()) if outputs is None else outputs)
-        own = getattr(self.law, "reference", None)
-        self.reference: Mapping[str, Any] | TrackingRun | MotionRun | str | None = (
-            own if reference is None else reference
-        )
+        reference = getattr(self.law, "reference", None) if reference is None else reference
+        self.reference: Mapping[str, Any] | TrackingRun | MotionRun | str | None = reference
         if self.reference and getattr(self.law, "absolute", False):
             raise InputError(f"{self.title} takes readings as they are", field="reference", value=reference,
                              remedy="leave it out")  # fmt: skip
@@ -158,15 +135,18 @@ class SampledController:
         if isinstance(self.law, DiscreteModel):
             self.law.check(self.inputs, self.outputs, self.period)
 
-    def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> Chain:
-        """What stands around the law, for sensors and motors.
+    def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[Any], ...]:
+        """What stands around the law, in the order of sensors and motors; None where there is nothing.
+
+        Resolution of readings, their filters (numerator, denominator), limits (lowest, highest) of torques [N m, N] and
+        of their rates [N m/s, N/s].
 
         Raises
         ------
         InputError
             Other names, or numbers that make no sense.
         """
-        return Chain(
+        return (
             _in_order(self.quantise, inputs, "quantise", "sensor", partial(checked_number, unit="the sensor's unit")),
             _in_order(self.filters, inputs, "filters", "sensor", transfer_function),
             _in_order(self.limits, outputs, "limits", "motor", _range),

@@ -3,49 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
 
 from paraflex.arrays import Array
 from paraflex.control.filters import transfer_function
-from paraflex.control.sampled import NamedMatrices, SampledPlant, discretise, named_matrices
+from paraflex.control.sampled import NamedMatrices, SampledPlant, as_sampled, discretise, named_matrices
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
-from paraflex.mechanism.quantities import known, positive
+from paraflex.mechanism.quantities import all_known, positive
+
+# Names of the inputs of filters.
+_NOISE = "{} noise".format
 
 
-class DisturbedPlant(NamedTuple):
-    """A sampled plant with states of filters, and the noise that drives these, of unit variance.
-
-    Attributes
-    ----------
-    plant : SampledPlant
-        Its own states are the model's and then the filters'.
-    noise : (n, filters) array
-        What noise adds to the states from sample to sample.
-    """
-
-    plant: SampledPlant
-    noise: Array
-
-
-@dataclass(frozen=True)
-class _Filtered:
-    """A continuous model with states of filters, whose noises are its last inputs."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-
-
-def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[str, Any]) -> DisturbedPlant:
+def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[str, Any]) -> tuple[SampledPlant, Array]:
     """A sampled model whose inputs are disturbed by what filters make of noise.
 
     Noise is constant from sample to sample; the filters, as the model, are sampled exactly.
@@ -53,33 +27,34 @@ def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[s
     Parameters
     ----------
     model, period, delay
-        See `discretise`.
+        See `as_sampled`.
     coloured : mapping of str to (float, Filter)
         By input: standard deviation of the disturbance [N m, N], and the filter that noise comes through.
+
+    Returns
+    -------
+    SampledPlant
+        Its own states are the model's and then the filters'.
+    (n, filters) array
+        What noise of unit variance adds to the states from sample to sample.
 
     Raises
     ------
     InputError
         See `discretise`; an unknown input, no pair, a deviation that is not positive, what is no stable filter.
     """
+    if not coloured:
+        plant = as_sampled(model, period, delay)
+        return plant, np.zeros((len(plant.states), 0))
     named = named_matrices(model)
-    filters = [_scaled(*_pair(name, given, named), period) for name, given in coloured.items()]
+    all_known(coloured, named.inputs, "coloured", "name")
+    filters = [_scaled(*deviation_and_filter(name, given), period) for name, given in coloured.items()]
     both = discretise(_filtered(named, list(coloured), filters), period, delay)
-    noises = [both.inputs.index(_noise(name)) for name in coloured]
+    noises = [both.inputs.index(_NOISE(name)) for name in coloured]
     plant = both.select(named.inputs)
     noise = np.zeros((len(plant.states), len(coloured)))
     noise[: plant.own] = both.G[: plant.own, noises]
-    return DisturbedPlant(plant, noise)
-
-
-def _noise(name: str) -> str:
-    return f"{name} noise"
-
-
-def _pair(name: str, given: Any, named: NamedMatrices) -> tuple[float, StateSpace]:
-    """Standard deviation and filter of an input's disturbance."""
-    known(name, named.inputs, "coloured", "name")
-    return deviation_and_filter(name, given)
+    return plant, noise
 
 
 def deviation_and_filter(name: str, given: Any) -> tuple[float, StateSpace]:
@@ -111,7 +86,7 @@ def _scaled(deviation: float, through: StateSpace, period: float) -> StateSpace:
     return StateSpace(through.A, through.B, gain * through.C, gain * through.D)
 
 
-def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) -> _Filtered:
+def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) -> NamedMatrices:
     """The model with filters before some inputs: x' = A x + B (u + F w)."""
     A, B, C, D = named.matrices
     own = scipy.linalg.block_diag(*(one.A for one in filters))
@@ -120,9 +95,9 @@ def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) ->
     places = [named.inputs.index(name) for name in at]
     B_d, D_d = B[:, places], D[:, places]
     states = [f"{name} disturbance {k + 1}" for name, one in zip(at, filters, strict=True) for k in range(len(one.A))]
-    return _Filtered(
+    matrices = StateSpace(
         np.block([[A, B_d @ made], [np.zeros((len(own), len(A))), own]]),
         np.block([[B, B_d @ direct], [np.zeros((len(own), B.shape[1])), into]]),
         np.hstack([C, D_d @ made]), np.hstack([D, D_d @ direct]),
-        (*named.states, *states), (*named.inputs, *map(_noise, at)), named.outputs,
     )  # fmt: skip
+    return NamedMatrices(matrices, (*named.states, *states), (*named.inputs, *map(_NOISE, at)), named.outputs)

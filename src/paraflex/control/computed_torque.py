@@ -7,12 +7,9 @@ sense of least squares. Torques are those of least norm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from paraflex.actuation import required_effort
-from paraflex.actuation.allocation import Effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.controllers import Plant
@@ -85,17 +82,14 @@ class ComputedTorque:
         sample = min(max(round((t - self._start) / self._period), 0), len(self._plan.t) - 1)
         place = self._closure.task(self._plan.q[sample])
         _, rate, acceleration = self._wanted[sample]
-        found = self._found(y, place)
-        velocity = found.rows @ self._rates.step(y)[1]
-        command = acceleration - self._Kv * (velocity - rate) - self._Kp * (found.place - place)
-        effort = required_effort(self._motion(t, found.place, velocity, command))
-        return self._least_norm(effort)
-
-    def _least_norm(self, effort: Effort) -> Array:
+        read, rows = self._read(y, place)
+        velocity = rows @ self._rates.step(y)[1]
+        command = acceleration - self._Kv * (velocity - rate) - self._Kp * (read - place)
+        effort = required_effort(self._motion(t, read, velocity, command))
         return np.linalg.pinv(effort.matrix[0][:, self._motors]) @ effort.required[0]
 
-    def _found(self, y: Array, place: Array) -> _Found:
-        """The end-effector's place (tasks,) at which joints read y, as nearly as they can."""
+    def _read(self, y: Array, place: Array) -> tuple[Array, Array]:
+        """The end-effector's place (tasks,) where joints read y nearly, and its changes by theirs (tasks, joints)."""
         size = self._closure.system.size
         for _ in range(_ITERATIONS):
             motion = self._motion(0.0, place, np.zeros_like(place), np.zeros_like(place))
@@ -105,7 +99,7 @@ class ComputedTorque:
             change = rows @ (y - read)
             place = place + change
             if np.max(np.abs(change)) < _FOUND * size:
-                return _Found(place, rows)
+                return place, rows
         raise ArithmeticError("the rigid mechanism has no pose near the readings of its encoders")
 
     def _motion(self, t: float, place: Array, velocity: Array, acceleration: Array) -> RigidMotion:
@@ -117,11 +111,3 @@ class ComputedTorque:
         self._pose = q[0]
         plan = self._plan
         return RigidMotion(plan.mechanism, plan.system, plan.path, np.array([t]), q, v, a, basis)
-
-
-@dataclass(frozen=True)
-class _Found:
-    """A place (tasks,), and what maps rates of joints to its velocity (tasks, joints)."""
-
-    place: Array
-    rows: Array

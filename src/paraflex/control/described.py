@@ -15,7 +15,7 @@ from paraflex.errors import InputError
 from paraflex.mechanism import AngleLaw, Mechanism
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.measured import encoders_of, measured_sensors
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import all_known
 
 if TYPE_CHECKING:
     from paraflex.control.chain import SampledController
@@ -95,8 +95,7 @@ class ControllerDescription(CheckedFields):
         sampled = self._sampled(law, {"reference": self.reference})
         among = sampled.inputs or names.sensors
         if isinstance(self.reference, Mapping):
-            for name in self.reference:
-                known(name, among, "reference", "sensor")
+            all_known(self.reference, among, "reference", "sensor")
         sampled.check(among, sampled.outputs or names.motors)
 
     def made(self, mechanism: Mechanism, motors: Sequence[str]) -> SampledController:

@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import all_known, known
 
 if TYPE_CHECKING:
     from paraflex.control.computed_torque import ComputedTorque
@@ -102,17 +102,13 @@ class PIDDescription(CheckedFields):
 
     def check(self, names: LawNames) -> None:
         """See `DescribedLaw`."""
-        from paraflex.control.laws import gains_of
+        from paraflex.control.laws import check_pairs, gains_of
 
         for name in _GAINS:
             gains_of(getattr(self, name), names.motors, name)
         self.made(names.motors, 1.0)
-        if names.inputs and names.outputs and len(names.inputs) != len(names.outputs):
-            raise InputError(
-                f"{len(names.inputs)} readings for {len(names.outputs)} motors", field="inputs",
-                value=", ".join(names.inputs),
-                remedy="name the encoder of each motor, in their order, or leave it out",
-            )  # fmt: skip
+        if names.inputs and names.outputs:
+            check_pairs(names.inputs, names.outputs)
 
     def made(self, outputs: Sequence[str], period: float) -> JointPID:
         """See `DescribedLaw`."""
@@ -169,12 +165,9 @@ class StateSpaceDescription(CheckedFields):
         return self._model(period)
 
     def _model(self, period: float) -> DiscreteModel:
-        from paraflex.control.discrete import DiscreteModel
+        from paraflex.control.discrete import DiscreteModel, matrices_of
 
-        D, n = np.array(self.D), len(self.A)
-        A, B, C = (np.reshape(rows, shape) if n else np.zeros(shape) for rows, shape in (
-            (self.A, (n, n)), (self.B, (n, D.shape[1])), (self.C, (D.shape[0], n))))  # fmt: skip
-        return DiscreteModel(A, B, C, D, period, (), ())
+        return DiscreteModel(*matrices_of(self), period, (), ())
 
 
 @given_as("a law", "a description of a law such as PIDDescription")
@@ -289,11 +282,10 @@ class LQGDescription(CheckedFields):
                  "noise": names.inputs or names.encoders, "integrators": names.inputs or names.encoders}  # fmt: skip
         for field_name, known_names in among.items():
             given = getattr(self, field_name)
-            for name in given if isinstance(given, Mapping) else ():
-                known(name, known_names, field_name, "motor" if known_names is names.motors else "sensor")
+            if isinstance(given, Mapping):
+                all_known(given, known_names, field_name, "motor" if known_names is names.motors else "sensor")
         places = [*names.motors, *(f"{point}.{axis}" for point in names.points for axis in "xy")]
-        for name in self.coloured:
-            known(name, places, "coloured", "motor or point")
+        all_known(self.coloured, places, "coloured", "motor or point")
         used = self.made(names.outputs or names.motors, 1.0).outputs
         if names.outputs and used and set(used) != set(names.outputs):
             raise InputError("are not those of effort", field="outputs", value=", ".join(names.outputs),

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.coloured import deviation_and_filter
 from paraflex.control.controllers import Plant
+from paraflex.control.described_laws import Numbers
 from paraflex.control.estimators import quantisation_noise
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.references import OPEN_LOOP
 from paraflex.control.regulators import LQGDesign, lqg
-from paraflex.control.together import by_name, checked_number
+from paraflex.control.together import numbers_by_name
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel, linearise, reduce
 from paraflex.mechanism import mode_of_motors
 from paraflex.mechanism.quantities import finite, not_negative, positive
-
-Numbers = float | Mapping[str, float]
 
 
 class DesignedLQG:
@@ -75,14 +73,15 @@ class DesignedLQG:
             raise InputError("are none", field="deviations", remedy="give the largest that are allowed, by sensor")
         if isinstance(effort, Mapping) and not effort:
             raise InputError("there is no motor", field="effort", remedy="name one with its largest torque")
-        for field, given, unit in (
-            ("deviations", deviations, "the unit of the sensor"),
-            ("effort", effort, "N m or N"),
-            ("noise", noise, "the unit of the sensor"),
-            ("integrators", integrators, "s"),
+        for field, given, unit, check in (
+            ("deviations", deviations, "the unit of the sensor", positive),
+            ("effort", effort, "N m or N", positive),
+            ("noise", noise, "the unit of the sensor", positive),
+            ("integrators", integrators, "s", positive),
+            ("disturbance", disturbance, "N m or N", not_negative),
         ):
-            _check(given, field, unit, positive)
-        _check(disturbance, "disturbance", "N m or N", not_negative)
+            if given is not None:
+                numbers_by_name(given, tuple(given) if isinstance(given, Mapping) else (), field, unit, check)
         for name, each in (coloured or {}).items():
             deviation_and_filter(name, each)
         finite(at or 0.0, "at")
@@ -148,10 +147,3 @@ class DesignedLQG:
             raise InputError("has no noise", field="noise", value=missing[0],
                              remedy="give its standard deviation, or quantise, the resolution of readings")  # fmt: skip
         return {name: given.get(name, rounding.get(name, 0.0)) for name in plant.inputs}
-
-
-def _check(given: Any, field: str, unit: str, check: Any) -> None:
-    """Check one number, or each by its name."""
-    if given is not None:
-        names = tuple(given) if isinstance(given, Mapping) else ()
-        by_name(given, names, field, "name", partial(checked_number, unit=unit, check=check))

@@ -149,10 +149,7 @@ def matrices_of(model: Any) -> StateSpace:
     except (ValueError, NotImplementedError) as error:
         raise InputError(f"has no state space: {error}", field="model", value=model,
                          remedy="give a proper transfer function, or a state space") from None  # fmt: skip
-    A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (model.A, model.B, model.C, model.D))
-    if A.size == 0:
-        A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
-    return StateSpace(A, B, C, D)
+    return StateSpace.of(model.A, model.B, model.C, model.D)
 
 
 def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ Gymnasium is an extra: this module is imported without it, but makes no environm
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.observations import WIDEST, Observer, observed_sensors
 from paraflex.control.simulation import Simulation
+from paraflex.control.together import by_name, checked_number
 from paraflex.dynamics import State
 from paraflex.dynamics.joint_coordinates import marker_position
 from paraflex.errors import InputError, IntegrationError
@@ -23,7 +25,7 @@ from paraflex.integrators import IntegrationOptions, Method
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.mechanism.measured import measured_sensors
-from paraflex.mechanism.quantities import known, not_negative, positive
+from paraflex.mechanism.quantities import not_negative, positive
 from paraflex.tracking import TrackingTask
 
 if TYPE_CHECKING:
@@ -155,6 +157,8 @@ class Environment(Env[Array, NDArray[Any]]):
         method: Method | str | None = None,
         options: IntegrationOptions | None = None,
     ) -> None:
+        from gymnasium.spaces import Box
+
         task = source if isinstance(source, TrackingTask) else None
         if task is None and reward is None:
             raise InputError("there is no plan to follow", field="reward",
@@ -187,11 +191,6 @@ class Environment(Env[Array, NDArray[Any]]):
         self._desired = None if task is None else task.plan.follow(self._times).desired.position
         self._step: int | None = None
         self._seen: Array = np.zeros(len(self.observed))
-        self._set_spaces()
-
-    def _set_spaces(self) -> None:
-        from gymnasium.spaces import Box
-
         self.action_space: Space[Any] = Box(-1.0, 1.0, (len(self.motors),), np.float32)
         self.observation_space: Space[Any] = Box(-WIDEST, WIDEST, (len(self.observed),), np.float64)
 
@@ -325,20 +324,12 @@ def _limits(given: Any, task: TrackingTask | None, simulation: Simulation, part:
         if not peak:
             raise InputError("are missing", field="limits", remedy="give them in N m: the plan needs no torques")
         return np.full(len(motors), part * peak)
-    if isinstance(given, Mapping):
-        for name in given:
-            known(name, motors, "limits", "motor")
-        missing = [name for name in motors if name not in given]
-        if missing:
-            raise InputError(
-                f"{', '.join(missing)} missing", field="limits", value=given, remedy="give one for each motor"
-            )
-        given = [given[name] for name in motors]
-    limits = np.empty(len(motors))
-    limits[:] = given
-    for name, limit in zip(motors, limits, strict=True):
-        positive(float(limit), f"limits.{name}", "N m or N")
-    return limits
+    by_motor = given if isinstance(given, Mapping) else dict.fromkeys(motors, given)
+    found = by_name(by_motor, motors, "limits", "motor", partial(checked_number, unit="N m or N"))
+    missing = [name for name in motors if name not in found]
+    if missing:
+        raise InputError(f"{', '.join(missing)} missing", field="limits", value=given, remedy="give one for each motor")
+    return np.array([found[name] for name in motors])
 
 
 def register() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,17 +15,10 @@ from paraflex.dynamics import InputSignals, State, System, constant_signals, pac
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import Mechanism
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import all_known
 from paraflex.tracking import path_stops
 
 Torques = Sequence[float] | Mapping[str, float] | Array
-
-
-class SavedTorques(NamedTuple):
-    """Torques held (motors,), and which acted before."""
-
-    held: Array
-    log: TorqueLog
 
 
 class HeldTorques:
@@ -95,8 +87,7 @@ class HeldTorques:
             Unknown motors, other numbers of torques, none that are finite.
         """
         if isinstance(torques, Mapping):
-            for name in torques:
-                known(name, self.motors, "torques", "motor")
+            all_known(torques, self.motors, "torques", "motor")
             torques = [torques.get(name, 0.0) for name in self.motors]
         try:
             given = np.asarray(torques, dtype=float)
@@ -126,7 +117,7 @@ class HeldTorques:
         if self.limited.any():
             torques = self._within_limits(torques, state())
         changed = not np.array_equal(torques, self.held)
-        if changed or not self.log.begun:
+        if changed or not len(self.log):
             self.note(t, torques)
         if changed:
             self._write()
@@ -143,13 +134,13 @@ class HeldTorques:
         self.log.note(t, torques)
         self.held = torques
 
-    def saved(self) -> SavedTorques:
-        """What `restore` goes back to."""
-        return SavedTorques(self.held.copy(), self.log.copy())
+    def saved(self) -> tuple[Array, TorqueLog]:
+        """Torques held (motors,), and which acted before: what `restore` goes back to."""
+        return self.held.copy(), self.log.copy()
 
-    def restore(self, saved: SavedTorques) -> None:
+    def restore(self, saved: tuple[Array, TorqueLog]) -> None:
         """Go back to what `saved` gave."""
-        self.held, self.log = saved.held.copy(), saved.log.copy()
+        self.held, self.log = saved[0].copy(), saved[1].copy()
         self._write()
 
     def _within_limits(self, torques: Array, now: State) -> Array:

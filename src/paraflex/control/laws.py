@@ -27,7 +27,7 @@ from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.mechanism.measured import encoders_of
-from paraflex.mechanism.quantities import known, positive
+from paraflex.mechanism.quantities import all_known, positive
 from paraflex.tracking import TrackingTask
 
 # Parts of torques below this are rounding.
@@ -89,11 +89,7 @@ class JointPID:
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
-        if len(plant.inputs) != len(plant.outputs):
-            raise InputError(
-                f"{len(plant.inputs)} readings for {len(plant.outputs)} motors", field="inputs",
-                value=", ".join(plant.inputs), remedy="give the encoder of each motor, in their order",
-            )  # fmt: skip
+        check_pairs(plant.inputs, plant.outputs)
         gains = (gains_of(gain, plant.outputs, field) for field, gain in self._gains.items())
         self._Kp, self._Kd, self._Ki = gains
         self._period = plant.period
@@ -242,6 +238,15 @@ def task_inertia(effort: Effort) -> Array:
     return np.swapaxes(motion.basis, 1, 2) @ masses @ motion.basis
 
 
+def check_pairs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    """Raise an `InputError` unless there is a reading for each motor."""
+    if len(inputs) != len(outputs):
+        raise InputError(
+            f"{len(inputs)} readings for {len(outputs)} motors", field="inputs", value=", ".join(inputs),
+            remedy="name the encoder of each motor, in their order, or leave it out",
+        )  # fmt: skip
+
+
 def gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
     """A gain for each motor (motors,), from one for all or by motor.
 
@@ -251,8 +256,7 @@ def gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
         Unknown motors, or no numbers from zero on.
     """
     if isinstance(given, Mapping):
-        for name in given:
-            known(name, motors, field, "motor")
+        all_known(given, motors, field, "motor")
         given = [given.get(name, 0.0) for name in motors]
     try:
         gains = np.broadcast_to(np.asarray(given, dtype=float), (len(motors),)).copy()

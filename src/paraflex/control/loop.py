@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,16 +34,6 @@ class Due(NamedTuple):
     part: float
     controller: int
     torques: Array
-
-
-@dataclass
-class Done:
-    """What a controller has done so far, at its samples: times, readings, torques wanted and given."""
-
-    t: list[float] = field(default_factory=list)
-    readings: list[Array] = field(default_factory=list)
-    wanted: list[Array] = field(default_factory=list)
-    given: list[Array] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -161,7 +151,8 @@ class Loop:
         self.acting: Array = np.zeros((len(self.controllers), len(motors)))
         for k, each in enumerate(self.controllers):
             self.acting[k, self._outputs[k]] = getattr(each, "holding_torques", 0.0)
-        self.kept: list[Done] = [Done() for _ in self.controllers]
+        # Of each its samples: times, readings, torques wanted and given.
+        self.kept: list[list[tuple[float, Array, Array, Array]]] = [[] for _ in self.controllers]
         # Where the compiled time loop runs the controller.
         self.inside: SampledLaw | None = None
 
@@ -243,12 +234,9 @@ class Loop:
         wrong = [motor for motor, value in zip(outputs, torques, strict=True) if not np.isfinite(value)]
         if wrong:
             raise _not_finite(name, wrong)
-        kept, last = self.kept[k], getattr(controller, "last", None)
+        last = getattr(controller, "last", None)
         record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
-        kept.t.append(t)
-        kept.readings.append(record.readings)
-        kept.wanted.append(record.wanted)
-        kept.given.append(torques)
+        self.kept[k].append((t, record.readings, record.wanted, torques))
         return torques
 
     def keep_last(self) -> None:
@@ -276,7 +264,8 @@ class Loop:
 
     def _record(self, k: int, units: Callable[[str], str]) -> ControllerRecord:
         controller, plant = self.controllers[k], self._plants[k]
-        kept = self.kept[k] if self.inside is None else _done(self.inside)
+        done = list(zip(*self.kept[k], strict=True)) if self.inside is None else _done(self.inside)
+        t, readings, wanted, given = done or [()] * 4
         law, limits, rates = _bounds(controller, len(plant.outputs))
         return ControllerRecord(
             name=self.names[k],
@@ -286,10 +275,10 @@ class Loop:
             outputs=plant.outputs,
             input_units=plant.input_units,
             output_units=tuple(units(motor) for motor in plant.outputs),
-            t=np.array(kept.t),
-            readings=_columns(kept.readings, plant.inputs),
-            wanted=_columns(kept.wanted, plant.outputs),
-            given=_columns(kept.given, plant.outputs),
+            t=np.array(t, dtype=float),
+            readings=_columns(readings, plant.inputs),
+            wanted=_columns(wanted, plant.outputs),
+            given=_columns(given, plant.outputs),
             law=law,
             limits=limits,
             rates=rates,
@@ -328,10 +317,9 @@ def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
     return LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(motors)}')
 
 
-def _done(inside: SampledLaw) -> Done:
-    """What a controller in the compiled time loop has done so far."""
-    so_far = slice(0, int(inside.counts[SAMPLED]))
-    return Done(*(list(each[so_far]) for each in (inside.t, inside.readings, inside.wanted, inside.given)))
+def _done(inside: SampledLaw) -> list[Array]:
+    """What a controller in the compiled time loop has done so far: times, readings, torques wanted and given."""
+    return [each[: inside.counts[SAMPLED]] for each in (inside.t, inside.readings, inside.wanted, inside.given)]
 
 
 def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -> Controller:
@@ -351,7 +339,7 @@ def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -
     return controller
 
 
-def _columns(rows: Sequence[Array], names: Sequence[str]) -> Array:
+def _columns(rows: Sequence[Array] | Array, names: Sequence[str]) -> Array:
     """Rows (k, names) of samples, which may be none."""
     return np.array(rows).reshape(len(rows), len(names))
 

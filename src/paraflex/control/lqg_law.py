@@ -119,7 +119,7 @@ class LQGDesign:
         States are the estimate before the reading, and integrals.
         """
         one, L, n = self.filter, self.L, len(self.filter.A)
-        rows, _ = self._integrals
+        rows = self._integrals
         K, K_i = np.split(self.K, [n], axis=1)
         rest = np.eye(n) - L @ one.C
         C, D = np.hstack([-K @ rest, -K_i]), -K @ L
@@ -128,10 +128,9 @@ class LQGDesign:
         return StateSpace(A, np.vstack([one.A @ L + one.B @ D, rows]), C, D)
 
     @property
-    def _integrals(self) -> tuple[Array, list[int]]:
-        """What a reading adds to integrals (integrated, measured), and which readings these are."""
-        columns = [self.measured.index(name) for name in self.regulator.integrated]
-        return self.period * np.eye(len(self.measured))[columns], columns
+    def _integrals(self) -> Array:
+        """What a reading adds to integrals (integrated, measured)."""
+        return self.period * np.eye(len(self.measured))[[self.measured.index(one) for one in self.regulator.integrated]]
 
     def law(self) -> LQGLaw:
         """The law, at the beginning of a run, for `SampledController`."""
@@ -206,7 +205,7 @@ class LQGLaw:
         else:
             before = design.filter.carried_on(self.x, self._given - self.holding_torques)
             if np.array_equal(self._given, self._wanted):
-                self.integrals = self.integrals + design._integrals[0] @ self._read
+                self.integrals = self.integrals + design._integrals @ self._read
         self.x = design.filter.corrected(before, y)
         self._read = np.array(y, dtype=float)
         self._wanted = self.holding_torques - design.K @ np.concatenate([self.x, self.integrals])

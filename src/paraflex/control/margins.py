@@ -194,7 +194,7 @@ def _peak(function: Callable[[float], float], grid: Array, values: Array) -> tup
     return best
 
 
-def _highest(values: Array, count: int = 3) -> Sequence[int]:
-    """The highest local maxima among values (k,)."""
+def _highest(values: Array) -> Sequence[int]:
+    """The three highest local maxima among values (k,)."""
     inner = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])) + 1
-    return [int(k) for k in inner[np.argsort(-values[inner])][:count]]
+    return [int(k) for k in inner[np.argsort(-values[inner])][:3]]

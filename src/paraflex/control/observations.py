@@ -13,7 +13,7 @@ from paraflex.control.simulation import Simulation
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import all_known, known
 from paraflex.tracking import TrackingTask
 
 # Observations beyond are cut off there: spaces are to be bounded, and no run that goes on comes near.
@@ -101,8 +101,7 @@ def observed_sensors(given: Sequence[str] | None, simulation: Simulation) -> tup
         Unknown ones.
     """
     if given is not None:
-        for name in given:
-            known(name, simulation.sensors_read, "sensors", "sensor")
+        all_known(given, simulation.sensors_read, "sensors", "sensor")
         return tuple(given)
     mechanism, effector = simulation.mechanism, simulation.mechanism.end_effector
     joints = encoders_of(mechanism, simulation.motors)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from paraflex.control.discrete import DiscreteModel
 from paraflex.control.estimators import BackwardDifference, checked_cutoff
 from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import all_known, finite
 
 
 class RateFeedback:
@@ -44,15 +43,16 @@ class RateFeedback:
         self.outputs: tuple[str, ...] = tuple(gains)
         if not self.inputs:
             raise InputError("no gains", field="gains", remedy="give them by motor and sensor")
-        self._gains = np.array([[_gain(row.get(name, 0.0), f"gains.{motor}.{name}") for name in self.inputs]
-                                for motor, row in gains.items()])  # fmt: skip
+        for motor, row in gains.items():
+            for name, gain in row.items():
+                finite(gain, f"gains.{motor}.{name}")
+        self._gains = np.array([[row.get(name, 0.0) for name in self.inputs] for row in gains.values()], dtype=float)
         self._cutoff = checked_cutoff(cutoff)
 
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
         for names, own, what in ((plant.inputs, self.inputs, "inputs"), (plant.outputs, self.outputs, "outputs")):
-            for name in names:
-                known(name, own, what, "name")
+            all_known(names, own, what, "name")
         self._K = self._gains[np.ix_([self.outputs.index(name) for name in plant.outputs],
                                      [self.inputs.index(name) for name in plant.inputs])]  # fmt: skip
         self._rates = BackwardDifference(plant.period, self._cutoff)
@@ -72,9 +72,3 @@ class RateFeedback:
         """For the compiled time loop: states are readings before and their rates."""
         rates = self._rates.linear_law(self._K.shape[1])
         return LinearLaw(rates.A, rates.B, -self._K @ rates.C, -self._K @ rates.D, first=rates.first)
-
-
-def _gain(value: Any, field: str) -> float:
-    if not (isinstance(value, int | float | np.floating) and np.isfinite(value)):
-        raise InputError("not a finite number", field=field, value=value, remedy="give a number")
-    return float(value)

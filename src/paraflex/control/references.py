@@ -14,9 +14,9 @@ from paraflex.control.controllers import Plant
 from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion
-from paraflex.mechanism import Encoder, Mechanism, PointSensor, Sensor, Tachometer
+from paraflex.mechanism import Encoder, Mechanism, PointSensor, Tachometer
 from paraflex.mechanism.measured import measured_sensors
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import all_known
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
@@ -44,8 +44,7 @@ def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, 
         return list(planned_readings(plant))
     if isinstance(given, TrackingRun | MotionRun):
         return list(readings_in(given, plant))
-    for name in given:
-        known(name, plant.inputs, "reference", "sensor")
+    all_known(given, plant.inputs, "reference", "sensor")
     return [_reference(given[name], f"reference.{name}") if name in given else None for name in plant.inputs]
 
 
@@ -72,8 +71,8 @@ class AtSamples:
         return self.values[min(max(sample, 0), len(self.values) - 1)]
 
 
-def planned_motion(plant: Plant, ahead: float = 0.0) -> RigidMotion:
-    """The rigid motion of a plan at the samples of a controller, so much later [s].
+def planned_motion(plant: Plant) -> RigidMotion:
+    """The rigid motion of a plan at the samples of a controller.
 
     Raises
     ------
@@ -87,16 +86,14 @@ def planned_motion(plant: Plant, ahead: float = 0.0) -> RigidMotion:
     end = float(task.motion.t[-1])
     count = int(np.floor((end - plant.state.time) / plant.period * (1.0 + 1e-12))) + 1
     times = plant.state.time + plant.period * np.arange(max(count, 2))
-    return task.plan.follow(np.minimum(times + ahead, end))
+    return task.plan.follow(np.minimum(times, end))
 
 
 def planned_readings(plant: Plant) -> list[AtSamples | None]:
     """Readings on the planned motion at a controller's samples; None of sensors that it says nothing of."""
     motion = planned_motion(plant)
-    columns = {
-        name: AtSamples(plant, values) for name, values in readings_of(motion, plant.mechanism, plant.inputs).items()
-    }
-    return [columns.get(name) for name in plant.inputs]
+    found = readings_of(motion, plant.mechanism, plant.inputs)
+    return [AtSamples(plant, found[name]) if name in found else None for name in plant.inputs]
 
 
 def open_loop(plant: Plant) -> TrackingRun:
@@ -125,8 +122,7 @@ def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:
     """
     system, solution = (run.task.system if isinstance(run, TrackingRun) else run.system), run.solution
     sensors = {sensor.name: sensor for sensor in measured_sensors(system.mechanism)}
-    for name in plant.inputs:
-        known(name, sensors, "reference", "sensor")
+    all_known(plant.inputs, sensors, "reference", "sensor")
     k = solution.t.size
     reader = SensorReader(system, [sensors[name] for name in plant.inputs])
     values = reader(solution.q, solution.v, solution.a, solution.multipliers, run.applied[:k])
@@ -137,12 +133,8 @@ def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:
 def readings_of(motion: RigidMotion, mechanism: Mechanism, names: Sequence[str]) -> dict[str, Array]:
     """Readings (k,) on a rigid motion of those sensors of a mechanism that it says something of, by name."""
     sensors = {sensor.name: sensor for sensor in measured_sensors(mechanism)}
-    told: list[Sensor] = [sensors[name] for name in names if _is_told(sensors[name])]
+    told = [sensors[name] for name in names if isinstance(sensors[name], Encoder | Tachometer | PointSensor)]
     system = motion.system
     nothing = np.zeros((motion.t.size, system.m)), np.zeros((motion.t.size, len(system.mechanism.motors)))
     values = SensorReader(system, told)(motion.q, motion.v, motion.a, *nothing)
     return {sensor.name: values[:, k] for k, sensor in enumerate(told)}
-
-
-def _is_told(sensor: Sensor) -> bool:
-    return isinstance(sensor, Encoder | Tachometer | PointSensor)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
@@ -12,15 +11,15 @@ from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.coloured import DisturbedPlant, disturbed_plant
+from paraflex.control.coloured import disturbed_plant
 from paraflex.control.estimators import kalman_filter, riccati
 from paraflex.control.lqg_law import LQGDesign, Regulator
 from paraflex.control.reach import check_reach
 from paraflex.control.sampled import SampledPlant, as_sampled, places
-from paraflex.control.together import by_name, checked_number
+from paraflex.control.together import numbers_by_name
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel
-from paraflex.mechanism.quantities import not_negative, positive
+from paraflex.mechanism.quantities import not_negative
 
 # Random torques by default, as a part of the largest ones.
 _OF_EFFORT = 0.1
@@ -114,14 +113,14 @@ def lqg(
     InputError
         See `lqr`; readings that do not show a motion without friction or a vibration, which it names.
     """
-    plant, lasting = _disturbed(model, period, delay, coloured)
+    plant, lasting = disturbed_plant(model, period, delay, coloured or {})
     regulator = _regulator(plant, deviations, effort, integrators or {}, state_weights)
     measured = tuple(measured)
     C = plant.rows(measured, "measured")
     for name in regulator.integrated:
         if name not in measured:
             raise InputError("is not measured", field="integrators", value=name, remedy="name it in measured, too")
-    given = _by_name(noise, measured, "noise", "the unit of the reading")
+    given = numbers_by_name(noise, measured, "noise", "the unit of the reading")
     missing = [name for name in measured if name not in given]
     if missing:
         raise InputError("has no noise", field="noise", value=missing[0], remedy="give its standard deviation, say "
@@ -145,20 +144,6 @@ def _holding(model: Any, motors: Sequence[str]) -> Array:
     return np.array([point.torques[own.index(name)] if name in own else 0.0 for name in motors])
 
 
-def _disturbed(model: Any, period: float, delay: float, coloured: Mapping[str, Any] | None) -> DisturbedPlant:
-    if coloured:
-        return disturbed_plant(model, period, delay, coloured)
-    plant = as_sampled(model, period, delay)
-    return DisturbedPlant(plant, np.zeros((len(plant.states), 0)))
-
-
-class _Cost(NamedTuple):
-    """Weights Q (n, n) and R (motors, motors) of states with integrals."""
-
-    Q: Array
-    R: Array
-
-
 def _is_force(name: str) -> bool:
     """Whether an input is a force at a point of a linear model, and no motor."""
     return name.count(".") > 1 and name.endswith((".x", ".y"))
@@ -168,9 +153,9 @@ def _regulator(
     plant: SampledPlant, deviations: Mapping[str, float], effort: Any, integrators: Mapping[str, float], extra: Any
 ) -> Regulator:
     usable = plant.inputs if isinstance(effort, Mapping) else [name for name in plant.inputs if not _is_force(name)]
-    efforts = _by_name(effort, usable, "effort", "N m or N")
-    largest = _by_name(deviations, plant.outputs, "deviations", "the unit of the output")
-    times = _by_name(integrators, plant.outputs, "integrators", "s")
+    efforts = numbers_by_name(effort, usable, "effort", "N m or N")
+    largest = numbers_by_name(deviations, plant.outputs, "deviations", "the unit of the output")
+    times = numbers_by_name(integrators, plant.outputs, "integrators", "s")
     for name in times:
         if name not in largest:
             raise InputError("has no deviation", field="integrators", value=name, remedy="name it in deviations, too")
@@ -186,7 +171,7 @@ def _regulator(
     Q[n:, n:] = np.diag([1.0 / (largest[name] * time) ** 2 for name, time in times.items()])
     R = np.diag([1.0 / efforts[name] ** 2 for name in motors])
     check_reach(used, used.B, "effort", "is not reached by the motors", "choose other motors")
-    P = _riccati(A, B, _Cost(Q, R))
+    P = _riccati(A, B, Q, R)
     gain = scipy.linalg.solve(R + B.T @ P @ B, B.T @ P @ A, assume_a="pos")
     poles = np.linalg.eigvals(A - B @ gain)
     return Regulator(plant, motors, _of_all(gain, plant, used), tuple(times), poles)
@@ -209,9 +194,9 @@ def _with_integrals(plant: SampledPlant, names: Sequence[str]) -> tuple[Array, A
     return A, np.vstack([plant.B, np.zeros((more, plant.B.shape[1]))])
 
 
-def _riccati(A: Array, B: Array, cost: _Cost) -> Array:
+def _riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
     try:
-        return riccati(A, B, *cost)
+        return riccati(A, B, Q, R)
     except (np.linalg.LinAlgError, ValueError):
         raise InputError(
             "no feedback is the best one", field="deviations",
@@ -223,11 +208,11 @@ def _riccati(A: Array, B: Array, cost: _Cost) -> Array:
 def _disturbances(plant: SampledPlant, regulator: Regulator, given: Any, effort: Any) -> Array:
     """Covariance (n, n) of what disturbs the states from sample to sample."""
     if given is None:
-        efforts = _by_name(effort, regulator.motors, "effort", "N m or N")
+        efforts = numbers_by_name(effort, regulator.motors, "effort", "N m or N")
         given = {name: _OF_EFFORT * value for name, value in efforts.items()}
     # By name also of points of forces; one number is for the motors.
     names = plant.inputs if isinstance(given, Mapping) else regulator.motors
-    sizes = _by_name(given, names, "disturbance", "N m or N", not_negative)
+    sizes = numbers_by_name(given, names, "disturbance", "N m or N", not_negative)
     G = plant.G[:, [plant.inputs.index(name) for name in sizes]] * np.array(list(sizes.values()))
     return G @ G.T
 
@@ -246,13 +231,7 @@ def _first_estimate(plant: SampledPlant, C: Array, spread: Array) -> Array:
 
 
 def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
-    """A symmetric matrix (n, n) of all states from one of all, or of the model's own.
-
-    Raises
-    ------
-    InputError
-        Another size, numbers that are not finite, a matrix that is not symmetric and positive semidefinite.
-    """
+    """A positive semidefinite matrix (n, n) of all states from one of all, or of the model's own."""
     size = len(plant.states)
     whole = np.zeros((size, size))
     if given is None:
@@ -268,8 +247,3 @@ def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
                          remedy="give such a matrix, say X.T @ X")  # fmt: skip
     whole[: len(matrix), : len(matrix)] = matrix
     return whole
-
-
-def _by_name(given: Any, names: Sequence[str], field: str, unit: str, check: Any = positive) -> dict[str, float]:
-    """Numbers by name, of all names where one number is given."""
-    return by_name(given, names, field, "name", partial(checked_number, unit=unit, check=check))

@@ -94,11 +94,6 @@ class TorqueLog:
         self._given: list[Array] = [before]
         self._begun: list[Array] = [before]
 
-    @property
-    def begun(self) -> bool:
-        """Whether anything was given."""
-        return bool(self._times)
-
     def __len__(self) -> int:
         """How often something was given."""
         return len(self._times)

@@ -192,6 +192,8 @@ def named_matrices(model: Any) -> NamedMatrices:
     InputError
         What is no model, or a sampled one; matrices that do not fit or are not finite.
     """
+    if isinstance(model, NamedMatrices):
+        return model
     given = model if isinstance(model, tuple | list) else [getattr(model, name, None) for name in ("A", "B", "C", "D")]
     if len(given) != 4 or any(each is None for each in given):
         raise InputError("is no linear model", field="model", value=model,
@@ -200,20 +202,18 @@ def named_matrices(model: Any) -> NamedMatrices:
     if dt is not None and (dt is True or dt > 0.0):
         raise InputError("is sampled already", field="model", value=model, remedy="give the continuous model")
     try:
-        A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in given)
+        A, B, C, D = matrices = StateSpace.of(*given)
     except (TypeError, ValueError):
         raise InputError("has matrices that are none", field="model", value=model, remedy="give numbers") from None
-    n, m, p = (0 if A.size == 0 else len(A)), D.shape[1], D.shape[0]
-    if not n:
-        A, B, C = np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0))
+    n, m, p = len(A), D.shape[1], D.shape[0]
     fits = A.shape == (n, n) and B.shape == (n, m) and C.shape == (p, n)
-    if not fits or not all(np.all(np.isfinite(each)) for each in (A, B, C, D)):
-        shapes = ", ".join(f"{each.shape[0]} x {each.shape[1]}" for each in (A, B, C, D))
+    if not fits or not all(np.all(np.isfinite(each)) for each in matrices):
+        shapes = ", ".join(f"{each.shape[0]} x {each.shape[1]}" for each in matrices)
         raise InputError("has matrices that do not fit together, or are not finite", field="model", value=shapes,
                          remedy="give A (n, n), B (n, m), C (p, n), D (p, m)")  # fmt: skip
     names = (names_of(model, what, letter, count) for what, letter, count in
              (("state", "x", n), ("input", "u", m), ("output", "y", p)))  # fmt: skip
-    return NamedMatrices(StateSpace(A, B, C, D), *names)
+    return NamedMatrices(matrices, *names)
 
 
 def names_of(model: Any, what: str, letter: str, count: int) -> tuple[str, ...]:

@@ -13,11 +13,11 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.described import ControllerDescription
-from paraflex.control.held import HeldTorques, SavedTorques, Torques
+from paraflex.control.held import HeldTorques, Torques
 from paraflex.control.inside import sampled_law
 from paraflex.control.loop import LawFailure, Loop
 from paraflex.control.readings import Readings
-from paraflex.control.runs import ControlledMotion, ControlledTracking
+from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
 from paraflex.control.together import SAME, is_number
 from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
@@ -50,7 +50,7 @@ class Saved:
 
     time: float
     kept: Kept
-    torques: SavedTorques
+    torques: tuple[Array, TorqueLog]
     loop: Loop | None
     controllers: Any
 
@@ -128,7 +128,9 @@ class Simulation:
         planned = FeedForward(self.mode, (), np.zeros(0), np.zeros(0))
         self._fed_forward = feed_forward
         if isinstance(source, TrackingTask):
-            _refuse(source, duration=duration, start=start)
+            for name, value in (("duration", duration), ("start", start)):
+                if value is not None:
+                    raise InputError("a plan says it itself", field=name, value=value, remedy="leave it out")
             # Brakes are not for motors under control.
             task = replace(source, after=Ending.FREE)
             self.task = task.balanced(self.mode) if balanced else task
@@ -280,9 +282,8 @@ class Simulation:
         except KeyboardInterrupt:
             self._integration.interrupt()
         except LawFailure as failure:
-            moment = self._moment()
-            cause = f"{failure}"
-            partial = self._made(replace(self._solution(), status="failed", message=f"{cause} at {moment}"))
+            cause, moment = str(failure), Moment(self.time, self._integration.run.attempts)
+            partial = self._made(replace(self._integration.solution(), status="failed", message=f"{cause} at {moment}"))
             raise ControllerError(cause, moment, partial, "mend the controller") from failure.__cause__
         made = self.result()
         if warning:
@@ -329,7 +330,7 @@ class Simulation:
             It cannot go on; it carries the run so far.
         """
         try:
-            solution = self._solution()
+            solution = self._integration.solution()
         except IntegrationError as error:
             with_blame(error, self.mechanism)
             error.partial = self._made(error.partial)
@@ -340,9 +341,6 @@ class Simulation:
         return self._made(solution)
 
     # --- Within ---
-
-    def _solution(self) -> Solution:
-        return self._integration.solution()
 
     def _made(self, solution: Solution) -> ControlledTracking | ControlledMotion:
         """The run with a solution."""
@@ -362,9 +360,6 @@ class Simulation:
         return ControlledTracking(self.task, self._torques.planned, self._condition, solution, title,
                                   acting=given[:k] + planned, commanded=commanded[:k] + planned,
                                   controllers=records)  # fmt: skip
-
-    def _moment(self) -> Moment:
-        return Moment(self.time, self._integration.run.attempts)
 
     def _use(self, loop: Loop | None) -> None:
         """Let these controllers act."""
@@ -448,10 +443,3 @@ def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMo
     if mode is None:
         return mode_of_motors(mechanism, [motor.name for motor in mechanism.motors])
     return mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
-
-
-def _refuse(task: TrackingTask, **given: Any) -> None:
-    """Refuse what a plan says itself."""
-    for name, value in given.items():
-        if value is not None:
-            raise InputError("a plan says it itself", field=name, value=value, remedy="leave it out")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import known, positive
+from paraflex.mechanism.quantities import all_known, known, positive
 
 # Instants closer than this part of the shortest period are one.
 SAME = 1e-9
@@ -56,9 +57,15 @@ def by_name(
     """
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, take(given, field))
-    for name in given:
-        known(name, names, field, what)
+    all_known(given, names, field, what)
     return {name: take(value, f"{field}.{name}") for name, value in given.items()}
+
+
+def numbers_by_name(
+    given: Any, names: Sequence[str], field: str, unit: str, check: Callable[..., None] = positive
+) -> dict[str, float]:
+    """Numbers by name, of every name where one number is given for all: see `by_name` and `checked_number`."""
+    return by_name(given, names, field, "name", partial(checked_number, unit=unit, check=check))
 
 
 def check_distinct(names: Sequence[str], among: Collection[str], field: str, what: str) -> None:

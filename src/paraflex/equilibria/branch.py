@@ -305,12 +305,7 @@ class Branch:
         longest: float = np.inf,
         counted: list[int] | None = None,
     ) -> Unknowns:
-        """Newton's iteration to an equilibrium, across a direction, or at a fraction.
-
-        Raises
-        ------
-        _Failed
-        """
+        """Newton's iteration to an equilibrium, across a direction, or at a fraction; else `_Failed`."""
         at, before = begin, np.inf
         for number in range(1, _MOST_ITERATIONS + 1):
             f, phi = self.equations.residual(at)

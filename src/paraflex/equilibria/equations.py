@@ -24,21 +24,18 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System
 from paraflex.dynamics.constraints import coordinate_kind
-from paraflex.dynamics.signals import acting_loads, moment_signals
+from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
 from paraflex.dynamics.stiffness import RestingForces
-from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
 from paraflex.equilibria.given import Conditions, Coordinate
-from paraflex.kernel.packed import CONSTRAINT, Signals
-from paraflex.linear.coordinates import Coordinates, unit_in
+from paraflex.kernel.packed import CONSTRAINT
+from paraflex.linear.coordinates import Coordinates, unit_in, with_coordinates
 from paraflex.linear.independent import independent_dense, independent_sparse
-from paraflex.mechanism import GROUND, ConstantSpeed, PointRef, PrescribedAngle, RevoluteJoint
-from paraflex.mechanism.cut import Cut
+from paraflex.mechanism import PointRef
 
 # A matrix of fewer entries has its independent rows found by a QR factorisation, others by elimination.
 _DENSE_ENTRIES = 400_000
-_ORIGIN = "origin of named coordinates"
 
 
 class Unknowns(NamedTuple):
@@ -90,23 +87,14 @@ class Equations:
     @cached_property
     def extended(self) -> System:
         """The system with a row for every named coordinate."""
-        mechanism = self.system.mechanism
-        prescribed = {one.joint for one in mechanism.prescribed}
-        origin, pins, more = PointRef(GROUND, _ORIGIN), {}, []
-        cut = mechanism.cut or Cut(mechanism, {}, {})
+        cut = self.system.mechanism.cut
+        joints, pins = [], {}
         for one in self.given.coordinates:
             if one.point is not None:
-                pins[_pin(one.point)] = RevoluteJoint(_pin(one.point), origin, cut.points.get(one.point, one.point))
-            if one.point is None and one.name not in prescribed:
-                more.append(one.name)
-            elif one.point is not None and one.axis == "angle":
-                more.append(_pin(one.point))
-        laws = (PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0)) for joint in more)
-        extended = replace(
-            mechanism, ground={**mechanism.ground, _ORIGIN: (0.0, 0.0)}, joints=(*mechanism.joints, *pins.values()),
-            prescribed=(*mechanism.prescribed, *laws), cut=cut,
-        )  # fmt: skip
-        return with_constraints_of(self.system, extended)
+                pins[_pin(one.point)] = one.point if cut is None else cut.points.get(one.point, one.point)
+            if one.point is None or one.axis == "angle":
+                joints.append(one.name if one.point is None else _pin(one.point))
+        return with_coordinates(self.system, joints, pins)
 
     @cached_property
     def own(self) -> NDArray[np.int64]:
@@ -115,7 +103,7 @@ class Equations:
         return np.array([number[name] for name in self.system.rows], dtype=int)
 
     @cached_property
-    def _row_numbers(self) -> dict[Coordinate, int]:
+    def number(self) -> dict[Coordinate, int]:
         """The row of every named coordinate in the extended system."""
         mechanism, names = self.extended.mechanism, {name: k for k, name in enumerate(self.extended.rows)}
         law = {one.joint: one.name for one in mechanism.prescribed}
@@ -128,15 +116,11 @@ class Equations:
                 numbers[one] = names[f"{law[joint]} {coordinate_kind(mechanism.joint(joint))}"]
         return numbers
 
-    def number(self, coordinate: Coordinate) -> int:
-        """The row of a coordinate in the extended system."""
-        return self._row_numbers[coordinate]
-
     @cached_property
     def holding(self) -> NDArray[np.int64]:
         """Rows that must keep their value or follow a change: constraints, and coordinates held or moved."""
         own = [k for k in self.own.tolist() if self.extended.packed.rows["kind"][k] == CONSTRAINT]
-        extra = [self.number(one) for one in (*self.given.held, *self.given.moved)]
+        extra = [self.number[one] for one in (*self.given.held, *self.given.moved)]
         return np.array(list(dict.fromkeys([*own, *extra])), dtype=int)
 
     @cached_property
@@ -144,27 +128,19 @@ class Equations:
         """Change of the rows `holding` with all that is given (rows,)."""
         change, place = np.zeros(self.holding.size), {row: k for k, row in enumerate(self.holding.tolist())}
         for one, value in self.given.moved.items():
-            change[place[self.number(one)]] = value
+            change[place[self.number[one]]] = value
         return change
 
     @cached_property
     def _loaded(self) -> tuple[NDArray[np.int64], Array]:
         """Rows at which forces act, and the forces."""
-        rows = np.array([self.number(one) for one in self.given.loads], dtype=int)
+        rows = np.array([self.number[one] for one in self.given.loads], dtype=int)
         return rows, np.array(list(self.given.loads.values()), dtype=float)
-
-    @cached_property
-    def _signals(self) -> Signals:
-        return moment_signals(self.extended.mechanism, self.start.time)
-
-    @cached_property
-    def _acting(self) -> Array:
-        return acting_loads(self.extended.mechanism, np.array([self.start.time]))[0]
 
     @cached_property
     def _forces(self) -> RestingForces:
         forces = RestingForces(self.extended, self.start.time)
-        forces.torques = self._acting
+        forces.torques = acting_loads(self.extended.mechanism, np.array([self.start.time]))[0]
         return forces
 
     @cached_property
@@ -191,7 +167,7 @@ class Equations:
 
     def values(self, q: Array) -> Array:
         """Values (rows,) of all rows of the extended system at coordinates (n,): of named coordinates their own."""
-        return self.extended.constraints(self._signals, self.start.time, q)[0]
+        return self.extended.constraints(self._forces.signals, self.start.time, q)[0]
 
     @cached_property
     def at_start(self) -> Array:
@@ -216,7 +192,7 @@ class Equations:
     def matrices(self, at: Unknowns) -> Matrices:
         """Derivatives at a point."""
         still = np.zeros(self.system.n)
-        point = MotionPoint(self.start.time, at.q, still, still, self.multipliers(at), self._acting)
+        point = MotionPoint(self.start.time, at.q, still, still, self.multipliers(at), self._forces.torques)
         found = self._tangency.at(point)
         rows, efforts = self._loaded
         held, loaded = (rows_of(np.searchsorted(found.rows, wanted), found.jacobian)[0]
@@ -227,7 +203,7 @@ class Equations:
     def rows_named(self, coordinates: Sequence[Coordinate], q: Array) -> csr_matrix:
         """Derivatives (coordinates, n) of named coordinates."""
         jacobian = self._tangency.inertia(self.start.time, q)[1]
-        return rows_of(np.array([self.number(one) for one in coordinates], dtype=int), jacobian)[0]
+        return rows_of(np.array([self.number[one] for one in coordinates], dtype=int), jacobian)[0]
 
     def guess(self) -> Unknowns:
         """The start, with the multipliers that would hold it best."""

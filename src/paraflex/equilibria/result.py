@@ -147,12 +147,12 @@ class Statics(Shown):
     @checked_arguments()
     def place(self, name: str) -> Array:
         """Value (k,) of a named coordinate [m, rad]."""
-        return self._values[:, self.equations.number(self._named(name))]
+        return self._values[:, self._row(name)]
 
     @checked_arguments()
     def travel(self, name: str) -> Array:
         """Change (k,) of a named coordinate since the start [m, rad]."""
-        number = self.equations.number(self._named(name))
+        number = self._row(name)
         return self._values[:, number] - self.equations.values(self.equations.start.q)[number]
 
     @checked_arguments()
@@ -161,12 +161,12 @@ class Statics(Shown):
 
         Of least norm where it is not determined; see `known_effort`.
         """
-        return -self.multipliers[:, self.equations.number(self._named(name))]
+        return -self.multipliers[:, self._row(name)]
 
     @checked_arguments()
     def known_effort(self, name: str) -> Array:
         """The same (k,), NaN where redundant rows share it in any way: two drives that hold one motion."""
-        number, units = self.equations.number(self._named(name)), self.equations.extended.row_units
+        number, units = self._row(name), self.equations.extended.row_units
         free = [one.self_stresses(units)[:, number] * units[number] for one in self._dependence]
         return np.where([np.any(np.abs(one) > NO_PART) for one in free], np.nan, self.effort(name))
 
@@ -177,13 +177,13 @@ class Statics(Shown):
         known(name, names, "stiffness", "direction with a stiffness")
         return np.array([one.stiffness[names.index(name)] for one in self.equilibria])
 
-    def _named(self, name: str) -> Coordinate:
-        for one in self.coordinates:
-            if one.name == name:
-                return one
-        names = [one.name for one in self.coordinates]
-        raise InputError("is no coordinate of these equilibria", field="name", value=name,
-                         remedy=f"{suggestion(name, names)}; name it in `stiffness` to have it")  # fmt: skip
+    def _row(self, name: str) -> int:
+        """Row of a named coordinate in the extended system."""
+        rows = {one.name: number for one, number in self.equations.number.items()}
+        if name not in rows:
+            raise InputError("is no coordinate of these equilibria", field="name", value=name,
+                             remedy=f"{suggestion(name, rows)}; name it in `stiffness` to have it")  # fmt: skip
+        return rows[name]
 
     @cached_property
     def solution(self) -> Solution:

@@ -189,7 +189,7 @@ def stiffness(equations: Equations, at: Unknowns, found: Matrices, directions: S
     wanted = equations.rows_named(directions, at.q)
     out = np.zeros(len(directions))
     for k, one in enumerate(directions):
-        others = np.nonzero(equations.holding != equations.number(one))[0]
+        others = np.nonzero(equations.holding != equations.number[one])[0]
         rows, row = csr_matrix(found.rows[others]), csr_matrix(wanted[k])
         kept, free = equations.independent(rows, row)
         if not free.size:

@@ -133,7 +133,7 @@ def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibri
     found = equations.matrices(point.at)
     vibration = free = vibrations(equations, found)
     if equations.given.moved:
-        moved = [equations.number(one) for one in equations.given.moved]
+        moved = [equations.number[one] for one in equations.given.moved]
         kept = np.flatnonzero(~np.isin(equations.holding, moved))
         free = vibrations(equations, found._replace(rows=csr_matrix(found.rows[kept])))
     return Equilibrium(

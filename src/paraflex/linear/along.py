@@ -11,10 +11,10 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State
 from paraflex.dynamics.joint_coordinates import marker_place
-from paraflex.errors import InputError, as_enum
+from paraflex.errors import InputError
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import FirstCoordinates, coordinates_of
-from paraflex.linear.linearise import mechanism_of, mode_of, moving, ports_of
+from paraflex.linear.coordinates import FirstCoordinates
+from paraflex.linear.linearise import charted
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import resting_point
 from paraflex.linear.varying import in_one_chart
@@ -76,10 +76,7 @@ def poses_along(
     SingularPositionError
         No coordinates describe the motion in all poses.
     """
-    mechanism = mechanism_of(source)
-    ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
-    motion = moving(source, ports.mode)
-    chart = coordinates_of(motion.system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
+    motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
     far, unit = _lengths(source)
     samples = _evenly(far, count)
     still = np.zeros(motion.system.n)

@@ -8,7 +8,7 @@ joints the end-effector's place and angle may come first.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
@@ -29,13 +29,14 @@ from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents, rows_of
 from paraflex.errors import InputError
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
+from paraflex.mechanism.cut import Cut
 
 # A matrix of so many entries BLAS factors in one thread.
 _FEW_ENTRIES = 8192
 # Places and angles of bodies count as much less than flexible coordinates: they are chosen last.
 _LAST = 1e-5
 # A pin between the end-effector and the ground frame's origin, whose rows are the end-effector's coordinates.
-_TASK = "the end-effector"
+_TASK, _ORIGIN = "the end-effector", "origin of named coordinates"
 
 
 class Variable(NamedTuple):
@@ -188,19 +189,9 @@ class Coordinates:
     @cached_property
     def tangency(self) -> Tangency:
         """Of the system with a row for every coordinate of `measured`, which holds nothing."""
-        mechanism, held = self.system.mechanism, {one.joint for one in self.system.mechanism.prescribed}
-        more = tuple(PrescribedAngle(_row(joint), joint, ConstantSpeed(0.0, 0.0))
-                     for joint in (*self.joints, *([_TASK] if "angle" in self.task else [])) if joint not in held
-                     )  # fmt: skip
-        if not (more or self.task):
-            return Tangency(self.system)
-        if self.task:
-            origin = PointRef(GROUND, _TASK)
-            mechanism = replace(
-                mechanism, ground={**mechanism.ground, _TASK: (0.0, 0.0)},
-                joints=(*mechanism.joints, RevoluteJoint(_TASK, origin, self._effector)),
-            )  # fmt: skip
-        return Tangency(with_constraints_of(self.system, replace(mechanism, prescribed=(*mechanism.prescribed, *more))))
+        angle = [_TASK] if "angle" in self.task else []
+        pins = {_TASK: self._effector} if self.task else {}
+        return Tangency(with_coordinates(self.system, (*self.joints, *angle), pins))
 
     @cached_property
     def _rows(self) -> tuple[dict[str, int], NDArray[np.int64]]:
@@ -351,8 +342,21 @@ def coordinates_of(
     return Coordinates(system, (*joints, *(known[name] for name in driven)), driven, task)
 
 
-def _row(joint: str) -> str:
-    return f"coordinate of {joint}"
+def with_coordinates(system: System, joints: Iterable[str], pins: Mapping[str, PointRef]) -> System:
+    """The system with rows that hold nothing: coordinates of joints, and places of points by pins to the origin.
+
+    Pins are joints by name, whose angles may be among the coordinates; prescribed joints have their rows already.
+    """
+    mechanism, origin = system.mechanism, PointRef(GROUND, _ORIGIN)
+    driven = {one.joint for one in mechanism.prescribed}
+    laws = [PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0))
+            for joint in joints if joint not in driven]  # fmt: skip
+    pinned = [RevoluteJoint(name, origin, point) for name, point in pins.items()]
+    extended = replace(
+        mechanism, ground={**mechanism.ground, _ORIGIN: (0.0, 0.0)}, joints=(*mechanism.joints, *pinned),
+        prescribed=(*mechanism.prescribed, *laws), cut=mechanism.cut or Cut(mechanism, {}, {}),
+    )  # fmt: skip
+    return with_constraints_of(system, extended)
 
 
 def unit_in(rows: csr_matrix, scale: Array) -> csr_matrix:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from paraflex.arguments import checked_arguments
@@ -176,7 +175,8 @@ def transitions(times: Array, A: Array, B: Array, ends: Array, hold: InputHold) 
     if parts > 1 or ends.size == 2:
         parts = 2 * math.ceil(0.5 * parts)
     grid = np.interp(np.arange((ends.size - 1) * parts + 1) / parts, np.arange(ends.size), ends)
-    every, second = (_Held(times[k], A[k], B[k], unit) for k in (slice(None), _every_second(times.size)))
+    halved = np.unique([*range(0, times.size, 2), times.size - 1])
+    every, second = (_Held(times[k], A[k], B[k], unit) for k in (slice(None), halved))
     steps = np.array([every.step(*step) for step in pairwise(grid)])
     n, m = B.shape[1:]
     whole = _composed(steps, parts)
@@ -204,10 +204,6 @@ class _Held:
         first, last = (self._at(start + place * h) for place in _PLACES)
         earlier, later = (h * (_WEIGHTS[k] * first + _WEIGHTS[1 - k] * last) for k in (1, 0))
         return scipy.linalg.expm(later) @ scipy.linalg.expm(earlier)
-
-
-def _every_second(samples: int) -> NDArray[np.int64]:
-    return np.unique([*range(0, samples, 2), samples - 1])
 
 
 def _composed(steps: Array, parts: int) -> Array:

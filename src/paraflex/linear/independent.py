@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -86,8 +86,13 @@ def successive(rows: Array, basis: Array) -> tuple[list[int], Array]:
 
 def unit_rows(rows: Array) -> Array:
     """Rows of size one, those of zeros as they are."""
-    size = np.linalg.norm(rows, axis=1, keepdims=True)
-    return rows / np.where(size > 0.0, size, 1.0)
+    return rows / sizes(rows, 1)
+
+
+def sizes(matrix: NDArray[Any], axis: int) -> Array:
+    """Sizes of a matrix' rows (rows, 1), along axis 1, or of its columns (1, columns); one for those of zeros."""
+    size = np.linalg.norm(matrix, axis=axis, keepdims=True)
+    return np.where(size > 0.0, size, 1.0)
 
 
 def independent_sparse(groups: Sequence[csr_matrix], weights: Array) -> Independent:

@@ -145,21 +145,20 @@ def sought_motion(
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
 ) -> Sought:
     """The point of a motion that is linearised about: see `linearise`."""
-    mechanism = source if isinstance(source, Mechanism) else mechanism_of(source)
+    if isinstance(source, TrackingTask | TrackingRun | MotionRun):
+        motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
+        point = motion.point(0 if at is None else nearest_sample(motion.times, at))
+        return Sought(chart, point, ports, motion.about)
+    mechanism = Mechanism.made_of(source)
     chosen = mode_of(source, mechanism, mode)
     ports = ports_of(mechanism, chosen, forces, prescribed)
-    first = as_enum(FirstCoordinates, coordinates, "coordinates")
-    if isinstance(source, TrackingTask | TrackingRun | MotionRun):
-        about, system, times, point_at = moving(source, chosen)
-        point = point_at(0 if at is None else nearest_sample(times, at))
-        return Sought(coordinates_of(system, ports.prescribed, first), point, ports, about)
     given = start if start is not None or isinstance(source, Mechanism) else source.start
     system = standing_system(mechanism, given, assembly)
     state = pose_at_rest(system, given, assembly)
     if balanced:
         joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
         state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
-    chart = coordinates_of(system, ports.prescribed, first)
+    chart = coordinates_of(system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
     point, unbalanced = resting_point(chart, state, chosen)
     return Sought(chart, point, ports, "static equilibrium" if balanced else "a pose at rest", unbalanced)
 
@@ -204,11 +203,17 @@ def linear_model(
     )
 
 
-def mechanism_of(source: ModelWithPaths | TrackingTask | TrackingRun | MotionRun) -> Mechanism:
-    """The mechanism that is linearised."""
-    if isinstance(source, TrackingRun):
-        return source.task.mechanism
-    return source.system.mechanism if isinstance(source, MotionRun) else source.mechanism
+def charted(
+    source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
+    prescribed: Sequence[str], coordinates: FirstCoordinates | str,
+) -> tuple[Moving, Ports, Coordinates]:  # fmt: skip
+    """A motion, what goes into linear models along it and comes out, and the coordinates that they choose from."""
+    task = source.task if isinstance(source, TrackingRun) else source
+    mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism
+    ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
+    motion = moving(source, ports.mode)
+    first = as_enum(FirstCoordinates, coordinates, "coordinates")
+    return motion, ports, coordinates_of(motion.system, ports.prescribed, first)
 
 
 def mode_of(source: object, mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:

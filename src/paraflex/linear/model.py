@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
@@ -24,11 +24,8 @@ from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
-from paraflex.linear.named import Names, control_model, labelled_model, not_at_poles, numbers_of, places_in_s
-from paraflex.linear.zeros import StateSpace, Vibrating, vibrating_zeros, zeros
-
-if TYPE_CHECKING:
-    import xarray as xr
+from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
+from paraflex.linear.zeros import StateSpace, Vibrating, by_size, vibrating_zeros, zeros
 
 Complex = NDArray[np.complex128]
 # Stiffness is symmetric at rest but for this part of it.
@@ -38,7 +35,7 @@ _DENSE_FREEDOMS = 200
 
 
 @dataclass(frozen=True)
-class LinearModel:
+class LinearModel(NamedModel):
     """Small changes of a mechanism's motion: x' = A x + B u, y = C x + D u.
 
     States are minimal coordinates and then their rates: angles and travels of the joints with motors, elastic
@@ -326,8 +323,8 @@ class LinearModel:
         vibrates = self.at_rest and uneven <= _SYMMETRIC * scipy.sparse.linalg.norm(whole.stiffness)
         if vibrates and not np.any(whole.damping.data):
             root = np.sqrt(-slow.squares.astype(complex))
-            return _by_size(np.concatenate([np.zeros(2 * driven, dtype=complex), root, -root]))[:count]
-        found = _by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
+            return by_size(np.concatenate([np.zeros(2 * driven, dtype=complex), root, -root]))[:count]
+        found = by_size(poles_near(self.minimal, np.sqrt(slow.shift), count + 2))
         free = (slow.squares == 0.0) & ~np.any(whole.damping @ slow.shapes, axis=0) & vibrates
         found[: 2 * (int(free.sum()) + (driven if vibrates else 0))] = 0.0
         return found[:count]
@@ -416,29 +413,6 @@ class LinearModel:
             wanted=(self.wanted[0][chosen[0]], self.wanted[1][chosen[1]]),
         )
 
-    def to_scipy(self) -> scipy.signal.StateSpace:
-        """The model as SciPy's."""
-        return scipy.signal.StateSpace(*self.state_space)
-
-    def to_control(self) -> Any:
-        """The model as python-control's; dots and spaces in names become underscores, as it takes none.
-
-        Raises
-        ------
-        InputError
-            python-control is not installed.
-        """
-        return control_model(self.mechanism, self.state_space, self._names)
-
-    def to_xarray(self) -> xr.Dataset:
-        """A, B, C and D by names of states, inputs and outputs, with units."""
-        attrs = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}
-        return labelled_model(self.state_space, self._names, attrs)
-
     @property
-    def _names(self) -> Names:
-        return Names(self.states, self.inputs, self.outputs)
-
-
-def _by_size(values: Complex) -> Complex:
-    return values[np.argsort(np.abs(values), kind="stable")]
+    def _attributes(self) -> dict[str, Any]:
+        return {"mechanism": self.mechanism, "mode": self.mode, "about": self.about, "time": self.time}

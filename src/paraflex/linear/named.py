@@ -3,58 +3,56 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable, named_axes
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import finite
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-class Names(NamedTuple):
-    """States, inputs and outputs of a linear model."""
+class NamedModel:
+    """The forms of SciPy, python-control and xarray of a linear model with named states, inputs and outputs."""
 
-    states: tuple[Variable, ...]
-    inputs: tuple[Variable, ...]
-    outputs: tuple[Variable, ...]
+    def to_scipy(self: Any) -> scipy.signal.StateSpace:
+        """The model as SciPy's."""
+        return scipy.signal.StateSpace(*self.state_space)
 
+    def to_control(self: Any) -> Any:
+        """The model as python-control's; dots and spaces in names become underscores, as it takes none.
 
-def control_model(title: str, matrices: StateSpace, names: Names) -> Any:
-    """The model as python-control's; dots and spaces in names become underscores, as it takes none.
+        Raises
+        ------
+        InputError
+            python-control is not installed.
+        """
+        try:
+            control = importlib.import_module("control")
+        except ImportError:
+            raise InputError(
+                "python-control is not installed", field="to_control",
+                remedy='install it: pip install "paraflex[control]"',
+            ) from None  # fmt: skip
+        plain = {key: [plain_name(one.name) for one in getattr(self, key)] for key in ("states", "inputs", "outputs")}
+        return control.ss(*self.state_space, name=plain_name(self._attributes["mechanism"]), **plain)
 
-    Raises
-    ------
-    InputError
-        python-control is not installed.
-    """
-    try:
-        control = importlib.import_module("control")
-    except ImportError:
-        raise InputError(
-            "python-control is not installed", field="to_control",
-            remedy='install it: pip install "paraflex[control]"',
-        ) from None  # fmt: skip
-    plain = {key: [plain_name(one.name) for one in values] for key, values in names._asdict().items()}
-    return control.ss(*matrices, name=plain_name(title), **plain)
+    def to_xarray(self: Any) -> xr.Dataset:
+        """A, B, C and D by names of states, inputs and outputs, with units."""
+        import xarray as xr
 
-
-def labelled_model(matrices: StateSpace, names: Names, attributes: Mapping[str, Any]) -> xr.Dataset:
-    """A, B, C and D by names of states, inputs and outputs, with units."""
-    import xarray as xr
-
-    dimensions = {
-        "A": ("state", "state_of"), "B": ("state", "input"), "C": ("output", "state_of"), "D": ("output", "input"),
-    }  # fmt: skip
-    data = {key: (dimensions[key], values) for key, values in matrices._asdict().items()}
-    return xr.Dataset(data, coords=named_axes(*names), attrs=attributes)
+        dimensions = {
+            "A": ("state", "state_of"), "B": ("state", "input"), "C": ("output", "state_of"), "D": ("output", "input"),
+        }  # fmt: skip
+        data = {key: (dimensions[key], values) for key, values in self.state_space._asdict().items()}
+        return xr.Dataset(data, coords=named_axes(self.states, self.inputs, self.outputs), attrs=self._attributes)
 
 
 def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> NDArray[np.complex128]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
@@ -19,11 +19,8 @@ from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import SecondOrder, motions
-from paraflex.linear.named import Names, control_model, labelled_model, not_at_poles, numbers_of, places_in_s
-from paraflex.linear.zeros import StateSpace, zeros
-
-if TYPE_CHECKING:
-    import xarray as xr
+from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
+from paraflex.linear.zeros import StateSpace, by_size, zeros
 
 Complex = NDArray[np.complex128]
 
@@ -38,7 +35,7 @@ class ReductionMethod(Enum):
 
 
 @dataclass(frozen=True)
-class ReducedModel:
+class ReducedModel(NamedModel):
     """A linear model of few states: x' = A x + B u, y = C x + D u.
 
     Attributes
@@ -152,8 +149,7 @@ class ReducedModel:
 
     def poles(self) -> Complex:
         """Poles, by magnitude [rad/s]."""
-        found = np.asarray(scipy.linalg.eigvals(self.A), dtype=complex)
-        return found[np.argsort(np.abs(found), kind="stable")]
+        return by_size(np.asarray(scipy.linalg.eigvals(self.A), dtype=complex))
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
         """Transmission zeros between some inputs and some outputs, by default all: see `LinearModel.zeros`."""
@@ -188,23 +184,7 @@ class ReducedModel:
         few = self.frequency_response(frequencies)[:, rows]
         return np.linalg.norm(few - full, 2, axis=(1, 2)) / np.linalg.norm(full, 2, axis=(1, 2))
 
-    def to_scipy(self) -> scipy.signal.StateSpace:
-        """The model as SciPy's."""
-        return scipy.signal.StateSpace(*self.state_space)
-
-    def to_control(self) -> Any:
-        """The model as python-control's: see `LinearModel.to_control`."""
-        return control_model(self.full.mechanism, self.state_space, self._names)
-
-    def to_xarray(self) -> xr.Dataset:
-        """A, B, C and D by names of states, inputs and outputs, with units."""
-        full = self.full
-        attrs = {
-            "mechanism": full.mechanism, "mode": full.mode, "about": full.about, "time": full.time,
-            "method": self.method.value, **({} if self.bound is None else {"bound": self.bound}),
-        }  # fmt: skip
-        return labelled_model(self.state_space, self._names, attrs)
-
     @property
-    def _names(self) -> Names:
-        return Names(self.states, self.inputs, self.outputs)
+    def _attributes(self) -> dict[str, Any]:
+        own = {"method": self.method.value, **({} if self.bound is None else {"bound": self.bound})}
+        return self.full._attributes | own

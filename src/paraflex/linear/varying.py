@@ -24,18 +24,9 @@ from paraflex.dynamics import sensor_readings
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, coordinates_of, named_axes
+from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, named_axes
 from paraflex.linear.discrete import InputHold, Predicted, SampledModel, transitions
-from paraflex.linear.linearise import (
-    Moving,
-    Ports,
-    linear_model,
-    mechanism_of,
-    mode_of,
-    moving,
-    nearest_sample,
-    ports_of,
-)
+from paraflex.linear.linearise import Ports, charted, linear_model, moving, nearest_sample
 from paraflex.linear.minimal import Minimal
 from paraflex.linear.model import LinearModel
 from paraflex.mechanism import ActuationMode
@@ -155,7 +146,7 @@ class VaryingModel:
         size = np.linalg.norm(there @ self.B[0], axis=0)
         size = np.where(size > 0.0, size, 1.0)
         found = transitions(self.times, there @ self.A @ back, there @ self.B / size, times, hold)
-        C, D = (_interpolated(self.times, each, times) for each in (self.C, self.D))
+        C, D = (make_interp_spline(self.times, each, k=3)(times) for each in (self.C, self.D))
         return SampledModel(
             self.states, self.inputs, self.outputs, times, hold, Phi=back @ found.Phi @ there,
             Gamma=back @ found.Gamma * size, Gamma_next=back @ found.Gamma_next * size, C=C, D=D, error=found.error,
@@ -225,28 +216,19 @@ def linearise_along(
     SingularPositionError
         A singular position, at which no coordinates describe the motion.
     """
-    mechanism = mechanism_of(source)
-    ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
-    motion = moving(source, ports.mode)
+    motion, ports, choice = charted(source, mode, forces, prescribed, coordinates)
     given = range(motion.times.size) if times is None else [nearest_sample(motion.times, at) for at in times]
     samples = np.unique(given).tolist()
     if len(samples) < _FEWEST:
         raise InputError("too few samples of the motion", field="times", value=len(samples),
                          remedy=f"give at least {_FEWEST} different ones")  # fmt: skip
     points = [motion.point(k) for k in samples]
-    choice = coordinates_of(motion.system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
-    return _model(motion, points, choice, ports)
-
-
-def _model(motion: Moving, points: Sequence[MotionPoint], coordinates: Coordinates, ports: Ports) -> VaryingModel:
-    """The model at points of a motion."""
-    about = motion.about
-    chosen, found = in_one_chart(points, coordinates, ports, about, lambda model: model.state_space)
-    first, (A, B, C, D) = linear_model(coordinates, points[0], ports, about, chosen=chosen), zip(*found, strict=True)
+    chosen, found = in_one_chart(points, choice, ports, motion.about, lambda model: model.state_space)
+    first, (A, B, C, D) = linear_model(choice, points[0], ports, motion.about, chosen=chosen), zip(*found, strict=True)
     return VaryingModel(
-        mechanism=first.mechanism, mode=first.mode, about=about, states=first.states, inputs=first.inputs,
+        mechanism=first.mechanism, mode=first.mode, about=first.about, states=first.states, inputs=first.inputs,
         outputs=first.outputs, times=np.array([point.time for point in points]), A=np.array(A), B=np.array(B),
-        C=np.array(C), D=np.array(D), nominal=_along(points, coordinates, chosen, ports), coordinates=coordinates,
+        C=np.array(C), D=np.array(D), nominal=_along(points, choice, chosen, ports), coordinates=choice,
         chosen=chosen, ports=ports, modal=first.modal_states,
     )  # fmt: skip
 
@@ -332,7 +314,3 @@ def _every(period: float, times: Array) -> Array:
                          remedy=f"give one up to {duration:.6g} s")  # fmt: skip
     periods = math.floor(duration / period + _SAME)
     return np.minimum(times[0] + period * np.arange(periods + 1), times[-1])
-
-
-def _interpolated(times: Array, values: Array, at: Array) -> Array:
-    return make_interp_spline(times, values, k=3)(at)

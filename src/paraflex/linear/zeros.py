@@ -13,7 +13,7 @@ and outputs loses rank is one of the system.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from paraflex.arrays import Array, Numbers
 from paraflex.limits import solvable
-from paraflex.linear.independent import unit_rows
+from paraflex.linear.independent import sizes, unit_rows
 
 Complex = NDArray[np.complex128]
 # Zeros of two squared systems that agree this well are one.
@@ -43,6 +43,14 @@ class StateSpace(NamedTuple):
     B: Array
     C: Array
     D: Array
+
+    @classmethod
+    def of(cls, *given: Any) -> StateSpace:
+        """A, B, C and D from what is taken for arrays; an A without entries stands for no states."""
+        A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in given)
+        if not A.size:
+            A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
+        return cls(A, B, C, D)
 
 
 class Vibrating(NamedTuple):
@@ -77,12 +85,12 @@ def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
         if not np.any(modes.damping):
             squares = _shifted(-_pencil(stiffness + shift**2 * mass, mass), shift**2)
             root = np.sqrt(squares)
-            return _sorted(np.concatenate([root, -root]))
+            return by_size(np.concatenate([root, -root]))
         whole = stiffness + shift * damping + shift**2 * mass
         n = len(whole)
         slopes = scipy.linalg.solve(whole, np.hstack([2.0 * shift * mass + damping, mass])) if n else np.zeros((0, 0))
         companion = np.vstack([-slopes, np.eye(n, 2 * n)])
-        return _sorted(_shifted(scipy.linalg.eigvals(companion), shift))
+        return by_size(_shifted(scipy.linalg.eigvals(companion), shift))
 
     # Null spaces leave as many rows and columns fewer as B and C have rank.
     more = sum(matrix(shift).shape) - modes.squares.size
@@ -113,18 +121,18 @@ def zeros(system: StateSpace, shift: float) -> Complex:
     n, fastest = len(A), np.linalg.norm(A, 2)
 
     def matrix(s: complex, B: Array = B, C: Array = C, D: Array = D) -> Numbers:
-        columns, rows = _sizes(B, 0), _sizes(np.hstack([C, D]), 1)
+        columns, rows = sizes(B, 0), sizes(np.hstack([C, D]), 1)
         return np.block([[A - s * np.eye(n), B / columns], [C / rows, D / rows / columns]])
 
     def even(s: complex) -> Numbers:
-        size = np.pad(1.0 / np.sqrt(_sizes(A - s * np.eye(n), 1).ravel()), (0, sum(D.shape)), constant_values=1.0)
+        size = np.pad(1.0 / np.sqrt(sizes(A - s * np.eye(n), 1).ravel()), (0, sum(D.shape)), constant_values=1.0)
         whole = matrix(s)
         return whole * size[: whole.shape[1]] * size[: len(whole), None]
 
     def squared(left: Array, right: Array) -> Complex:
         pencil = np.asarray(matrix(shift, B @ right, left @ C, left @ D @ right), dtype=float)
         found = _shifted(_pencil(pencil, np.eye(*pencil.shape) * (np.arange(len(pencil)) < n)), shift)
-        return _sorted(found[np.abs(found) < _FURTHEST * fastest])
+        return by_size(found[np.abs(found) < _FURTHEST * fastest])
 
     return _common(squared, even, D.shape, n, shift)
 
@@ -165,7 +173,7 @@ def _pencil(whole: Array, mass: Array) -> Complex:
     """Eigenvalues theta of mass x = theta whole x."""
     if not whole.size:
         return np.zeros(0, dtype=complex)
-    size = _sizes(whole, 1)
+    size = sizes(whole, 1)
     return np.asarray(scipy.linalg.eigvals(scipy.linalg.solve(whole / size, mass / size)), dtype=complex)
 
 
@@ -175,11 +183,6 @@ def _shifted(theta: Complex, shift: float) -> Complex:
     return shift + 1.0 / kept
 
 
-def _sizes(matrix: Numbers, axis: int) -> Array:
-    size = np.linalg.norm(matrix, axis=axis, keepdims=True)
-    return np.where(size > 0.0, size, 1.0)
-
-
-def _sorted(values: Complex) -> Complex:
-    """By magnitude."""
+def by_size(values: Complex) -> Complex:
+    """Complex numbers by magnitude, those of one in their order."""
     return values[np.argsort(np.abs(values), kind="stable")]

@@ -21,6 +21,12 @@ def known(name: str, names: Collection[str], field: str, kind: str) -> None:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 
+def all_known(given: Iterable[str], names: Collection[str], field: str, kind: str) -> None:
+    """Raise an `InputError` that names the nearest name, unless all names are known ones."""
+    for name in given:
+        known(name, names, field, kind)
+
+
 def finite(values: float | Iterable[float], field: str) -> None:
     """Raise an `InputError` unless a value, or each of several, is finite and of a size that is possible."""
     several = isinstance(values, Iterable) and getattr(values, "ndim", 1)
