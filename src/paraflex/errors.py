@@ -11,7 +11,8 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import SequenceMatcher, get_close_matches
 from enum import Enum
@@ -78,6 +79,15 @@ class InputError(ParaflexError, ValueError):
         """The same error with its field inside a table."""
         field = f"{table}.{self.field}"
         return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy, source=self.source)
+
+
+@contextmanager
+def fields_within(table: str) -> Iterator[None]:
+    """Put the field of an `InputError` inside a table: see `InputError.within`."""
+    try:
+        yield
+    except InputError as error:
+        raise error.within(table) from None
 
 
 class OutputError(InputError):

@@ -8,7 +8,7 @@ from typing import Any
 
 from paraflex.control.described import TABLE, ControllerDescription, check_controllers
 from paraflex.control.described_laws import LAWS
-from paraflex.errors import InputError
+from paraflex.errors import InputError, fields_within
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components
 from paraflex.files.said import fields_said
@@ -27,10 +27,8 @@ def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, Contr
     """
     parameters, found = evaluate_parameters(table.parameters), {}
     for name, one in table.controller.items():
-        try:
+        with fields_within(f"{TABLE}.{name}"):
             found[name] = _read(name, one, parameters, table.study.duration)
-        except InputError as error:
-            raise error.within(f"{TABLE}.{name}") from None
     check_controllers(found, mechanism)
     return found
 

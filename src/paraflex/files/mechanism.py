@@ -8,7 +8,7 @@ from typing import Any
 
 from paraflex.control.shaped import ShapedPath
 from paraflex.control.shaping import Shaper, ShaperKind
-from paraflex.errors import InputError
+from paraflex.errors import InputError, fields_within
 from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import quantities, read_components, read_law
@@ -113,10 +113,8 @@ def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
     made = []
     for name, entry in table.prescribed.items():
         _check_quantity(name, entry, table.joint.get(entry.joint))
-        try:
+        with fields_within(f"prescribed.{name}"):
             law = read_law(entry, parameters, table.study.duration)
-        except InputError as error:
-            raise error.within(f"prescribed.{name}") from None
         made.append(PrescribedAngle(name, entry.joint, law))
     return tuple(made)
 
@@ -140,10 +138,8 @@ def _assembly(name: str, entry: AssemblyTable) -> Assembly:
 def _load(_: Group, name: str, entry: Any, table: ModelTable) -> Load:
     """A load from its table."""
     kind = {"force": PointForce, "torque": AppliedTorque}[entry.type]
-    try:
+    with fields_within(f"load.{name}"):
         given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
-    except InputError as error:
-        raise error.within(f"load.{name}") from None
     return kind(name, entry.point, *(given if entry.type == "torque" else (given,)))
 
 
@@ -187,10 +183,8 @@ def read_paths(tables: Mapping[str, PathTable]) -> dict[str, Path]:
     found: dict[str, Path] = {}
     # Sequences name the others.
     for name in sorted(tables, key=lambda name: tables[name].type == "sequence"):
-        try:
+        with fields_within(f"path.{name}"):
             found[name] = read_path(tables[name], found)
-        except InputError as error:
-            raise error.within(f"path.{name}") from error
     return {name: found[name] for name in tables}
 
 
@@ -232,7 +226,5 @@ def read_shaper(table: ShaperTable) -> Shaper:
         Numbers that make no shaper.
     """
     said = {name: value for name, value in table if name != "type" and value is not None}
-    try:
+    with fields_within("shaper"):
         return Shaper(ShaperKind(table.type), **said)
-    except InputError as error:
-        raise error.within("shaper") from None

@@ -10,9 +10,8 @@ from typing import Any
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.control.described import NONE, ControllerDescription, check_together
 from paraflex.control.shaped import shape_torques
-from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults, conditions
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, fields_within, suggestion
 from paraflex.files.controllers import read_controllers
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
@@ -388,11 +387,9 @@ def load_path(file: str | FilePath) -> Path:
     source = str(file)
     with naming(source):
         data = with_rows(read_toml(FilePath(file), source), FilePath(file).parent)
-    table = validate(PathFile, data, source)
-    try:
-        return read_path(table.path)
-    except InputError as error:
-        raise error.within("path").in_file(source) from None
+        table = validate(PathFile, data, source)
+        with fields_within("path"):
+            return read_path(table.path)
 
 
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
@@ -404,8 +401,10 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
         "orientation": table.study.orientation or 0.0,
         "torques": read_torques(table),
         "controllers": tuple(table.study.controllers),
-        "shaper": _study_shaper(table),
     }
+    if table.study.shaper is not None:
+        with fields_within("study"):
+            said["shaper"] = read_shaper(table.study.shaper)
     study = StudyDefaults(**said)
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
@@ -427,22 +426,13 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     return model
 
 
-def _study_shaper(table: ModelTable) -> Shaper | None:
-    try:
-        return None if table.study.shaper is None else read_shaper(table.study.shaper)
-    except InputError as error:
-        raise error.within("study") from None
-
-
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
     said = dict(table.statics)
     for name in ("held", "stiffness"):
         said[name] = None if said[name] is None else tuple(said[name])
     found = StaticsDefaults(**said)
-    try:
+    with fields_within("statics"):
         conditions(mechanism, found)
-    except InputError as error:
-        raise error.within("statics") from None
     return found
 
 

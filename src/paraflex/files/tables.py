@@ -12,7 +12,7 @@ from paraflex.control.described import ControllerDescription
 from paraflex.control.shaped import ShapedPath
 from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults
-from paraflex.errors import InputError
+from paraflex.errors import InputError, fields_within
 from paraflex.files.controllers import controller_table
 from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
@@ -129,10 +129,8 @@ def _member(member: Any) -> dict[str, Any]:
     together = {"points": ["a", "b"] if hasattr(member, "a") else [], "joints": joint_pair(member)}
     pairs = {key: [getattr(member, name) for name in names] for key, names in together.items() if names}
     if isinstance(member, PointForce | AppliedTorque):
-        try:
+        with fields_within(f"load.{member.name}"):
             return {"point": member.point} | components_table(member.components, member.kind)
-        except InputError as error:
-            raise error.within(f"load.{member.name}") from None
     return pairs | fields_said(member, "name", *(name for names in together.values() for name in names))
 
 
@@ -293,10 +291,8 @@ def _joint(joint: Joint) -> Any:
 
 
 def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, Any]:
-    try:
+    with fields_within(f"prescribed.{prescribed.name}"):
         law = law_table(prescribed.law, "displacement" if mechanism.slides(prescribed.joint) else "angle")
-    except InputError as error:
-        raise error.within(f"prescribed.{prescribed.name}") from None
     return {"joint": prescribed.joint} | law
 
 
@@ -332,10 +328,8 @@ def _torques(study: StudyDefaults) -> dict[str, Any]:
     """Torques of motors: a number or an expression alone where that says it."""
     said = {}
     for name, law in study.torques.items():
-        try:
+        with fields_within(f"study.torques.{name}"):
             table = components_table((law,), "torque")
-        except InputError as error:
-            raise error.within(f"study.torques.{name}") from None
         said[name] = table.get("torque", table)
     return said
 
