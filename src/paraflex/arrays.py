@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,3 +11,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 # Real, or complex where a complex step carries a derivative.
 Numbers = NDArray[Any]
+
+
+def side_by_side(columns: Sequence[Numbers], rows: int) -> Numbers:
+    """Columns (rows, ...) as an array (rows, columns, ...); (rows, 0) without any."""
+    return np.stack(columns, axis=1) if columns else np.zeros((rows, 0))

@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.actuation import Electrical, electrical, electrical_findings
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.arrays import Array
+from paraflex.arrays import Array, side_by_side
 from paraflex.display import Shown
 from paraflex.dynamics import (
     InputSignals,
@@ -70,7 +70,7 @@ class MotionRun(Shown):
         each = [
             law.evaluate(t)[0] if isinstance(law, AngleLaw) else np.full(t.size, law) for law in self.torques.values()
         ]
-        return np.stack(each, axis=1) if each else np.zeros((t.size, 0))
+        return side_by_side(each, t.size)
 
     @cached_property
     def validity(self) -> Validity | None:

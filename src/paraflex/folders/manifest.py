@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from paraflex.errors import InputError
@@ -14,8 +15,7 @@ from paraflex.folders.lock import LOCK, finish_change
 from paraflex.seals import damaged
 from paraflex.writing import read_json
 
-# So much of a file is held at once [bytes].
-_PIECE = 1 << 20
+_hash = partial(hashlib.blake2b, digest_size=16)
 
 # Kinds of results, and by which files a folder without a manifest, of an earlier release, is known to hold them.
 RUN = "run"
@@ -70,7 +70,7 @@ class Manifest:
     def of(cls, kind: str, files: Mapping[str, str]) -> Manifest:
         """The manifest of some files."""
         numbers = [f"{name} {files[name]}" for name in sorted(files) if not _is_derived(name)]
-        return cls(kind, _digest("\n".join(numbers).encode()), dict(sorted(files.items())))
+        return cls(kind, _hash("\n".join(numbers).encode()).hexdigest(), dict(sorted(files.items())))
 
 
 def read_manifest(folder: Path) -> Manifest | None:
@@ -161,13 +161,10 @@ def foreign_files(folder: Path) -> list[str]:
 
 def digest_of(file: Path, *, sync: bool = False) -> str:
     """The digest of a file's bytes, which are on the disk afterwards where that is asked for."""
-    with file.open("rb+" if sync else "rb") as opened:
+    with file.open("rb+") if sync else file.open("rb") as opened:
         if sync:
             os.fsync(opened.fileno())
-        digest = hashlib.blake2b(digest_size=16)
-        while piece := opened.read(_PIECE):
-            digest.update(piece)
-        return digest.hexdigest()
+        return hashlib.file_digest(opened, _hash).hexdigest()
 
 
 def _is_listed(file: Path) -> bool:
@@ -183,7 +180,3 @@ def _is_listed(file: Path) -> bool:
 def _is_derived(name: str) -> bool:
     """Whether a file is made of the files of numbers, and can be made again."""
     return name == _REPORT or name.startswith(("figures/", "export/"))
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.blake2b(data, digest_size=16).hexdigest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from typing import Any
@@ -19,7 +18,7 @@ from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.sensors import READING, SENSOR
-from paraflex.results.storage import SCHEMA
+from paraflex.results.storage import origin
 from paraflex.results.stress import (
     COMMENTS as STRESS_COMMENTS,
     MOMENT,
@@ -292,16 +291,13 @@ def provenance(
     ours = options.to_dict() if method == options.method.title else {}
     effector = mechanism.end_effector
     return {
-        "mechanism": mechanism.name,
+        **origin(mechanism.name, parameters),
         **({} if effector is None else {"end_effector_point": str(effector.point)}),
         "tolerance": options.tolerance_for(system),
         "baumgarte_alpha": options.alpha,
         "baumgarte_beta": options.beta,
         "method": method,
         **ours,
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
         "numba_version": version("numba"),
         "numpy_version": version("numpy"),
-        "schema": SCHEMA,
     }

@@ -17,7 +17,7 @@ from paraflex.linear.branches import pole_branches
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import Motions
 from paraflex.results.drawing import Drawing, drawing_coordinates, system_drawing
-from paraflex.results.storage import SCHEMA
+from paraflex.results.storage import origin
 
 Array = NDArray[np.float64]
 
@@ -294,14 +294,11 @@ def _provenance(model: LinearModel, parameters: dict[str, Any] | None) -> dict[s
     motors = {motor.name: motor.joint for motor in mechanism.motors}
     return {
         "kind": "linear",
-        "mechanism": mechanism.name,
+        **origin(mechanism.name, parameters),
         "about": model.about,
         "time": model.time,
         "motor_joints": json.dumps(motors),
         "end_effector_outputs": json.dumps(end_effector_outputs(model)),
         **({} if mechanism.end_effector is None else {"end_effector_point": str(mechanism.end_effector.point)}),
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
         "numpy_version": version("numpy"),
-        "schema": SCHEMA,
     }

@@ -14,6 +14,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.dynamics.linearise import BALANCED
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import ENCODERS, END_EFFECTOR, HOLDINGS
+from paraflex.results.storage import origin_figures
 
 Complex = NDArray[np.complex128]
 
@@ -205,8 +206,7 @@ def linear_summary(data: xr.Dataset) -> dict[str, Any]:
             for key in ("state", "input", "output")
         },
         "modes": {mode: _mode_summary(data, mode) for mode in data["mode"].values.tolist()},
-        "parameters": json.loads(attrs["parameters"]),
-        "version": attrs["paraflex_version"],
+        **origin_figures(data),
     }
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array, side_by_side
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import (
     FrameLoad,
@@ -23,8 +23,6 @@ from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, system_drawing
 from paraflex.results.stress import SectionResult, section_result
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,24 +136,20 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         joint_force=np.where(shared.force, np.nan, loads.force),
         joint_moment=np.where(shared.moment, np.nan, loads.moment),
         multiplier=_multipliers(system, multipliers),
-        motor_speed=_stacked([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
+        motor_speed=side_by_side([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
         kinetic_energy=solution.kinetic_energy[:samples],
         strain_energy=solution.strain_energy[:samples],
         work=solution.work[:samples],
         drawing=drawn,
-        joint_coordinate=_stacked([each.value for each in coordinates.values()], samples),
-        joint_speed=_stacked([each.rate for each in coordinates.values()], samples),
+        joint_coordinate=side_by_side([each.value for each in coordinates.values()], samples),
+        joint_speed=side_by_side([each.rate for each in coordinates.values()], samples),
         drive_torque=drive_torques(system, multipliers)[:, : len(mechanism.prescribed)],
-        drive_speed=_stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
+        drive_speed=side_by_side([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
         load_errors=None if errors is None else load_errors(system, joints, errors),
         frame_load=frame_load(system, drawn.joints, loads, q, v),
         sections=section_result(system, q, v, a, multipliers),
         sensors=_sensors(system, sensor_readings(system, q, v, a, multipliers, torques[:samples])),
     )
-
-
-def _stacked(columns: list[Array], samples: int) -> Array:
-    return np.stack(columns, axis=1) if columns else np.zeros((samples, 0))
 
 
 def stacked_motions(points: Sequence[PointMotion], samples: int) -> PointMotion:

@@ -35,6 +35,7 @@ from paraflex.results.numbers import finite_or_none
 from paraflex.results.record import RUN_FIGURES
 from paraflex.results.reduced_runs import reduction_figures
 from paraflex.results.sensors import sensor_figures
+from paraflex.results.storage import origin_figures
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 
@@ -130,8 +131,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
                 for point in data["point"].values
             },
         },
-        "parameters": json.loads(data.attrs["parameters"]),
-        "version": data.attrs["paraflex_version"],
+        **origin_figures(data),
     }
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,7 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
-from paraflex.results.storage import SCHEMA
+from paraflex.results.storage import origin, origin_figures
 
 Array = NDArray[np.float64]
 
@@ -114,11 +112,9 @@ def reduction_dataset(
     }  # fmt: skip
     units = dict.fromkeys(one.unit for model in models for one in model.inputs)
     attrs = {
-        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about,
+        "kind": "reduction", **origin(models[0].mechanism, parameters), "about": models[0].about,
         "kept_states": len(few[0][0].states), "full_states": len(models[0].states), "until": until, "accuracy": error,
         "damping_ratio": DAMPING, "input_unit": ", ".join(units),
-        "parameters": json.dumps(parameters or {}, sort_keys=True), "paraflex_version": version("paraflex"),
-        "schema": SCHEMA,
     }  # fmt: skip
     if along:
         method = _carrying(names)
@@ -220,8 +216,7 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
             }
             for mode in modes
         },
-        "parameters": json.loads(data.attrs["parameters"]),
-        "version": data.attrs["paraflex_version"],
+        **origin_figures(data),
     }  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from typing import Generic, TypeVar, overload
 import numpy as np
 
 from paraflex.actuation import Electrical
+from paraflex.arrays import side_by_side
 from paraflex.control.laws import internal_torques
 from paraflex.control.loop import ControllerRecord
 from paraflex.control.runs import ControlledMotion, ControlledTracking
@@ -88,7 +89,7 @@ class SolutionTraces(Generic[R]):
         ]
         names = [joint.name for joint in system.described.joints]
         shared = undetermined_loads(system, names, solution.q.real, solution.acting).force.any(axis=2)
-        known = np.stack([length(each) for each in forces], axis=1) if forces else np.zeros((len(solution.q), 0))
+        known = side_by_side([length(each) for each in forces], len(solution.q))
         return np.where(shared, np.nan, known)
 
     @cached_property
@@ -105,7 +106,7 @@ class SolutionTraces(Generic[R]):
         """Rates of joints by name (k, joints)."""
         solution = self.solution
         rates = [joint_coordinate(self.system, name, solution.q, solution.v).rate for name in names]
-        return np.stack(rates, axis=1) if rates else np.zeros((len(solution.q), 0))
+        return side_by_side(rates, len(solution.q))
 
 
 @dataclass(frozen=True)
@@ -246,8 +247,7 @@ class StaticsTraces(SolutionTraces[Statics]):
         return int(np.sum(~self.run.stable & ~self.run.limit))
 
     def _columns(self, quantity: Callable[[str], Trace], of: Sequence[Coordinate]) -> Trace:
-        columns = [quantity(one.name) for one in of]
-        return np.stack(columns, axis=1) if columns else np.zeros((len(self.run.equilibria), 0))
+        return side_by_side([quantity(one.name) for one in of], len(self.run.equilibria))
 
 
 @overload

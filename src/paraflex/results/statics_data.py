@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import side_by_side
 from paraflex.equilibria import Statics
 from paraflex.findings import Finding
 from paraflex.results.doubts import keep_findings, verdict_of
@@ -20,7 +19,8 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
 from paraflex.results.numbers import finite_or_none
-from paraflex.results.storage import SCHEMA
+from paraflex.results.run_traces import StaticsTraces
+from paraflex.results.storage import origin, origin_figures
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 
@@ -110,13 +110,7 @@ def statics_dataset(
             name_units(out[name], [unit for unit in NAMED_UNITS[name] if unit in each] or NAMED_UNITS[name], each)
         if name in _COMMENTS:
             out[name].attrs["comment"] = _COMMENTS[name]
-    out.attrs = {
-        "kind": "statics",
-        "mechanism": mechanism.name,
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
-        "schema": SCHEMA,
-    }
+    out.attrs = {"kind": "statics", **origin(mechanism.name, parameters)}
     beyond = [] if found.validity is None or found.validity.holds else [found.validity.finding()]
     keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *found.doubts])
     return out
@@ -124,20 +118,17 @@ def statics_dataset(
 
 def _of_steps(found: Statics) -> dict[str, Any]:
     """Variables of the equilibria that no run has."""
-    names = [one.name for one in found.coordinates]
-    stiffness = np.full((len(found.equilibria), len(names)), np.nan)
-    for one in found.directions:
-        stiffness[:, names.index(one.name)] = found.stiffness(one.name)
-    with np.errstate(divide="ignore"):
-        compliance = 1.0 / stiffness
-    along = (("step", "named"),)
+    traces, along = StaticsTraces(found), (("step", "named"),)
+    stiffness, compliance = np.full((2, *traces.travel.shape), np.nan)
+    asked = [found.coordinates.index(one) for one in found.directions]
+    stiffness[:, asked], compliance[:, asked] = traces.stiffness, traces.compliance
     return {
         "fraction": ("step", found.fraction),
         "limit_point": ("step", found.limit),
         "stable": ("step", found.stable),
-        "place": (*along, _columns(found, found.place)),
-        "travel": (*along, _columns(found, found.travel)),
-        "effort": (*along, _columns(found, found.known_effort)),
+        "place": (*along, side_by_side([found.place(one.name) for one in found.coordinates], len(found.equilibria))),
+        "travel": (*along, traces.travel),
+        "effort": (*along, traces.effort),
         "stiffness": (*along, stiffness),
         "compliance": (*along, compliance),
         "natural_frequency": (("step", "frequency_number"), _hertz(found.frequencies, found)),
@@ -180,11 +171,6 @@ def _buckling_shapes(found: Statics) -> dict[str, Any]:
     out[known] /= np.linalg.norm(out[known], axis=2).max(axis=1)[:, None, None]
     values = out.reshape(steps, count, *drawn.shape[1:]).astype(np.float32)
     return {"buckling_shape": (("step", "buckling_number", "station", "axis"), values)}
-
-
-def _columns(found: Statics, quantity: Any) -> np.ndarray:
-    columns = [quantity(one.name) for one in found.coordinates]
-    return np.stack(columns, axis=1) if columns else np.zeros((len(found.equilibria), 0))
 
 
 def _motors(found: Statics) -> dict[str, Any]:
@@ -288,8 +274,7 @@ def statics_summary(data: xr.Dataset) -> dict[str, Any]:
         **({"stress_max": _of_bodies(data["stress_max"])} if "stress_max" in data else {}),
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
-        "parameters": json.loads(data.attrs["parameters"]),
-        "version": data.attrs["paraflex_version"],
+        **origin_figures(data),
     }  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import xarray as xr
@@ -17,6 +16,7 @@ from paraflex.results.metrics import METRICS
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.reduced_runs import reduction_figures
 from paraflex.results.sensors import sensor_figures
+from paraflex.results.storage import origin_figures
 from paraflex.results.traces import data_traces
 from paraflex.results.validity import validity_summary
 
@@ -87,6 +87,5 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         "verdict": verdict_of(data).to_dict(),
         "part": None if part is None else part.to_dict(),
         "modes": modes,
-        "parameters": json.loads(data.attrs["parameters"]),
-        "version": data.attrs["paraflex_version"],
+        **origin_figures(data),
     }
