@@ -111,10 +111,13 @@ class _Table(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
 
 
-_UNTIL = Field(default=None, description="the time in s at which the next piece takes over")
-_INTERPOLATION = Field(
-    default=None, description='how a table is interpolated: "spline", smoothly, by default, or "linear"'
-)
+def _optional(description: str) -> Any:
+    """A field that is None by default."""
+    return Field(default=None, description=description)
+
+
+_UNTIL = _optional("the time in s at which the next piece takes over")
+_INTERPOLATION = _optional('how a table is interpolated: "spline", smoothly, by default, or "linear"')
 InterpolationName = Literal["spline", "linear"]
 _PAIR_IN_TIME = Annotated[list[FunctionOfTime], Field(min_length=2, max_length=2)]
 
@@ -150,10 +153,10 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
     return {
         name: (
             written | None,
-            Field(default=None, description=f"{description}, numbers or expressions of the time t"),
+            _optional(f"{description}, numbers or expressions of the time t"),
         ),
-        "pieces": (pieces | None, Field(default=None, description=example)),
-        "table": (rows | None, Field(default=None, description=f"a list of {columns} such columns")),
+        "pieces": (pieces | None, _optional(example)),
+        "table": (rows | None, _optional(f"a list of {columns} such columns")),
         "interpolation": (InterpolationName | None, _INTERPOLATION),
     }
 
@@ -254,18 +257,16 @@ def _joint_table() -> Any:
 class SectionTable(_Table):
     """A cross-section, by its shape or by its properties: what one shape needs others do not have."""
 
-    shape: Literal["rectangle", "round", "tube"] | None = Field(
-        default=None, description='"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
+    shape: Literal["rectangle", "round", "tube"] | None = _optional(
+        '"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
     )
-    width: Number | None = Field(default=None, description="the width out of the plane of motion in m")
-    thickness: Number | None = Field(default=None, description="the thickness in the plane of motion in m")
-    diameter: Number | None = Field(default=None, description="the outer diameter in m")
-    wall: Number | None = Field(default=None, description="the thickness of the wall of a hollow section in m")
-    area: Number | None = Field(default=None, description="the area in m^2")
-    second_moment: Number | None = Field(default=None, description="the second moment of area in m^4")
-    outer_fibre: Number | None = Field(
-        default=None, description="the distance of the outermost fibre from the neutral axis in m"
-    )
+    width: Number | None = _optional("the width out of the plane of motion in m")
+    thickness: Number | None = _optional("the thickness in the plane of motion in m")
+    diameter: Number | None = _optional("the outer diameter in m")
+    wall: Number | None = _optional("the thickness of the wall of a hollow section in m")
+    area: Number | None = _optional("the area in m^2")
+    second_moment: Number | None = _optional("the second moment of area in m^4")
+    outer_fibre: Number | None = _optional("the distance of the outermost fibre from the neutral axis in m")
 
 
 class MaterialTable(_Table):
@@ -273,7 +274,7 @@ class MaterialTable(_Table):
 
     youngs_modulus: Number = Field(description="Young's modulus in Pa")
     density: Number = Field(description="the density in kg/m^3")
-    strength: Number | None = Field(default=None, description="the largest stress that it bears in Pa")
+    strength: Number | None = _optional("the largest stress that it bears in Pa")
 
 
 class LumpTable(_Table):
@@ -311,27 +312,24 @@ class BeamTable(_Table):
     section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one a span")
     material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one a span")
     points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
-    elements: Count | list[Count] | None = Field(
-        default=None,
-        description="elements per span, one number or one a span; by default 1, and where a joint slides along "
-        "the beam so many that none is longer than a third of it",
+    elements: Count | list[Count] | None = _optional(
+        "elements per span, one number or one a span; by default 1, and where a joint slides along "
+        "the beam so many that none is longer than a third of it"
     )
     lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
-    reference: ReferenceName | None = Field(
-        default=None,
-        description='how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default',
+    reference: ReferenceName | None = _optional(
+        'how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default'
     )
-    curvature: CurvatureName | None = Field(
-        default=None,
-        description='curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default',
+    curvature: CurvatureName | None = _optional(
+        'curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default'
     )
-    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
+    modes: Count | None = _optional("how many modes of lowest frequency to keep")
     reduction: ReductionName = Field(
         default="modal",
         description='what is kept with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
         "held, and static shapes of these",
     )
-    damping: DampingTable | None = Field(default=None, description="a damping table")
+    damping: DampingTable | None = _optional("a damping table")
     flexible: Yes = Field(default=True, description="false for a rigid beam")
     frames: Count = Field(
         default=1, description="floating frames of equal length, joined rigidly: more of them for large deflections"
@@ -378,8 +376,8 @@ class AssumedModesTable(_Table):
     axial_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
     points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
     lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
-    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
-    damping: DampingTable | None = Field(default=None, description="a damping table")
+    modes: Count | None = _optional("how many modes of lowest frequency to keep")
+    damping: DampingTable | None = _optional("a damping table")
     flexible: Yes = Field(default=True, description="false for a rigid bar")
 
 
@@ -404,10 +402,10 @@ class ModalTable(_Table):
     I1: list[Number] = Field(description="int s0^T N dm")
     G1: list[Number] = Field(description="int (x N_y - y N_x) dm")
     G2: list[list[Number]] = Field(description="rows of the skew int (N_x^T N_y - N_y^T N_x) dm")
-    I2: list[list[Number]] | None = Field(default=None, description="rows of int N^T N dm")
+    I2: list[list[Number]] | None = _optional("rows of int N^T N dm")
     points: dict[str, ModalPointTable] = Field(default={}, description="position, shape and slope of each named point")
-    modes: Count | None = Field(default=None, description="how many modes of lowest frequency to keep")
-    damping: DampingTable | None = Field(default=None, description="a damping table")
+    modes: Count | None = _optional("how many modes of lowest frequency to keep")
+    damping: DampingTable | None = _optional("a damping table")
     flexible: Yes = Field(default=True, description="false for a rigid body")
 
 
@@ -415,30 +413,26 @@ class PieceTable(_Table):
     """One of the pieces of a law."""
 
     until: Number | None = _UNTIL
-    angle: FunctionOfTime | None = Field(default=None, description="the angle in rad, an expression of the time t")
-    displacement: FunctionOfTime | None = Field(
-        default=None, description="the displacement in m, an expression of the time t"
-    )
+    angle: FunctionOfTime | None = _optional("the angle in rad, an expression of the time t")
+    displacement: FunctionOfTime | None = _optional("the displacement in m, an expression of the time t")
 
 
 class PrescribedTable(_Table):
     """A joint's angle, or where it slides its displacement, given in time."""
 
     joint: Text = Field(description="the name of a joint")
-    angle: FunctionOfTime | None = Field(
-        default=None,
-        description="the angle at t = 0 in rad, by default that of the assembly, or an expression of the time t",
+    angle: FunctionOfTime | None = _optional(
+        "the angle at t = 0 in rad, by default that of the assembly, or an expression of the time t"
     )
-    displacement: FunctionOfTime | None = Field(
-        default=None,
-        description="the displacement at t = 0 in m, by default that of the assembly, or an expression of the time t",
+    displacement: FunctionOfTime | None = _optional(
+        "the displacement at t = 0 in m, by default that of the assembly, or an expression of the time t"
     )
-    speed: Number | None = Field(default=None, description="the speed in rad/s or m/s, from a constant start")
-    pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = Field(
-        default=None, description='a list of { until = s, angle = "..." }, the last without until'
+    speed: Number | None = _optional("the speed in rad/s or m/s, from a constant start")
+    pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = _optional(
+        'a list of { until = s, angle = "..." }, the last without until'
     )
-    table: Rows | None = Field(
-        default=None, description="a list of [t, value] in s and rad or m, or the name of a file with two such columns"
+    table: Rows | None = _optional(
+        "a list of [t, value] in s and rad or m, or the name of a file with two such columns"
     )
 
 
@@ -461,9 +455,9 @@ class AssemblyTable(BaseModel):
 class DeflectionTable(_Table):
     """How far a point of a beam is off its place in the body frame."""
 
-    axial: Number | None = Field(default=None, description="the stretch along the beam in m")
-    transverse: Number | None = Field(default=None, description="the displacement across the beam in m")
-    slope: Number | None = Field(default=None, description="the slope in rad")
+    axial: Number | None = _optional("the stretch along the beam in m")
+    transverse: Number | None = _optional("the displacement across the beam in m")
+    slope: Number | None = _optional("the slope in rad")
 
 
 class CoordinatesTable(_Table):
@@ -472,9 +466,7 @@ class CoordinatesTable(_Table):
     x: Number = Field(description="x of the body frame's origin in m")
     y: Number = Field(description="y of the body frame's origin in m")
     phi: Number = Field(description="the angle of the body frame in rad")
-    flexible: list[Number] | None = Field(
-        default=None, description="the body's own flexible coordinates; zeros by default"
-    )
+    flexible: list[Number] | None = _optional("the body's own flexible coordinates; zeros by default")
 
 
 class RatesTable(_Table):
@@ -483,9 +475,7 @@ class RatesTable(_Table):
     x: Number = Field(description="the rate of x of the body frame's origin in m/s")
     y: Number = Field(description="the rate of y of the body frame's origin in m/s")
     phi: Number = Field(description="the rate of the angle of the body frame in rad/s")
-    flexible: list[Number] | None = Field(
-        default=None, description="the rates of the body's own flexible coordinates; zeros by default"
-    )
+    flexible: list[Number] | None = _optional("the rates of the body's own flexible coordinates; zeros by default")
 
 
 class VelocityTable(_Table):
@@ -535,13 +525,11 @@ class ShaperTable(_Table):
     damping: Number | list[Number] = Field(
         default=0.0, description="the damping ratio of all modes, or a list with one for each"
     )
-    tolerance: Number | None = Field(
-        default=None, description='of "ei", the residual at its frequency as a fraction, by default 0.05'
-    )
+    tolerance: Number | None = _optional('of "ei", the residual at its frequency as a fraction, by default 0.05')
 
 
 class _PathTable(_Table):
-    shaper: ShaperTable | None = Field(default=None, description="the input shaper of the path: none by default")
+    shaper: ShaperTable | None = _optional("the input shaper of the path: none by default")
 
 
 class PolygonTable(_PathTable):
@@ -590,11 +578,9 @@ class TabulatedPathTable(_PathTable):
     table: PathRows = Field(
         description="a list of [x, y] in m, or of [x, y, t] in m and s, or the name of a file with such columns"
     )
-    motion_time: Number | None = Field(default=None, description="the time from the first point to the last in s")
-    max_acceleration: Number | None = Field(
-        default=None, description="the largest acceleration along the path in m/s^2"
-    )
-    max_speed: Number | None = Field(default=None, description="the largest speed along the path in m/s")
+    motion_time: Number | None = _optional("the time from the first point to the last in s")
+    max_acceleration: Number | None = _optional("the largest acceleration along the path in m/s^2")
+    max_speed: Number | None = _optional("the largest speed along the path in m/s")
 
 
 class SequenceTable(_PathTable):
@@ -614,13 +600,11 @@ PathTable = Annotated[
 class TorqueTable(_Table):
     """A motor's torque in time, by pieces or a table."""
 
-    torque: FunctionOfTime | None = Field(default=None, description="the torque in N m, an expression of the time t")
-    pieces: Annotated[list[TorquePiece], Field(min_length=1)] | None = Field(
-        default=None, description="a list of { until = s, torque = ... }, the last without until"
+    torque: FunctionOfTime | None = _optional("the torque in N m, an expression of the time t")
+    pieces: Annotated[list[TorquePiece], Field(min_length=1)] | None = _optional(
+        "a list of { until = s, torque = ... }, the last without until"
     )
-    table: Rows | None = Field(
-        default=None, description="a list of [t, torque] in s and N m, or the name of a file with two such columns"
-    )
+    table: Rows | None = _optional("a list of [t, torque] in s and N m, or the name of a file with two such columns")
     interpolation: InterpolationName | None = _INTERPOLATION
 
 
@@ -654,23 +638,17 @@ class ControllerTable(_Table):
         "encoders of its motors",
     )
     outputs: list[Text] = Field(default=[], description="motors; by default all of a mode")
-    reference: ReferenceEntry | None = Field(
-        default=None,
-        description='what is taken off the readings: "plan", the planned motion; "open-loop", what sensors read where '
+    reference: ReferenceEntry | None = _optional(
+        'what is taken off the readings: "plan", the planned motion; "open-loop", what sensors read where '
         "the planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the "
-        'unit of the sensor; by default "plan" with "pid", "open-loop" with "lqg", nothing with others',
+        'unit of the sensor; by default "plan" with "pid", "open-loop" with "lqg", nothing with others'
     )
-    limits: Number | Pair | dict[str, Number | Pair] | None = Field(
-        default=None,
-        description="the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all "
-        "motors or by motor",
+    limits: Number | Pair | dict[str, Number | Pair] | None = _optional(
+        "the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all "
+        "motors or by motor"
     )
-    rates: NumbersOf | None = Field(
-        default=None, description="the largest change of torques in N m/s or N/s, of all motors or by motor"
-    )
-    quantise: NumbersOf | None = Field(
-        default=None, description="the resolution of readings, in the unit of the sensor, of all or by sensor"
-    )
+    rates: NumbersOf | None = _optional("the largest change of torques in N m/s or N/s, of all motors or by motor")
+    quantise: NumbersOf | None = _optional("the resolution of readings, in the unit of the sensor, of all or by sensor")
     filters: dict[str, Number | list[list[Number]]] = Field(
         default={},
         description="by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients "
@@ -690,7 +668,7 @@ class PIDTable(ControllerTable):
         default=0.0, description="the integral gain in N m/rad/s or N/m/s, of all motors or by motor"
     )
     project: Yes = Field(default=True, description="whether torques that only strain links are taken out")
-    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
 class StateSpaceTable(ControllerTable):
@@ -709,7 +687,7 @@ class ComputedTorqueTable(ControllerTable):
     type: Literal["computed-torque"]
     frequency: Number = Field(description="the frequency of the end-effector's error, as of an oscillator, in Hz")
     damping_ratio: Number = Field(default=0.7, description="the damping ratio of the end-effector's error")
-    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
 class RateFeedbackTable(ControllerTable):
@@ -720,7 +698,7 @@ class RateFeedbackTable(ControllerTable):
         description="by motor and sensor the torque or force over the rate of the reading, in N m s or N s by the unit "
         "of the sensor"
     )
-    cutoff: Number | None = Field(default=None, description="the cut-off frequency of the low-pass of rates in Hz")
+    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
 class LQGTable(ControllerTable):
@@ -733,15 +711,12 @@ class LQGTable(ControllerTable):
     effort: NumbersOf = Field(
         description="the largest torque in N m or N, of all motors or by motor; those not named are not used"
     )
-    noise: NumbersOf | None = Field(
-        default=None,
-        description="the standard deviation of readings, in the unit of the sensor, of all or by sensor; by default of "
-        "rounding to quantise",
+    noise: NumbersOf | None = _optional(
+        "the standard deviation of readings, in the unit of the sensor, of all or by sensor; by default of "
+        "rounding to quantise"
     )
-    disturbance: NumbersOf | None = Field(
-        default=None,
-        description="the standard deviation of random torques in N m or N, of all motors or by motor; by default a "
-        "tenth of effort",
+    disturbance: NumbersOf | None = _optional(
+        "the standard deviation of random torques in N m or N, of all motors or by motor; by default a tenth of effort"
     )
     integrators: dict[str, Number] = Field(
         default={}, description="by sensor the time constant in s with which its error under constant loads decays"
@@ -752,12 +727,8 @@ class LQGTable(ControllerTable):
         "N m or N and the cut-off frequency in Hz, or lists of the coefficients of numerator and denominator of a "
         "filter in descending powers of s",
     )
-    states: Count | None = Field(
-        default=None, description="the states of the reduced model, by default 16, or all of fewer"
-    )
-    at: Number | None = Field(
-        default=None, description="the time of the planned motion that it is designed about in s, by default its start"
-    )
+    states: Count | None = _optional("the states of the reduced model, by default 16, or all of fewer")
+    at: Number | None = _optional("the time of the planned motion that it is designed about in s, by default its start")
 
 
 AnyControllerTable = Annotated[
@@ -768,15 +739,15 @@ AnyControllerTable = Annotated[
 class StudyDefaultsTable(_Table):
     """What `paraflex run` does unless asked otherwise."""
 
-    path: Text | None = Field(default=None, description="the name of a [path.NAME] table")
+    path: Text | None = _optional("the name of a [path.NAME] table")
     paths: list[Text] = Field(
         default=[],
         description="in its place several names: runs and studies of many designs take all, others the first",
     )
     modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
-    duration: Number | None = Field(default=None, description="the duration in s, dwell included")
+    duration: Number | None = _optional("the duration in s, dwell included")
     samples: Count = Field(default=701, description="the number of samples kept")
-    assembly: Text | None = Field(default=None, description="the name of an [assembly.NAME] table")
+    assembly: Text | None = _optional("the name of an [assembly.NAME] table")
     torques: dict[str, TorqueEntry] = Field(
         default={},
         description="torques of motors in N m, without a path: numbers, expressions of the time t, or tables",
@@ -784,33 +755,28 @@ class StudyDefaultsTable(_Table):
     controllers: list[Text] = Field(
         default=[], description="names of [controller.NAME] tables that act, beside the torques planned along a path"
     )
-    shaper: ShaperTable | None = Field(
-        default=None,
-        description="the input shaper of torques planned along a path, as "
-        '{ type = "zvd", frequencies = ["9 Hz"] }: none by default',
+    shaper: ShaperTable | None = _optional(
+        'the input shaper of torques planned along a path, as { type = "zvd", frequencies = ["9 Hz"] }: none by default'
     )
-    orientation: Number | None = Field(
-        default=None, description="the end-effector's angle along the path in rad, where it is a task coordinate"
+    orientation: Number | None = _optional(
+        "the end-effector's angle along the path in rad, where it is a task coordinate"
     )
-    method: Text | None = Field(
-        default=None, description="the method of integration, by default esdirk5: see paraflex methods"
+    method: Text | None = _optional("the method of integration, by default esdirk5: see paraflex methods")
+    tolerance: Number | None = _optional(
+        "the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
     )
-    tolerance: Number | None = Field(
-        default=None, description="the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
+    tolerance_per: Literal["cycle", "run"] | None = _optional(
+        'the time in which errors may add up to it: a "cycle" of the motion or the "run"'
     )
-    tolerance_per: Literal["cycle", "run"] | None = Field(
-        default=None, description='the time in which errors may add up to it: a "cycle" of the motion or the "run"'
+    control: Literal["positions", "forces"] | None = _optional(
+        'whose errors choose the steps: "positions", or "forces", the default of rigid bodies'
     )
-    control: Literal["positions", "forces"] | None = Field(
-        default=None, description='whose errors choose the steps: "positions", or "forces", the default of rigid bodies'
-    )
-    step: Number | None = Field(default=None, description="a fixed step in s, with methods that take one")
+    step: Number | None = _optional("a fixed step in s, with methods that take one")
     after: Literal["free", "hold"] = Field(
         default="free", description='what the active motors do after the path: "free" or "hold", by brakes'
     )
-    reduced: Count | None = Field(
-        default=None,
-        description="flexible coordinates that runs keep, all bodies together; all by default, or with 0",
+    reduced: Count | None = _optional(
+        "flexible coordinates that runs keep, all bodies together; all by default, or with 0"
     )
     error: Literal["motion", "whole"] = Field(
         default="motion", description='which tracking error ranks modes: of the "motion", or the "whole" run with dwell'
@@ -838,13 +804,9 @@ class StaticsTable(_Table):
     moved: NumbersByName = Field(
         default={}, description='the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start'
     )
-    held: list[Text] | None = Field(
-        default=None, description="coordinates that stay; by default the joints of motors without a torque"
-    )
+    held: list[Text] | None = _optional("coordinates that stay; by default the joints of motors without a torque")
     steps: Count = Field(default=STEPS, description="how many equal steps of all that is given")
-    stiffness: list[Text] | None = Field(
-        default=None, description="coordinates with a stiffness; by default those loaded or moved"
-    )
+    stiffness: list[Text] | None = _optional("coordinates with a stiffness; by default those loaded or moved")
     buckling: Count = Field(default=FACTORS, description="how many factors of buckling about every equilibrium")
 
 
