@@ -108,8 +108,12 @@ def _try(law: AngleLaw, duration: float | None) -> None:
 
 def quantities(entry: PrescribedTable) -> set[str]:
     """Which of "angle" and "displacement" a [prescribed.NAME] table speaks of."""
-    said: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
-    return {name for table in said for name in ("angle", "displacement") if getattr(table, name) is not None}
+    return {name for table in (entry, *(entry.pieces or [])) for name in _quantities_in(table)}
+
+
+def _quantities_in(table: PrescribedTable | PieceTable) -> dict[str, Any]:
+    """The angle and the displacement of a table, as far as it gives them."""
+    return {name: law for name in ("angle", "displacement") if (law := getattr(table, name)) is not None}
 
 
 def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
@@ -295,27 +299,21 @@ def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
         return TabulatedLaw(times, values)
     if entry.pieces is not None:
         return _pieces(entry.pieces, parameters)
-    field = "angle" if entry.displacement is None else "displacement"
-    given = entry.angle if entry.displacement is None else entry.displacement
-    if given is None:
-        return ConstantSpeed(0.0, entry.speed or 0.0, from_assembly=True)
-    return _expression(given, parameters, field, entry.speed or 0.0)
+    for name, law in _quantities_in(entry).items():
+        return _expression(law, parameters, name, entry.speed or 0.0)
+    return ConstantSpeed(0.0, entry.speed or 0.0, from_assembly=True)
 
 
 def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseLaw:
     laws = []
     for number, piece in enumerate(pieces):
-        field = f"pieces.{number}"
-        if (piece.angle is None) == (piece.displacement is None):
+        given = _quantities_in(piece)
+        if len(given) != 1:
             raise InputError(
-                "a piece needs one law, an angle or a displacement",
-                field=field,
+                "a piece needs one law, an angle or a displacement", field=f"pieces.{number}",
                 remedy="give its angle, or its displacement where the joint slides",
-            )
-        name = "angle" if piece.displacement is None else "displacement"
-        given = piece.angle if piece.displacement is None else piece.displacement
-        assert given is not None
-        laws.append(_expression(given, parameters, f"{field}.{name}"))
+            )  # fmt: skip
+        laws += [_expression(law, parameters, f"pieces.{number}.{name}") for name, law in given.items()]
     return PiecewiseLaw(tuple(laws), tuple(_ends(pieces)))
 
 

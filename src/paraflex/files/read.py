@@ -29,7 +29,8 @@ T = typing.TypeVar("T", bound=BaseModel)
 
 def read_toml(path: Path, source: str) -> dict[str, Any]:
     """Parse a TOML file; see `read_text` and `parse_toml` for the errors."""
-    return parse_toml(read_text(path, source), source)
+    with naming(source):
+        return parse_toml(read_text(path, source))
 
 
 def read_text(path: Path, source: str) -> str:
@@ -91,7 +92,7 @@ def exists(path: Path) -> bool:
         return False
 
 
-def parse_toml(text: str, source: str) -> dict[str, Any]:
+def parse_toml(text: str) -> dict[str, Any]:
     """The data of a TOML text.
 
     Raises
@@ -101,25 +102,22 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     """
     if _DEEP_KEY.search(text):
         raise InputError(
-            "not valid TOML: a name of too many parts", field="file", remedy=f"at most {KEY_PARTS} between dots",
-            source=source,
-        )  # fmt: skip
+            "not valid TOML: a name of too many parts", field="file", remedy=f"at most {KEY_PARTS} between dots"
+        )
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise _not_toml(str(error), source) from error
+        raise _not_toml(str(error)) from error
     except (ValueError, RecursionError):
         raise InputError(
-            "not valid TOML: a number of too many digits, or too many brackets in one another",
-            field="file",
+            "not valid TOML: a number of too many digits, or too many brackets in one another", field="file",
             remedy="name a model file",
-            source=source,
-        ) from None
-    _check_names(data, source)
+        ) from None  # fmt: skip
+    _check_names(data)
     return data
 
 
-def _check_names(data: dict[str, Any], source: str) -> None:
+def _check_names(data: dict[str, Any]) -> None:
     """Names are none too long, at whatever depth."""
     left: list[tuple[str, Any]] = [("", data)]
     while left:
@@ -127,26 +125,22 @@ def _check_names(data: dict[str, Any], source: str) -> None:
         inner = value.items() if isinstance(value, dict) else [("", each) for each in value]
         for name, each in inner:
             if len(name) > NAME_LETTERS:
-                raise InputError(
-                    f"a name of {len(name)} letters", field=table or "file", value=name,
-                    remedy=f"at most {NAME_LETTERS}", source=source,
-                )  # fmt: skip
+                problem, remedy = f"a name of {len(name)} letters", f"at most {NAME_LETTERS}"
+                raise InputError(problem, field=table or "file", value=name, remedy=remedy)
             if isinstance(each, dict | list):
                 left.append((f"{table}.{name}".strip("."), each))
 
 
-def _not_toml(reason: str, source: str) -> InputError:
+def _not_toml(reason: str) -> InputError:
     """What the parser says, with the name of a table that stands twice."""
     twice = re.match(r"Cannot declare \((.*?),?\) twice \((.*)\)", reason)
     if twice is None:
         problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "mend that line"
         if re.search("overwrite|mutate|uplicate", reason):
             remedy += "; a name may stand only once"
-        return InputError(problem, field="file", remedy=remedy, source=source)
+        return InputError(problem, field="file", remedy=remedy)
     table = ".".join(part.strip(" '") for part in twice[1].split(","))
-    return InputError(
-        f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out", source=source
-    )
+    return InputError(f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out")
 
 
 @contextmanager
@@ -172,14 +166,12 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
         try:
             checked = schema.model_validate(data, context={"parameters": parameters})
         except ValidationError as error:
-            raise _first_problem(schema, data, error, source) from None
+            raise _other_kind(schema, data, source) or _first_problem(schema, data, error) from None
         check_units(schema, data)
     return checked
 
 
-def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
-    if (problem := _other_kind(schema, data, source)) is not None:
-        return problem
+def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError) -> InputError:
     problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
     location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)
@@ -187,28 +179,28 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
     model, description = place.owner, place.description
     kind, value = problem["type"], problem.get("input")
     if kind == "missing":
-        return InputError("is missing", field=field, remedy=f"give {description}", source=source)
+        return InputError("is missing", field=field, remedy=f"give {description}")
     if kind == "extra_forbidden":
         known = sorted(model.model_fields) if model is not None else []
         near = get_close_matches(str(location[-1]), known, n=1)
         remedy = f'did you mean "{near[0]}"?' if near else f"known here: {listed(known)}"
-        return InputError("unknown field", field=field, value=value, remedy=remedy, source=source)
+        return InputError("unknown field", field=field, value=value, remedy=remedy)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        return _tag_problem(_tags(schema, problem["loc"]), field, value, source)
+        return _tag_problem(_tags(schema, problem["loc"]), field, value)
     if kind == "expression":
         said = problem.get("ctx", {})
         remedy = f"give {description}; {said.get('remedy')}"
-        return InputError(said.get("problem", ""), field=field, value=value, remedy=remedy, source=source)
+        return InputError(said.get("problem", ""), field=field, value=value, remedy=remedy)
     if kind in _NO_TABLE:
-        return InputError("should be a table", field=field, value=value, remedy=f"give {description}", source=source)
+        return InputError("should be a table", field=field, value=value, remedy=f"give {description}")
     if kind == "literal_error":
         allowed = problem.get("ctx", {}).get("expected", "")
         near = get_close_matches(str(value), re.findall("'([^']*)'", allowed), n=1)
         remedy = f'did you mean "{near[0]}"?' if near else f"give {description}"
-        return InputError(f"should be {allowed}", field=field, value=value, remedy=remedy, source=source)
+        return InputError(f"should be {allowed}", field=field, value=value, remedy=remedy)
     message = problem["msg"].removeprefix("Input ").replace(" after validation", "")
     text = message[0].lower() + message[1:]
-    return InputError(text, field=field, value=value, remedy=f"give {description}", source=source)
+    return InputError(text, field=field, value=value, remedy=f"give {description}")
 
 
 def _other_kind(schema: type[BaseModel], data: dict[str, Any], source: str) -> InputError | None:
@@ -217,28 +209,26 @@ def _other_kind(schema: type[BaseModel], data: dict[str, Any], source: str) -> I
     if "mechanism" in fields and "body" in data and "mechanism" not in data:
         name = f'mechanism = "{source}"'
         remedy = f"write a study file with {name} and what it is to vary, and name that"
-        return InputError("this is a model file, not a study file", field="file", remedy=remedy, source=source)
+        return InputError("this is a model file, not a study file", field="file", remedy=remedy)
     if "body" in fields and "body" not in data and isinstance(data.get("mechanism"), str):
         remedy = f"name its mechanism, {data['mechanism']}, or give it to the command of its study"
-        return InputError("this is a study file, not a model file", field="file", remedy=remedy, source=source)
+        return InputError("this is a study file, not a model file", field="file", remedy=remedy)
     return None
 
 
-def _tag_problem(tags: list[str], table: str, value: Any, source: str) -> InputError:
+def _tag_problem(tags: list[str], table: str, value: Any) -> InputError:
     """What is wrong with the field that says of which kind a table is."""
     choice = " or ".join([", ".join(f'"{tag}"' for tag in tags[:-1]), f'"{tags[-1]}"'])
     given = value if isinstance(value, dict) else {}
     if _TAG in given:
         near = get_close_matches(str(given[_TAG]), tags, n=1)
         remedy = f'did you mean "{near[0]}"? it may be {choice}' if near else f"it may be {choice}"
-        return InputError("unknown type", field=f"{table}.{_TAG}", value=given[_TAG], remedy=remedy, source=source)
+        return InputError("unknown type", field=f"{table}.{_TAG}", value=given[_TAG], remedy=remedy)
     near = get_close_matches(_TAG, given, n=1)
     if near:
         remedy = f'did you mean "{_TAG}"?'
-        return InputError(
-            "unknown field", field=f"{table}.{near[0]}", value=given[near[0]], remedy=remedy, source=source
-        )
-    return InputError("is missing", field=f"{table}.{_TAG}", remedy=f"it may be {choice}", source=source)
+        return InputError("unknown field", field=f"{table}.{near[0]}", value=given[near[0]], remedy=remedy)
+    return InputError("is missing", field=f"{table}.{_TAG}", remedy=f"it may be {choice}")
 
 
 def _tags(schema: type[BaseModel], location: tuple) -> list[str]:
