@@ -6,7 +6,8 @@ import warnings
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
-from paraflex.errors import InputError, ModelWarning
+from paraflex.arguments import checked_arguments
+from paraflex.errors import ModelWarning
 from paraflex.files import Model, load
 from paraflex.mechanism import Mechanism
 from paraflex.results.posed import Posed, posed
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@checked_arguments(model="give a model, a mechanism, or a file's name")
 def pose_of(
     model: Model | Mechanism | str | FilePath, *, assembly: str | None = None, path: str | None = None
 ) -> Posed:
@@ -38,10 +40,6 @@ def pose_of(
         model = load(model)
     if isinstance(model, Mechanism):
         model = Model(model)
-    if not isinstance(model, Model):
-        raise InputError(
-            "not a model", field="model", value=model, remedy="give a model, a mechanism, or a file's name"
-        )
     followed = None
     if path is not None or (model.paths and model.start is None):
         name = model.path_name(path)
