@@ -151,12 +151,7 @@ class TrackingTask:
             As `Mechanism.rigid`, `with_beams`, `with_geometry` or `refined` return it.
         """
         system = build_system(mechanism)
-        return replace(
-            self,
-            mechanism=mechanism,
-            system=system,
-            start=_start(system, self.motion),
-        )
+        return replace(self, mechanism=mechanism, system=system, start=_start(system, self.motion))
 
     @checked_arguments()
     def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
@@ -174,15 +169,7 @@ class TrackingTask:
         """
         if self.whole is not None:
             raise InputError("cut into segments already", field="segments", remedy="cut the task it was made from")
-        segmented = finite_segments(self.mechanism, segments)
-        system = build_system(segmented.mechanism)
-        return replace(
-            self,
-            mechanism=segmented.mechanism,
-            system=system,
-            start=_start(system, self.motion),
-            whole=self,
-        )
+        return replace(self.remodelled(finite_segments(self.mechanism, segments).mechanism), whole=self)
 
     @checked_arguments()
     def balanced(self, mode: str | ActuationMode) -> TrackingTask:

@@ -13,7 +13,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics.points import PointMotion
 from paraflex.fem import BeamMesh, SpanProperties
 from paraflex.mechanism import Joint, PointRef
-from paraflex.results.outlines import Outline
+from paraflex.results.outlines import Outline, turned
 
 Columns = NDArray[np.int64]
 
@@ -141,11 +141,9 @@ class RigidLink:
     def curve(self, drawn: Outline, history: Trajectory) -> Array:
         """Places of the stations of the body (k, s, 2) [m]."""
         r, angle = history.states[0][:, self.columns[:2]], self.frame(history).angle
-        c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
         # Any of its joints gives the distance of the body's frame from the centre of mass.
         point, station = next(iter(drawn.points.items()))
-        x, y = (drawn.places - drawn.places[station] + self.points[point]).T
-        return r[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
+        return turned(r, angle, drawn.places - drawn.places[station] + self.points[point])
 
     def turn(self, point: str, history: Trajectory) -> Turn:
         """Rotation of the material at a named point."""

@@ -79,9 +79,7 @@ def drawing(
     samples = len(next(iter(shapes.values())))
 
     def place(ref: PointRef) -> Array:
-        if ref.on_ground:
-            return np.broadcast_to(np.array(mechanism.ground[ref.point], dtype=float), (samples, 2))
-        return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
+        return _place(mechanism, drawn, shapes, ref, samples)
 
     joined = _joined(mechanism)
     joints = _second([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples)
@@ -274,14 +272,18 @@ def _rigid_bases(
 ) -> tuple[dict[str, Array], Array, Array]:
     """Stations of all bodies, joints and directions of their axes of the rigid mechanism."""
     bases = {name: turned(*posed[name], one.places) for name, one in drawn.items()}
-    ends = [
-        np.broadcast_to(np.array(mechanism.ground[end.point], dtype=float), (samples, 2))
-        if end.on_ground
-        else bases[end.body][:, drawn[end.body].points[end.point]]
-        for end in (_drawn_ends(joint)[0] for joint in mechanism.joints)
-    ]
+    ends = [_place(mechanism, drawn, bases, _drawn_ends(joint)[0], samples) for joint in mechanism.joints]
     directions = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
     return bases, _second(ends, samples), directions
+
+
+def _place(
+    mechanism: Mechanism, drawn: Mapping[str, Outline], shapes: Mapping[str, Array], ref: PointRef, samples: int
+) -> Array:
+    """Place (k, 2) of a point among the stations of its body, or on the ground."""
+    if ref.on_ground:
+        return np.broadcast_to(np.array(mechanism.ground[ref.point], dtype=float), (samples, 2))
+    return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
 
 
 def _bends_between_holds(body: Body, one: Outline, joined: list[tuple[Joint, PointRef]]) -> bool:
@@ -354,17 +356,11 @@ def _directions(
     """Of the axes of joints that slide (k, joints), NaN of others [rad]."""
     out = np.full((samples, len(mechanism.joints)), np.nan)
     for i, joint in enumerate(mechanism.joints):
-        if joint.slides:
-            out[:, i] = _direction(joint, angle, frame)
+        if joint.follows_beam:
+            out[:, i] = frame(joint.a.body)[1]
+        elif joint.slides:
+            out[:, i] = joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
     return out
-
-
-def _direction(
-    joint: Joint, angle: Callable[[PointRef], Array], frame: Callable[[str], tuple[Array, Array]]
-) -> Array | float:
-    if joint.follows_beam:
-        return frame(joint.a.body)[1]
-    return joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
 
 
 def _complex(places: Array) -> NDArray[np.complex128]:

@@ -220,7 +220,7 @@ def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
         struct[field] = _matlab_value(array.values)
         struct["units"][field], struct["meaning"][field] = _unit_and_meaning(array)
         struct["dims"][field] = _cells([str(dim) for dim in array.dims])
-    struct["attributes"] = {matlab_name(str(key)): _matlab_attribute(value) for key, value in data.attrs.items()}
+    struct["attributes"] = {matlab_name(str(key)): value for key, value in data.attrs.items()}
     return struct
 
 
@@ -236,10 +236,6 @@ def _matlab_value(values: NDArray[Any]) -> Any:
     if values.dtype.kind in "fiub":
         return values if values.ndim else values.item()
     return str(values.item()) if not values.ndim else _cells([str(value) for value in values.ravel()])
-
-
-def _matlab_attribute(value: Any) -> Any:
-    return _plain(value) if isinstance(value, str) else value
 
 
 def _cells(texts: Sequence[str]) -> NDArray[Any]:

@@ -31,7 +31,7 @@ from paraflex.results.labelled import (
 )
 from paraflex.results.links import system_links
 from paraflex.results.loads import load_figures
-from paraflex.results.numbers import finite_or_none
+from paraflex.results.numbers import finite_by_name, finite_or_none
 from paraflex.results.record import RUN_FIGURES
 from paraflex.results.reduced_runs import reduction_figures
 from paraflex.results.sensors import sensor_figures
@@ -125,7 +125,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]) if reached.size else None,
-            "angle": _numbers(last["angle"], "body"),
+            "angle": finite_by_name(last["angle"], "body"),
             "point_position": {
                 str(point): [finite_or_none(x) for x in last["point_position"].sel(point=point).values]
                 for point in data["point"].values
@@ -141,7 +141,3 @@ def _coordinate_names(run: MotionRun) -> list[str]:
         for body in run.system.bodies
         for part in ("x", "y", "phi", *(f"eta{k + 1}" for k in range(body.nf)))
     ]
-
-
-def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:
-    return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}

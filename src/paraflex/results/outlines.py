@@ -22,6 +22,7 @@ from paraflex.mechanism import (
 )
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 # Pieces a beam is drawn in, and the fewest between two of its points.
 _BEAM_PIECES, _FEWEST_PIECES = 16, 4
@@ -153,8 +154,8 @@ def _of_parts(system: System, names: Sequence[str], drawn: Outline, q: Array) ->
 class Hold:
     """A point of a body at a joint: in the undeformed body and in the ground frame, each (k,) as x + i y [m]."""
 
-    rest: NDArray[np.complex128]
-    place: NDArray[np.complex128]
+    rest: Complex
+    place: Complex
 
 
 def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
@@ -187,14 +188,7 @@ def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
     return np.stack([out.real, out.imag], axis=-1)
 
 
-def _between(
-    z: NDArray[np.complex128],
-    rest: NDArray[np.complex128],
-    place: NDArray[np.complex128],
-    turn: Array,
-    axis: complex,
-    short: float,
-) -> NDArray[np.complex128]:
+def _between(z: Complex, rest: Complex, place: Complex, turn: Array, axis: complex, short: float) -> Complex:
     """The similarity between two holds; beyond them a free end keeps its length."""
     rest, place = _in_order(rest, place, axis)
     gap, step = np.diff(rest, axis=1)[:, 0], np.diff(place, axis=1)[:, 0]
@@ -206,9 +200,7 @@ def _between(
     return np.where(after, place[:, 1:] + scale * (z - rest[:, 1:]), place[:, :1] + scale * (z - rest[:, :1]))
 
 
-def _spline(
-    z: NDArray[np.complex128], rest: NDArray[np.complex128], place: NDArray[np.complex128], axis: complex, short: float
-) -> NDArray[np.complex128]:
+def _spline(z: Complex, rest: Complex, place: Complex, axis: complex, short: float) -> Complex:
     """The natural cubic spline through holds in line, continued straight and as long as the body beyond the last ones.
 
     With second derivatives M and slopes s of the chords: h_i M_i + 2 (h_i + h_i+1) M_i+1 + h_i+1 M_i+2 =
@@ -244,17 +236,13 @@ def _spline(
     return out
 
 
-def _in_order(
-    rest: NDArray[np.complex128], place: NDArray[np.complex128], axis: complex
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _in_order(rest: Complex, place: Complex, axis: complex) -> tuple[Complex, Complex]:
     """Holds in their order along an axis."""
     order = np.argsort((rest * np.conj(axis)).real, axis=1)
     return np.take_along_axis(rest, order, axis=1), np.take_along_axis(place, order, axis=1)
 
 
-def _fitted(
-    z: NDArray[np.complex128], rest: NDArray[np.complex128], place: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
+def _fitted(z: Complex, rest: Complex, place: Complex) -> Complex:
     """The similarity nearest to all holds, and its residuals, distributed by squares of distances."""
     middle, centre = rest.mean(axis=1, keepdims=True), place.mean(axis=1, keepdims=True)
     arm = rest - middle
@@ -274,7 +262,7 @@ def in_line(drawn: Outline) -> bool:
     return _axis(drawn.places[:, 0] + 1j * drawn.places[:, 1], drawn.size) is not None
 
 
-def _axis(z: NDArray[np.complex128], size: float) -> complex | None:
+def _axis(z: Complex, size: float) -> complex | None:
     """Direction of the line through places; None if they are not on a line."""
     far = z[np.argmax(np.abs(z - z[0]))] - z[0]
     if abs(far) == 0.0:

@@ -18,7 +18,7 @@ from paraflex.linear.reduction import CARRIED, reduce
 from paraflex.linear.states_needed import DAMPING, states_needed
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
-from paraflex.results.numbers import finite_or_none
+from paraflex.results.numbers import finite_by_name, finite_or_none
 from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
 from paraflex.results.storage import origin, origin_figures
 
@@ -191,10 +191,10 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
         run = data.sel(mode=mode, reduction=name)
         frequencies = data["natural_frequency"].sel(mode=mode, variant=name)
         return {
-            "states_needed": _numbers(run["states"], "output"),
-            "largest_error": _numbers(run["largest_error"], "output"),
+            "states_needed": finite_by_name(run["states"], "output"),
+            "largest_error": finite_by_name(run["largest_error"], "output"),
             "bound": finite_or_none(float(run["bound"])),
-            "held_frequency_by_states": _numbers(run["held_frequency"], "kept"),
+            "held_frequency_by_states": finite_by_name(run["held_frequency"], "kept"),
             **{f"frequencies_{holding}": _list(frequencies.sel(holding=holding)) for holding in HOLDINGS},
         }
 
@@ -224,10 +224,6 @@ def percent_off(value: float, exact: float) -> str:
     """How far a number is off another one, in percent; rounding is none."""
     part = value / exact - 1.0
     return "0 %" if abs(part) < _ROUNDING else f"{100.0 * part:+{'.2g' if abs(part) < 1.0 else '.0f'}} %"
-
-
-def _numbers(values: xr.DataArray, dim: str) -> dict[str, float | None]:
-    return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}
 
 
 def _list(values: xr.DataArray) -> list[float]:

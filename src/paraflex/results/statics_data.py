@@ -18,7 +18,7 @@ from paraflex.results.drawing import system_drawing
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
-from paraflex.results.numbers import finite_or_none
+from paraflex.results.numbers import finite_by_name, finite_or_none
 from paraflex.results.run_traces import StaticsTraces
 from paraflex.results.storage import origin, origin_figures
 from paraflex.results.validity import validity_summary, validity_variables
@@ -271,12 +271,8 @@ def statics_summary(data: xr.Dataset) -> dict[str, Any]:
         },
         **{name: [finite_or_none(float(x)) for x in last[name].values] for name in
            ("natural_frequency", "free_frequency")},
-        **({"stress_max": _of_bodies(data["stress_max"])} if "stress_max" in data else {}),
+        **({"stress_max": finite_by_name(data["stress_max"], "body")} if "stress_max" in data else {}),
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         **origin_figures(data),
     }  # fmt: skip
-
-
-def _of_bodies(values: xr.DataArray) -> dict[str, float | None]:
-    return {str(name): finite_or_none(values.sel(body=name).item()) for name in values["body"].values}
