@@ -199,11 +199,11 @@ def motion_start(
     if isinstance(start, State) and balanced:
         raise InputError("a state is as it is", field="balanced", value=balanced, remedy="leave one of the two out")
     system = standing_system(Mechanism.made_of(given), start)
-    state = start if isinstance(start, State) else _state(system, start, balanced)
-    placed = isinstance(start, State) or (isinstance(start, Start) and start.places)
+    given_start, name = start if isinstance(start, Start) else None, start if isinstance(start, str) else None
+    state = start if isinstance(start, State) else state_at(system, given_start, name, balanced=balanced)
+    placed = isinstance(start, State) or (given_start is not None and given_start.places)
     if warning and not placed and system.mechanism.assemblies:
-        assembly = system.mechanism.assembly(start if isinstance(start, str) else None)
-        warn_of(moved_far(system, assembly, state.q), ResultWarning)
+        warn_of(moved_far(system, system.mechanism.assembly(name), state.q), ResultWarning)
     return system, state, np.linspace(state.time, state.time + duration, samples)
 
 
@@ -222,13 +222,6 @@ def _motor_signals(torques: Mapping[str, InTime], end: float) -> tuple[list[Inpu
             (signal,) = constant_signals([float(law)], end)
         signals.append(signal)
     return signals, knots
-
-
-def _state(system: System, start: Start | str | None, balanced: bool) -> State:
-    """The state at the given start, or an assembly at rest."""
-    if isinstance(start, Start):
-        return state_at(system, start, None, balanced=balanced)
-    return state_at(system, None, start, balanced=balanced)
 
 
 def state_at(system: System, start: Start | None, assembly: str | None, *, balanced: bool) -> State:

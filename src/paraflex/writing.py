@@ -172,7 +172,7 @@ def portable_name(text: str) -> str:
     return f"_{name}" if name.partition(".")[0].upper() in _DEVICES else name or "_"
 
 
-def unwritable(error: OSError, field: str, remedy: str, value: str | None = None) -> OutputError:
+def unwritable(error: Exception, field: str, remedy: str, value: str | None = None) -> OutputError:
     """The error of a place that cannot be written, with the system's reason."""
-    reason = (error.strerror or str(error)).lower()
+    reason = (getattr(error, "strerror", None) or str(error)).lower()
     return OutputError(f"cannot be written ({reason})", field=field, value=value, remedy=remedy)

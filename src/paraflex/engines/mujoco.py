@@ -145,37 +145,25 @@ def _add_relation(mujoco: Any, spec: Any, one: Relation, tree: Tree, step: float
     """Let the hinge of the second joint follow that of the first, by a polynomial of degree one."""
     hinge = {link.joint.name: link for link in tree.links}
     first, second = (hinge[name] for name in one.joints)
-    equality = spec.add_equality(
-        name=one.name,
-        type=mujoco.mjtEq.mjEQ_JOINT,
-        objtype=mujoco.mjtObj.mjOBJ_JOINT,
-        name1=second.name,
-        name2=first.name,
-    )
+    kind, of = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
+    equality = _equality(spec, one.name, kind, of, second.name, first.name, step)
     assert one.phase is not None
     equality.data[:2] = second.sign * one.phase, second.sign * one.transmission * first.sign
-    _stiffen(equality, step)
 
 
 def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, step: float) -> None:
-    sites = []
-    for side, ref in (("a", joint.a), ("b", joint.b)):
-        name = f"{joint.name} {side}"
+    sites = [f"{joint.name} {side}" for side in "ab"]
+    for name, ref in zip(sites, (joint.a, joint.b), strict=True):
         bodies[ref.body].add_site(name=name, pos=[*place(system, ref), 0.0])
-        sites.append(name)
-    equality = spec.add_equality(
-        name=joint.name,
-        type=mujoco.mjtEq.mjEQ_CONNECT,
-        objtype=mujoco.mjtObj.mjOBJ_SITE,
-        name1=sites[0],
-        name2=sites[1],
-    )
-    _stiffen(equality, step)
+    _equality(spec, joint.name, mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_SITE, sites[0], sites[1], step)
 
 
-def _stiffen(equality: Any, step: float) -> None:
+def _equality(spec: Any, name: str, kind: Any, of: Any, first: str, second: str, step: float) -> Any:
+    """A constraint of two joints or sites, as stiff as MuJoCo allows."""
+    equality = spec.add_equality(name=name, type=kind, objtype=of, name1=first, name2=second)
     equality.solref = [_TIME_CONSTANT * step, 1.0]
     equality.solimp = [_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0]
+    return equality
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from fnmatch import fnmatch
 from importlib.metadata import version
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from paraflex.errors import InputError, OutputError
 from paraflex.folders.changes import MANIFEST, NEW, READY, REMOVED, check_place, files_in, finish_moves
-from paraflex.folders.lock import LOCK, FolderInUseError, lock_folder, no_folder
+from paraflex.folders.lock import LOCK, FolderInUseError, lock_folder
 from paraflex.folders.manifest import STUDY_OF_RUNS, Manifest, digest_of, files_of, kind_of_folder
 from paraflex.writing import ELSEWHERE, unwritable, write_json
 
@@ -52,7 +52,7 @@ class ResultsFolder:
         OutputError
             It cannot be written; the results before are all there.
         """
-        with self._changed(lambda name: not _matches(name, but)) as new:
+        with self._changed(lambda name: not any(fnmatch(name, pattern) for pattern in but)) as new:
             yield new
 
     @contextmanager
@@ -132,7 +132,7 @@ def hold_folder(
                 (path / NEW).mkdir()
                 (path / NEW).rmdir()
             except OSError as error:
-                raise no_folder(path, error, field) from error
+                raise unwritable(error, field, ELSEWHERE, str(path)) from error
             yield ResultsFolder(path, kind, locks=locks, remedy=remedy)
     finally:
         _remove_empty(path, made)
@@ -171,7 +171,3 @@ def _remove_empty(folder: Path, made: Sequence[Path]) -> None:
             (folder / LOCK).unlink()
         for each in made:
             each.rmdir()
-
-
-def _matches(name: str, patterns: Iterable[str]) -> bool:
-    return any(fnmatch(name, pattern) for pattern in patterns)

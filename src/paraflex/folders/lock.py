@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from paraflex.errors import InputError, OutputError
+from paraflex.errors import InputError
 from paraflex.folders.changes import READY, finish_moves
-from paraflex.writing import ELSEWHERE
+from paraflex.writing import ELSEWHERE, unwritable
 
 LOCK = ".lock"
 # How long a reader waits for a writer that moves files [s], and how often it looks.
@@ -39,7 +39,7 @@ def lock_folder(folder: Path, *, field: str = "--output") -> Iterator[bool]:
         folder.mkdir(parents=True, exist_ok=True)
         lock = sqlite3.connect(folder / LOCK, timeout=0.0)
     except (OSError, sqlite3.OperationalError) as error:
-        raise no_folder(folder, error, field) from error
+        raise unwritable(error, field, ELSEWHERE, str(folder)) from error
     with closing(lock):
         try:
             # Nothing is written to this file, nor to a journal of it.
@@ -52,7 +52,7 @@ def lock_folder(folder: Path, *, field: str = "--output") -> Iterator[bool]:
                     "another process writes to it", field=field, value=str(folder), remedy=remedy
                 ) from None
             if code != sqlite3.SQLITE_IOERR:
-                raise no_folder(folder, error, field) from error
+                raise unwritable(error, field, ELSEWHERE, str(folder)) from error
             locks = False
         finish_moves(folder)
         yield locks
@@ -77,9 +77,3 @@ def finish_change(folder: Path) -> None:
             if time.monotonic() > until:
                 raise
             time.sleep(_LOOK)
-
-
-def no_folder(folder: Path, error: Exception, field: str = "--output") -> OutputError:
-    """The error of a folder that cannot be made or written."""
-    reason = (getattr(error, "strerror", None) or str(error)).lower()
-    return OutputError(f"cannot be written ({reason})", field=field, value=str(folder), remedy=ELSEWHERE)
