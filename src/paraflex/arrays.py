@@ -13,6 +13,6 @@ Array = NDArray[np.float64]
 Numbers = NDArray[Any]
 
 
-def side_by_side(columns: Sequence[Numbers], rows: int) -> Numbers:
-    """Columns (rows, ...) as an array (rows, columns, ...); (rows, 0) without any."""
-    return np.stack(columns, axis=1) if columns else np.zeros((rows, 0))
+def side_by_side(columns: Sequence[Numbers], rows: int, *inner: int) -> Numbers:
+    """Columns (rows, ...) as an array (rows, columns, ...), of whose last dimensions `inner` are the sizes."""
+    return np.stack(columns, axis=1) if columns else np.zeros((rows, 0, *inner))

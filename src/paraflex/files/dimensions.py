@@ -6,8 +6,7 @@ import ast
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from paraflex.errors import InputError
-from paraflex.files.expressions import CONSTANTS, ExpressionError, tree_of
+from paraflex.files.expressions import CONSTANTS, ExpressionError, expression_of, tree_of
 from paraflex.units import ANGLE, PLAIN, Dimension, spelt, unit_named
 
 # That of a name; None where it is not known, such as that of the time or of a parameter without a unit.
@@ -51,10 +50,8 @@ def dimensions_of_parameters(table: Mapping[str, Any]) -> dict[str, Dimension | 
         return found[name]
 
     for name, entry in table.items():
-        try:
+        with expression_of(f"parameters.{name}", entry):
             of(name)
-        except ExpressionError as error:
-            raise InputError(error.problem, field=f"parameters.{name}", value=entry, remedy=error.remedy) from None
     return found
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,15 @@ class ExpressionError(ValueError):
         self.problem = problem
         self.remedy = remedy
         super().__init__(problem)
+
+
+@contextmanager
+def expression_of(field: str, value: object) -> Iterator[None]:
+    """Errors of an expression become those of the field that has it."""
+    try:
+        yield
+    except ExpressionError as error:
+        raise InputError(error.problem, field=field, value=value, remedy=error.remedy) from None
 
 
 def evaluate(text: str, parameters: Mapping[str, float]) -> float:
@@ -134,10 +144,8 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
             raise InputError("not usable as a name", field=field, value=name, remedy="letters, digits and _; not pi")
         if isinstance(entry, bool) or not isinstance(entry, (int, float, str)):
             raise InputError("neither a number nor an expression", field=field, value=entry, remedy="give one of them")
-        try:
+        with expression_of(field, entry):
             value = value_of(name, ())
-        except ExpressionError as error:
-            raise InputError(error.problem, field=field, value=entry, remedy=error.remedy) from None
         if not math.isfinite(value):
             raise InputError("not a finite number", field=field, value=entry, remedy="give a number")
     return values

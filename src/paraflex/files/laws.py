@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.files.expressions import (
-    ExpressionError,
     check_in_time,
     evaluate,
     evaluate_in_time,
+    expression_of,
     is_constant,
     names_in,
 )
@@ -51,10 +51,8 @@ class ExpressionLaw:
     knots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        try:
+        with expression_of(self.field, self.text):
             check_in_time(self.text, self.parameters)
-        except ExpressionError as error:
-            raise InputError(error.problem, field=self.field, value=self.text, remedy=error.remedy) from None
         spoken_of = names_in(self.text)
         used = {name: value for name, value in self.parameters.items() if name in spoken_of}
         object.__setattr__(self, "parameters", used)
@@ -67,10 +65,8 @@ class ExpressionLaw:
         InputError
             One of them is no finite number at some time.
         """
-        try:
+        with expression_of(self.field, self.text):
             jet = evaluate_in_time(self.text, self.parameters, t)
-        except ExpressionError as error:
-            raise InputError(error.problem, field=self.field, value=self.text, remedy=error.remedy) from None
         return jet.value, jet.rate, jet.acceleration
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array, side_by_side
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
@@ -18,8 +19,6 @@ from paraflex.mechanism.gears import SumRelation
 from paraflex.mechanism.poses import local_points
 from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
 from paraflex.results.stiff import Frames, rigid_frames
-
-Array = NDArray[np.float64]
 
 # Joints of wheels and of racks: whether they slide, and what they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
@@ -82,7 +81,7 @@ def drawing(
         return _place(mechanism, drawn, shapes, ref, samples)
 
     joined = _joined(mechanism)
-    joints = _second([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples)
+    joints = side_by_side([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples, 2)
     directions = _directions(mechanism, samples, angle, frame)
     springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
     posed = None
@@ -274,7 +273,7 @@ def _rigid_bases(
     bases = {name: turned(*posed[name], one.places) for name, one in drawn.items()}
     ends = [_place(mechanism, drawn, bases, _drawn_ends(joint)[0], samples) for joint in mechanism.joints]
     directions = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
-    return bases, _second(ends, samples), directions
+    return bases, side_by_side(ends, samples, 2), directions
 
 
 def _place(
@@ -365,7 +364,3 @@ def _directions(
 
 def _complex(places: Array) -> NDArray[np.complex128]:
     return places[..., 0] + 1j * places[..., 1]
-
-
-def _second(parts: list[Array], samples: int) -> Array:
-    return np.stack(parts, axis=1) if parts else np.zeros((samples, 0, 2))
