@@ -141,12 +141,10 @@ def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
 
 def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
     """A drawing at times (k,) as a run: what is drawn, and nothing else."""
-    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
     effector = mechanism.end_effector
     return xr.Dataset(
         {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(one).items()},
-        coords={"time": time, "point": points, "joint": [joint.name for joint in mechanism.joints],
-                **drawing_coordinates(mechanism)},
+        coords={"time": time, **drawing_coordinates(mechanism)},
         attrs={"mechanism": mechanism.name} | ({} if effector is None else {"end_effector_point": str(effector.point)}),
     )  # fmt: skip
 
@@ -166,7 +164,7 @@ def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
 
 
 def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
-    """Labels of these variables: bodies of the stations, stations of the points, kinds of the joints.
+    """Labels of these variables: names of points and joints, bodies of the stations, stations of the points, kinds.
 
     Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
     -1, and so has the rail of a joint without one on a moving body.
@@ -183,7 +181,9 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     out: dict[str, Any] = {
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
         "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
+        "point": list(map(str, stations)),
         "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
+        "joint": [joint.name for joint in joints],
         "joint_kind": ("joint", [joint.symbol for joint in joints]),
         "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
         "joint_driven": ("joint", np.array([joint.name in driven for joint in joints], dtype=bool)),

@@ -109,7 +109,7 @@ def linear_dataset(
         "mode": [model.mode for model in models], "holding": list(HOLDINGS), "frequency": frequency,
         "map": list(dict.fromkeys(name for each in maps for name in each)), "axis": ["x", "y"],
         "state_of": [*names["states"]],
-        **_labels(first),
+        **drawing_coordinates(first.minimal.system.mechanism),
     }  # fmt: skip
     for key, own in names.items():
         coordinates[key[:-1]] = [*own]
@@ -273,12 +273,6 @@ def _drawn(model: LinearModel, shapes: Array) -> dict[str, Array]:
 def _change(name: str, one: Drawing, other: Drawing) -> Array:
     values = getattr(one, name) - getattr(other, name)
     return np.arctan2(np.sin(values), np.cos(values)) if name == "directions" else values
-
-
-def _labels(model: LinearModel) -> dict[str, Any]:
-    mechanism = model.minimal.system.mechanism
-    points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
-    return {"point": points, "joint": [joint.name for joint in mechanism.joints], **drawing_coordinates(mechanism)}
 
 
 def _provenance(model: LinearModel, parameters: dict[str, Any] | None) -> dict[str, Any]:

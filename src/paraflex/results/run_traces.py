@@ -83,11 +83,10 @@ class SolutionTraces(Generic[R]):
         """Magnitude of the force in every joint (k, joints) [N]; zero near poles, NaN where not determined."""
         system, solution = self.system, self.solution
         multipliers = np.where(np.isnan(solution.multipliers), 0.0, solution.multipliers)
-        forces = [
-            load_in(system, joint.name, joint_parts(system, joint.name), solution.q, multipliers, self.torque)[0]
-            for joint in system.described.joints
-        ]
         names = [joint.name for joint in system.described.joints]
+        forces = [
+            load_in(system, name, joint_parts(system, name), solution.q, multipliers, self.torque)[0] for name in names
+        ]
         shared = undetermined_loads(system, names, solution.q.real, solution.acting).force.any(axis=2)
         known = side_by_side([length(each) for each in forces], len(solution.q))
         return np.where(shared, np.nan, known)
