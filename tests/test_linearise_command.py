@@ -10,6 +10,7 @@ import pytest
 
 import paraflex as pf
 from conftest import DESKTOP
+from paraflex.cli.repeated import repeated_runs
 from paraflex.dynamics.joint_coordinates import marker_place
 from paraflex.files import library_text
 from paraflex.linear.branches import pole_branches
@@ -292,6 +293,16 @@ def test_about_the_runs_of_a_folder(tmp_path):
     ):
         done = paraflex("linearise", *words)
         assert (done.returncode, done.stderr.splitlines()[-1][: len(problem) + 7]) == (2, f"error: {problem}")
+
+
+def test_a_run_from_equilibrium_is_made_again_from_there(tmp_path):
+    few = ("--duration", "0.01", "--samples", "3", "--no-report")
+    ran = paraflex("run", "five_bar", "--set", "gravity=[0,-9.81]", "--balanced", *few, "--out", tmp_path)
+    assert ran.returncode == 0
+    energy = pf.open_results(tmp_path)["strain_energy"].values[0]
+    _, runs = repeated_runs(str(tmp_path))
+    assert energy[0] > 1e-3
+    assert np.array_equal(pf.tracking_dataset(list(runs))["strain_energy"].values[0], energy)
 
 
 def test_about_equilibrium():

@@ -452,20 +452,25 @@ fields = ["section.bar.thickness"]
 """
 
 
-def study_of(folder, force):
+def study_of(folder, force, flexible=True):
     text = library_file("raparm_i").read_text(encoding="utf-8").replace("\n[", "\n[parameters]\na = 5.0\n[", 1)
+    if not flexible:
+        text = text.replace('type = "beam"', 'type = "beam"\nflexible = false')
     (folder / "model.toml").write_text(f'{text}\n[load.tool]\ntype = "force"\npoint = "link4.C"\n{force}\n')
     (folder / "study.toml").write_text(STUDY)
     return load_sensitivities(folder / "study.toml")
 
 
-def test_runs_have_derivatives_by_a_number_in_a_law_of_a_load(tmp_path):
-    study = study_of(tmp_path, 'force = ["a * sin(40 * t)", "-a * t"]')
+@pytest.mark.parametrize("flexible", [True, False])
+def test_runs_have_derivatives_by_a_number_in_a_law_of_a_load(tmp_path, flexible):
+    """Without flexible bodies the equations of motion are solved at samples within steps, where curves are 2 % off."""
+    study = study_of(tmp_path, 'force = ["a * sin(200 * t)", "-a * t"]', flexible)
     setting = study.setting
     task = Task(0, 0, nominal_values(study.setting), "line")
     planned, options = plan_task(setting, task)
     nominal = given(planned, options, "++++")
-    for k, (step, within) in enumerate([(1e-2, 3e-6), (3e-4, 3e-6)]):
+    # Rigid links know their thickness by their mass alone.
+    for k, step in enumerate([1e-2, 3e-4 if flexible else 3e-2]):
         change = Change(setting, task, planned, k, task.values[k]).of_mode(nominal)
         assert change.error < 1e-10
         found = run_derivatives(nominal.problem, options, [change.direction])
@@ -479,7 +484,9 @@ def test_runs_have_derivatives_by_a_number_in_a_law_of_a_load(tmp_path):
             motions.append(run_derivatives(near.problem, options, []).motion)
         for kind, exact, parts in zip(found.motion._fields, found.derivatives, zip(*motions, strict=True), strict=True):
             expected = sum(weight * part for (_, weight), part in zip(PLACES, parts, strict=True)) / step
-            assert np.abs(exact[0] - expected).max() < within * np.abs(expected).max(), kind
+            # Rigid links follow the plan whatever they weigh and carry: how their motion changes is rounding.
+            if flexible or kind == "multipliers":
+                assert np.abs(exact[0] - expected).max() < 3e-6 * np.abs(expected).max(), kind
 
 
 @pytest.mark.parametrize(

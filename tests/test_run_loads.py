@@ -97,9 +97,9 @@ def test_every_effort_has_its_unit():
     turns, slides = ("N m", "rad/s"), ("N", "m/s")
     assert units == {"lift": slides, "turn": turns, "push": slides, "spin": turns}
     push, spin = effort_lines(loads)
-    assert push.startswith("drive push: force up to ")
+    assert push.startswith("prescribed.push: force up to ")
     assert "; speed up to 2 m/s; power up to " in push
-    assert spin.startswith("drive spin: torque up to ")
+    assert spin.startswith("prescribed.spin: torque up to ")
     assert "; speed up to 3 rad/s, 28.65 rpm; power up to " in spin
     efforts = dict(motion_page(data).more)["Motors and prescribed motions"]
     assert efforts.count("m/s") == efforts.count("rad/s") == 2

@@ -82,8 +82,8 @@ class InputError(ParaflexError, ValueError):
 
 
 @contextmanager
-def fields_within(table: str) -> Iterator[None]:
-    """Put the field of an `InputError` inside a table: see `InputError.within`."""
+def within(table: str) -> Iterator[None]:
+    """Context whose input errors name their fields inside a table."""
     try:
         yield
     except InputError as error:

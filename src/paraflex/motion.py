@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.actuation import Electrical, electrical, electrical_findings
 from paraflex.arguments import checked_arguments, given_as
-from paraflex.arrays import Array, side_by_side
+from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import (
     InputSignals,
@@ -70,7 +70,7 @@ class MotionRun(Shown):
         each = [
             law.evaluate(t)[0] if isinstance(law, AngleLaw) else np.full(t.size, law) for law in self.torques.values()
         ]
-        return side_by_side(each, t.size)
+        return np.stack(each, axis=1) if each else np.zeros((t.size, 0))
 
     @cached_property
     def validity(self) -> Validity | None:
@@ -199,11 +199,15 @@ def motion_start(
     if isinstance(start, State) and balanced:
         raise InputError("a state is as it is", field="balanced", value=balanced, remedy="leave one of the two out")
     system = standing_system(Mechanism.made_of(given), start)
-    given_start, name = start if isinstance(start, Start) else None, start if isinstance(start, str) else None
-    state = start if isinstance(start, State) else state_at(system, given_start, name, balanced=balanced)
-    placed = isinstance(start, State) or (given_start is not None and given_start.places)
+    if isinstance(start, State):
+        state = start
+    else:
+        near, assembly = (start, None) if isinstance(start, Start) else (None, start)
+        state = state_at(system, near, assembly, balanced=balanced)
+    placed = isinstance(start, State) or (isinstance(start, Start) and start.places)
     if warning and not placed and system.mechanism.assemblies:
-        warn_of(moved_far(system, system.mechanism.assembly(name), state.q), ResultWarning)
+        assembly = system.mechanism.assembly(start if isinstance(start, str) else None)
+        warn_of(moved_far(system, assembly, state.q), ResultWarning)
     return system, state, np.linspace(state.time, state.time + duration, samples)
 
 

@@ -9,8 +9,8 @@ earlier releases are.
 from __future__ import annotations
 
 import hashlib
-from io import BufferedIOBase
 from pathlib import Path
+from typing import BinaryIO
 
 from paraflex.errors import InputError
 
@@ -68,7 +68,7 @@ def damaged(file: Path, why: str, remedy: str) -> InputError:
     return InputError(f"damaged: {why}", field=str(file), remedy=remedy)
 
 
-def _is_whole(stream: BufferedIOBase) -> bool:
+def _is_whole(stream: BinaryIO) -> bool:
     start, end = _place(stream)
     start -= _SEAL
     if start < 0:
@@ -80,7 +80,7 @@ def _is_whole(stream: BufferedIOBase) -> bool:
     return found[len(_MARK) :] == _digest(stream, start, start + _SEAL)
 
 
-def _place(stream: BufferedIOBase) -> tuple[int, int]:
+def _place(stream: BinaryIO) -> tuple[int, int]:
     """Where a seal is to stand, or ends, and where the file ends."""
     end = stream.seek(0, 2)
     stream.seek(0)
@@ -91,7 +91,7 @@ def _place(stream: BufferedIOBase) -> tuple[int, int]:
     return max(end - _TAIL - footer, 0), end
 
 
-def _named_end(stream: BufferedIOBase, end: int) -> int:
+def _named_end(stream: BinaryIO, end: int) -> int:
     """Where an HDF5 file says that it ends: what lies behind it was a seal. Of other files where they do end."""
     stream.seek(0)
     head = stream.read(36)
@@ -101,7 +101,7 @@ def _named_end(stream: BufferedIOBase, end: int) -> int:
     return end
 
 
-def _digest(stream: BufferedIOBase, stop: int, go_on: int) -> bytes:
+def _digest(stream: BinaryIO, stop: int, go_on: int) -> bytes:
     """Of all bytes before one place and from another on."""
     found = hashlib.blake2b(digest_size=_DIGEST)
     stream.seek(0)
@@ -110,4 +110,6 @@ def _digest(stream: BufferedIOBase, stop: int, go_on: int) -> bytes:
         found.update(piece)
         left -= len(piece)
     stream.seek(go_on)
-    return hashlib.file_digest(stream, lambda: found).digest()
+    while piece := stream.read(_PIECE):
+        found.update(piece)
+    return found.digest()

@@ -244,7 +244,8 @@ class TrackingRun(Shown):
     @cached_property
     def validity(self) -> Validity | None:
         """Validity of the model in the run; None for rigid bodies and finite segments."""
-        return assess(self.task.system, self.solution, self._following())
+        following = None if self.driven is None else Following(self.driven.deviation, self.driven.condition)
+        return assess(self.task.system, self.solution, following)
 
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
@@ -276,10 +277,6 @@ class TrackingRun(Shown):
             return None
         actual = marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0]
         return task.driven(self.mode.name, self.applied, self.condition[:k], actual)
-
-    def _following(self) -> Following | None:
-        """Deviation from the path and condition number, where torques drive the mechanism along it."""
-        return None if self.driven is None else Following(self.driven.deviation, self.driven.condition)
 
     def warn(self) -> None:
         """Issue a `ValidityWarning` or a `ResultWarning` for each finding."""

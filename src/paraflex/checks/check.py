@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 
-from paraflex.arguments import checked_arguments
 from paraflex.checks.pose import Examination, examine, pose_findings
 from paraflex.checks.start import start_findings
 from paraflex.checks.study import path_findings, study_findings, task_findings
 from paraflex.checks.unused import file_findings
+from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.findings import Finding, Verdict
 from paraflex.integrators import loose_tolerance
@@ -18,7 +18,14 @@ from paraflex.tracking import TrackingTask
 from paraflex.validity.numbers import doubtful_numbers
 
 
-@checked_arguments(model="give a model, a mechanism, or a file's name")
+def loaded(model: Model | Mechanism | str | FilePath) -> Model | Mechanism:
+    """A model or mechanism as it is, or the model of a name or file; an `InputError` for anything else."""
+    found = load(model) if isinstance(model, str | FilePath) else model
+    if isinstance(found, Model | Mechanism):
+        return found
+    raise InputError("not a model", field="model", value=model, remedy="give a model, a mechanism, or a file's name")
+
+
 def check(
     model: Model | Mechanism | str | FilePath,
     *,
@@ -52,8 +59,7 @@ def check(
     InputError
         A file that cannot be read, an unknown path, assembly or mode, or nothing to check.
     """
-    if isinstance(model, str | FilePath):
-        model = load(model)
+    model = loaded(model)
     mechanism = model if isinstance(model, Mechanism) else model.mechanism
     if isinstance(model, Model):
         assembly = assembly or model.study.assembly

@@ -6,9 +6,9 @@ import warnings
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
-from paraflex.arguments import checked_arguments
+from paraflex.checks.check import loaded
 from paraflex.errors import ModelWarning
-from paraflex.files import Model, load
+from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.results.posed import Posed, posed
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@checked_arguments(model="give a model, a mechanism, or a file's name")
 def pose_of(
     model: Model | Mechanism | str | FilePath, *, assembly: str | None = None, path: str | None = None
 ) -> Posed:
@@ -36,8 +35,7 @@ def pose_of(
     InputError
         A file that cannot be read, an unknown path or assembly, or no assembly at all.
     """
-    if isinstance(model, str | FilePath):
-        model = load(model)
+    model = loaded(model)
     if isinstance(model, Mechanism):
         model = Model(model)
     followed = None

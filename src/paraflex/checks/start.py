@@ -9,7 +9,6 @@ from paraflex.dynamics import start_state
 from paraflex.errors import InputError, NumericalError
 from paraflex.files import Model
 from paraflex.findings import Finding
-from paraflex.mechanism import Mechanism, Start
 from paraflex.validity.numbers import FAST, mechanism_size
 
 
@@ -20,17 +19,18 @@ def start_findings(model: Model, seen: Examination, assembly: str | None) -> Ite
     chosen = model.mechanism.assembly(assembly) if seen.starts else None
     try:
         start_state(seen.system, model.start, chosen)
-        yield from _fast(model.mechanism, model.start)
+        yield from _fast(model)
     except InputError as error:
         yield Finding("start-refused", error.field, error.problem, error.remedy)
     except NumericalError as error:
         yield Finding("start-refused", "start", str(error), "give a start that the joints allow")
 
 
-def _fast(mechanism: Mechanism, start: Start) -> Iterator[Finding]:
+def _fast(model: Model) -> Iterator[Finding]:
     """Rates that no body turns at."""
-    size = mechanism_size(mechanism)
-    for body, rate in start.angular.items():
+    size = mechanism_size(model.mechanism)
+    given = {} if model.start is None else model.start.angular
+    for body, rate in given.items():
         if abs(rate) * size > FAST:
             yield Finding(
                 "speed-large", f"start.velocity.angular.{body}",

@@ -9,16 +9,8 @@ from rich.console import Console
 from paraflex.cli.tables import number, plain_table, print_titled
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 
-# Names that fit above a column.
-_SHORT = {
-    "rigid": "rigid",
-    "ked": "KED",
-    "linear": "linear",
-    "second-order": "2nd-ord.",
-    "segments": "segments",
-    "exudyn": "Exudyn",
-    "mujoco": "MuJoCo",
-}
+# Names that fit above a column, of models that are printed by others than their own.
+_SHORT = {"ked": "KED", "second-order": "2nd-ord.", "exudyn": "Exudyn", "mujoco": "MuJoCo"}
 _ERRORS = ("error\n[m]", "largest\n[m]", "RMS\n[m]", "wall\n[s]")
 _SOUND = {
     "finer step\n[m]": "change_with_finer_step",
@@ -37,31 +29,35 @@ def print_agreement(console: Console, summary: dict[str, Any], mode: str) -> Non
     reference = summary["reference"]
     compared = {name: values for name, values in finished.items() if "distance_max" in values and name != reference}
 
-    short = [_SHORT[name] for name in finished]
+    short = [_short(name) for name in finished]
     where = f"{summary['mechanism']}, mode {mode}"
     span = SPAN_WORDS[ErrorSpan(summary["error"])]
     print_titled(
         console,
-        f"{where}: tracking error {span}, and distance from the path of {_SHORT[reference]}",
+        f"{where}: tracking error {span}, and distance from the path of {_short(reference)}",
         plain_table("model", numbers=_ERRORS, rows=(_errors(name, one, reference) for name, one in models.items())),
     )
     apart = (
-        [_SHORT[a], *("" if a == b else number(distances[a][b], ".1e") for b in finished)] for a in finished
+        [_short(a), *("" if a == b else number(distances[a][b], ".1e") for b in finished)] for a in finished
     )  # fmt: skip
     table = plain_table("", numbers=short, rows=apart)
     print_titled(console, "Largest distance between the paths of two models [m]", table)
-    sound = ([_SHORT[name], *(number(one[key], ".1e") for key in _SOUND.values())] for name, one in finished.items())
+    sound = ([_short(name), *(number(one[key], ".1e") for key in _SOUND.values())] for name, one in finished.items())
     title = "Change of the path with a finer step and mesh, imbalance of energy, constraint violation"
     print_titled(console, title, plain_table("model", numbers=_SOUND, rows=sound))
     for key, what in _LINKS.items() if compared else ():
         of_links = [one[f"{key}_difference_rms"] for one in compared.values()]
         rows = ([link, *(number(each[link], ".1e") for each in of_links)] for link in summary["links"])
-        table = plain_table("link", numbers=(_SHORT[name] for name in compared), rows=rows)
-        print_titled(console, f"RMS difference of each link's {what} from {_SHORT[reference]}", table)
+        table = plain_table("link", numbers=(_short(name) for name in compared), rows=rows)
+        print_titled(console, f"RMS difference of each link's {what} from {_short(reference)}", table)
 
 
 def _errors(name: str, values: dict[str, Any], reference: str) -> list[str]:
     if "tracking_error" not in values:
-        return [_SHORT[name], "failed"]
+        return [_short(name), "failed"]
     far = ("" if name == reference else number(values.get(f"distance_{kind}"), ".1e") for kind in ("max", "rms"))
-    return [_SHORT[name], number(values["tracking_error"], ".4e"), *far, number(values["wall_time"], ".2f")]
+    return [_short(name), number(values["tracking_error"], ".4e"), *far, number(values["wall_time"], ".2f")]
+
+
+def _short(name: str) -> str:
+    return _SHORT.get(name, name)

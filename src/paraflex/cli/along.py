@@ -20,7 +20,7 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import check_stops, model_parameters
 from paraflex.cli.reduced import asked_reduction, kept_coordinates
-from paraflex.cli.request import acting_controllers, at_fault, controllers_said, plan_study
+from paraflex.cli.request import acting_controllers, asked_of, at_fault, controllers_said, plan_study
 from paraflex.cli.tables import (
     below_tolerance,
     failures,
@@ -80,21 +80,28 @@ def run_along(
     planned = []
     # A path that cannot be followed is refused before the first is run.
     for name, (path, folder) in paths.items():
-        task = plan_study(model, mechanism, path, name, request.plan, request.after)
+        task, full = asked_tasks(request, model, mechanism, (path, name), modes)
         if request.segments is not None:
-            task = task.in_segments(proportional_segments(mechanism, request.segments))
             check_stops(task.mechanism, options, request.stop_at)
-        kept, full = kept_coordinates(request, model.study), None
-        if kept is not None:
-            full, task = task, task.remodelled(asked_reduction(request, task, kept, modes))
         parameters = _parameters(model, name, modes, task, how, request, controllers)
         doubts = check_planned(model, task, name, modes, request.plan.assembly)
-        method, error = _method(request, options, controllers), model.study.error
+        method, error = own_method(request, options, controllers), model.study.error
         study = TrackingStudy(
             task, modes, options, parameters, method, error, warning=False, findings=doubts, full=full
         )
         planned.append(_Along(name, study, folder, f'path "{name}": ' if len(paths) > 1 else ""))
     return _run(request, model, planned, _model_name(request, mechanism), began)
+
+
+def asked_tasks(
+    request: RunRequest, model: Model, mechanism: Mechanism, along: tuple[Path, str], modes: Sequence[ActuationMode]
+) -> tuple[TrackingTask, TrackingTask | None]:
+    """The plan of a path as it is run, in finite segments or with few coordinates; of the latter that with all too."""
+    task = plan_study(model, mechanism, *along, request.plan, request.after)
+    if request.segments is not None:
+        return task.in_segments(proportional_segments(mechanism, request.segments)), None
+    kept = kept_coordinates(request, model.study)
+    return (task, None) if kept is None else (task.remodelled(asked_reduction(request, task, kept, modes)), task)
 
 
 def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity: str, began: float) -> int:
@@ -172,7 +179,7 @@ def _draw(console: Console, request: RunRequest, along: _Along, result: StudyRes
         failures(console, result, along.whose)
 
 
-def _method(
+def own_method(
     request: RunRequest, options: IntegrationOptions, controllers: Sequence[ControllerDescription]
 ) -> Simulator | None:
     """How each mode is run where it is not by the study's own way."""
@@ -206,22 +213,17 @@ def _parameters(
     request: RunRequest,
     controllers: Sequence[ControllerDescription],
 ) -> dict:
-    return {
-        "model": dict(model.parameters),
-        "run": {
-            "mechanism": model.source,
-            "set": dict(model.settings),
-            "path": path,
-            "modes": [mode.name for mode in modes],
-            "duration": float(task.motion.t[-1]),
-            "samples": int(task.motion.t.size),
-            "after": task.after.value,
-            "error": model.study.error,
-            "controllers": controllers_said(model, controllers),
-        }
-        | model_parameters(request, task.mechanism, kept_coordinates(request, model.study))
-        | how,
+    run = {
+        "path": path,
+        "modes": [mode.name for mode in modes],
+        "duration": float(task.motion.t[-1]),
+        "samples": int(task.motion.t.size),
+        "after": task.after.value,
+        "error": model.study.error,
+        "controllers": controllers_said(model, controllers),
     }
+    kept = kept_coordinates(request, model.study)
+    return asked_of(model, run | model_parameters(request, task.mechanism, kept) | how)
 
 
 @contextmanager

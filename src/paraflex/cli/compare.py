@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
 from paraflex.cli import COMPLETE
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import CompareRequest
 from paraflex.cli.ending import say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.tables import plain_table, print_titled
-from paraflex.errors import InputError
 from paraflex.folders import RUN_COMPARISON, ResultsFolder
 from paraflex.results.comparison import MotionPair, NumberPair, RunComparison, compare
 from paraflex.results.metrics import metric_label
@@ -28,25 +29,15 @@ _MOST_SETTINGS, _MOST_LETTERS = 20, 40
 def compare_command(request: CompareRequest) -> int:
     """Compare two runs, print what differs, and write it where that is asked for; the exit code."""
     began = time.perf_counter()
-    try:
+    with flagged(request):
         found = compare(request.first, request.second, request.modes)
-    except InputError as error:
-        if error.field != "modes":
-            raise
-        raise error.at("--mode") from None
-    if request.out is None:
-        _tell(found, request)
-        return COMPLETE
-    with hold_results(request.out, RUN_COMPARISON, force=request.force) as folder:
-        _write(found, folder)
-    _tell(found, request)
-    if not request.json:
-        say_where(began, "numbers and figures", folder.path)
-    return COMPLETE
-
-
-def _tell(found: RunComparison, request: CompareRequest) -> None:
+    if request.out is not None:
+        with hold_results(request.out, RUN_COMPARISON, force=request.force) as folder:
+            _write(found, folder)
     tell(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, doubts=())
+    if request.out is not None and not request.json:
+        say_where(began, "numbers and figures", Path(request.out))
+    return COMPLETE
 
 
 def _write(found: RunComparison, folder: ResultsFolder) -> None:

@@ -5,20 +5,13 @@ from __future__ import annotations
 import time
 
 from paraflex.cli.bars import counting
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import CompareMethodsRequest
 from paraflex.cli.compare_methods_tables import print_comparison
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    asked_model,
-    at_fault,
-    find_mode,
-    find_path,
-    flagged,
-    of_assembly,
-    plan_study,
-)
+from paraflex.cli.request import asked_model, asked_of, at_fault, find_mode, find_path, of_assembly, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
@@ -59,14 +52,9 @@ def _compare(
     else:
         path, name = find_path(model, request.path)
         case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-    asked = {
-        "mechanism": model.source,
-        "set": dict(model.settings),
-        "limit": options.limit,
-        "repetitions": options.repetitions,
-    }
+    asked = {"limit": options.limit, "repetitions": options.repetitions}
     asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
-    study = ComparisonStudy(case, methods, options, {"model": dict(model.parameters), "run": asked})
+    study = ComparisonStudy(case, methods, options, asked_of(model, asked))
     with counting(console) as report:
         comparison = study.run(on_progress=report)
     summary = comparison.to_dict()

@@ -10,10 +10,11 @@ from paraflex.checks import check_planned
 from paraflex.cli.bars import counting
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.control import CompareLawsRequest
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.control_tables import print_laws
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, find_modes, find_path, flagged, plan_study
+from paraflex.cli.request import asked_model, asked_of, find_modes, find_paths, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
@@ -24,7 +25,6 @@ from paraflex.folders import LAW_COMPARISON, ResultsFolder
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode
 from paraflex.results.following import ErrorSpan
-from paraflex.studies.law_comparison import LawComparison
 from paraflex.studies.laws import LawStudy, laws_of, reduced_tasks
 
 Laws = dict[str, tuple[ControllerDescription, ...]]
@@ -34,7 +34,7 @@ Paths = dict[str, Path]
 def compare_laws_command(request: CompareLawsRequest) -> int:
     """Run every law in every mode, write the table and its figure; the exit code."""
     model = asked_model(request.model)
-    laws, paths, modes = _laws(model, request), _paths(model, request), find_modes(model, request.modes)
+    laws, paths, modes = _laws(model, request), find_paths(model, request.paths), find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     with hold_results(request.out, LAW_COMPARISON, force=request.force, field="--output") as folder:
         return _compare(request, model, laws, paths, modes, folder)
@@ -61,7 +61,7 @@ def _compare(
     write_drawn(result.data, folder)
     if not request.json:
         say_where(began, "table and figure", folder.path)
-    return exit_code(_any_complete(result), interrupted=result.interrupted)
+    return exit_code(bool((result.data["status"] == "complete").any()), interrupted=result.interrupted)
 
 
 def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> LawStudy:
@@ -72,7 +72,7 @@ def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, 
         options = model.study.integration(chosen)
         return LawStudy(
             reduced_tasks(model, tasks, modes), laws, modes, options, request.metrics, ErrorSpan(model.study.error),
-            {"model": dict(model.parameters), "run": _asked(model, laws, paths, modes) | options.to_dict()},
+            asked_of(model, _asked(model, laws, paths, modes) | options.to_dict()),
         )  # fmt: skip
 
 
@@ -83,28 +83,11 @@ def _laws(model: Model, request: CompareLawsRequest) -> Laws:
         raise (error.at("--controller") if error.field == "controllers" else error.in_file(model.source)) from None
 
 
-def _paths(model: Model, request: CompareLawsRequest) -> Paths:
-    """Paths asked for, else the study's first one, by name."""
-    found = {}
-    for name in request.paths or (None,):
-        path, called = find_path(model, name)
-        if called in found:
-            raise InputError("is named twice", field="--path", value=called, remedy="name each path once")
-        found[called] = path
-    return found
-
-
 def _asked(model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> dict[str, Any]:
-    """What was compared, for provenance."""
+    """What was compared."""
     return {
-        "mechanism": model.source,
-        "set": dict(model.settings),
         "laws": {name: [one.name for one in together] for name, together in laws.items()},
         "paths": list(paths),
         "modes": [mode.name for mode in modes],
         "reduced": model.study.reduced,
     }
-
-
-def _any_complete(result: LawComparison) -> bool:
-    return bool((result.data["status"] == "complete").any())

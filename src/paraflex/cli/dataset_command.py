@@ -5,42 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 import xarray as xr
 from rich.console import Console
 
+from paraflex.cli.commands.options import FilesChoice
 from paraflex.cli.ending import say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.findings import Finding
-
-if TYPE_CHECKING:
-    # Imported when a page is made: it takes a second.
-    from paraflex.report import Page
-
-
-class DatasetRequest(Protocol):
-    """What such a command is asked for besides its models."""
-
-    @property
-    def out(self) -> str | None:
-        """The folder for its files; none are written without one."""
-        ...
-
-    @property
-    def force(self) -> bool:
-        """Whether results of another kind may be replaced."""
-        ...
-
-    @property
-    def json(self) -> bool:
-        """Whether JSON is printed."""
-        ...
-
-    @property
-    def report(self) -> bool:
-        """Whether a report is written."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -57,8 +30,6 @@ class DatasetCommand:
         The dataset as plain numbers.
     show : callable
         Prints tables of it.
-    page : callable
-        Its report.
     doubts : iterable of Finding, optional
         Those of the summary by default.
     """
@@ -67,24 +38,23 @@ class DatasetCommand:
     files: tuple[str, str]
     summary: Callable[[xr.Dataset], dict[str, Any]]
     show: Callable[[Console, xr.Dataset], None]
-    page: Callable[[xr.Dataset], Page]
     doubts: Iterable[Finding] | None = None
 
-    def run(self, request: DatasetRequest, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+    def run(self, chosen: FilesChoice, make: Callable[[], xr.Dataset]) -> xr.Dataset:
         """Make the dataset, the folder for it held before; print and write it."""
         began = time.perf_counter()
-        if request.out is None:
-            return self._tell(request, make())
-        with hold_results(request.out, self.kind, force=request.force) as folder:
-            data = self._tell(request, make())
+        if chosen.out is None:
+            return self._tell(chosen, make())
+        with hold_results(chosen.out, self.kind, force=chosen.force) as folder:
+            data = self._tell(chosen, make())
             from paraflex.cli.writing import write_drawn, write_numbers
 
             write_numbers(data, self.summary(data), folder, self.files)
-            write_drawn(data, folder, (lambda: self.page(data)) if request.report else None)
-        if not request.json:
-            say_where(began, "numbers, figures", folder.path, report=request.report)
+            write_drawn(data, folder, report=chosen.report)
+        if not chosen.json:
+            say_where(began, "numbers, figures", folder.path, report=chosen.report)
         return data
 
-    def _tell(self, request: DatasetRequest, data: xr.Dataset) -> xr.Dataset:
-        tell(self.summary(data), lambda out: self.show(out, data), as_json=request.json, doubts=self.doubts)
+    def _tell(self, chosen: FilesChoice, data: xr.Dataset) -> xr.Dataset:
+        tell(self.summary(data), lambda out: self.show(out, data), as_json=chosen.json, doubts=self.doubts)
         return data

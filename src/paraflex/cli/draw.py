@@ -6,7 +6,6 @@ import os
 import sys
 import tempfile
 import webbrowser
-from collections.abc import Sequence
 from html import escape
 from io import StringIO
 from pathlib import Path
@@ -20,7 +19,7 @@ from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import DrawRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.request import asked_model
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import few, framed_table, plain_console
 from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import InputError
 from paraflex.files import Model
@@ -99,11 +98,12 @@ def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, ou
     mechanism = model.mechanism
     console.print(f"{mechanism.name} ({model.source})", soft_wrap=True)
     console.print(_joints(mechanism, shown))
-    console.print(f"bodies: {_few([body.name for body in mechanism.bodies])}", soft_wrap=True)
+    console.print(f"bodies: {few([body.name for body in mechanism.bodies], _LISTED)}", soft_wrap=True)
     for line in [*_drives(mechanism, shown), *_loads(mechanism, shown)]:
         console.print(line, soft_wrap=True)
     if mechanism.sensors:
-        console.print(f"sensors: {_few([f'{one.name} ({one.kind})' for one in mechanism.sensors])}", soft_wrap=True)
+        sensors = [f"{one.name} ({one.kind})" for one in mechanism.sensors]
+        console.print(f"sensors: {few(sensors, _LISTED)}", soft_wrap=True)
     for problem in shown.problems:
         console.print(f"warning: {problem}", soft_wrap=True)
     if shown.gaps:
@@ -113,12 +113,6 @@ def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, ou
     name = request.model.name
     then = "run" if model.statics == StaticsDefaults() else "statics"
     console.print(f"next: paraflex info {name}, paraflex {then} {name}", soft_wrap=True)
-
-
-def _few(names: Sequence[str]) -> str:
-    """The first of some names."""
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return f"{', '.join(names[:_LISTED])}{more}"
 
 
 def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:
@@ -146,7 +140,6 @@ def _loads(mechanism: Mechanism, shown: Posed) -> list[str]:
 
 
 def _joints(mechanism: Mechanism, shown: Posed) -> Table:
-    table = Table(title="joints", title_justify="left")
     # Columns of what there is.
     columns = {
         "motor": {motor.joint: motor.name for motor in mechanism.motors},
@@ -154,8 +147,7 @@ def _joints(mechanism: Mechanism, shown: Posed) -> Table:
         "open by": dict(shown.gaps),
     }
     columns = {heading: of_joints for heading, of_joints in columns.items() if of_joints}
-    for heading in ("joint", "kind", "between", *columns):
-        table.add_column(heading)
+    table = framed_table("joints", ("joint", "kind", "between", *columns))
     for joint in mechanism.joints[:_LISTED]:
         more = [of_joints.get(joint.name, "") for of_joints in columns.values()]
         table.add_row(joint.name, joint.kind, f"{joint.a}, {joint.b}", *more)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import ExportRequest
 from paraflex.cli.tables import plain_console
-from paraflex.errors import InputError
 from paraflex.results import open_results
 from paraflex.results.export import export, export_table
 
@@ -19,16 +19,12 @@ def export_command(request: ExportRequest) -> int:
     folder = results if results.is_dir() else results.parent
     output = folder / "export" if request.output is None else Path(request.output)
     table = results / _TABLE if results.is_dir() else results
-    try:
+    with flagged(request):
         if table.name.endswith(".parquet") and table.is_file():
             files = export_table(table, output, request.to, force=request.force)
         else:
             data = open_results(results)
             files = export(data, output, request.to, shapes=request.shapes, force=request.force)
-    except InputError as error:
-        if error.field not in ("to", "output"):
-            raise
-        raise error.at(f"--{error.field}") from None
     console = plain_console(stderr=True)
     for file in files:
         console.print(f"{file} ({file.stat().st_size / 1e6:.3g} MB)", soft_wrap=True)

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
 
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import few, framed_table, plain_console
 from paraflex.files import generator_names
 from paraflex.findings import Level
 from paraflex.mechanism import Mechanism, groups_of
@@ -40,9 +40,11 @@ def print_facts(facts: dict[str, Any]) -> None:
     if facts["description"]:
         console.print(facts["description"])
     console.print(_counts(facts))
-    loops = [f"loop {k + 1}: {_some(loop)}" for k, loop in enumerate(facts["loops"])]
+    loops = [f"loop {k + 1}: {few(loop, _LISTED)}" for k, loop in enumerate(facts["loops"])]
     _print_some(console, loops, facts["loop_count"], " loops")
-    redundancies = [f"redundant: {one['row']}, among {_some(one['among'])}" for one in facts.get("redundancies", [])]
+    redundancies = [
+        f"redundant: {one['row']}, among {few(one['among'], _LISTED)}" for one in facts.get("redundancies", [])
+    ]
     _print_some(console, redundancies, len(redundancies))
     _print_starts(console, facts)
     if "drives" in facts:
@@ -66,13 +68,6 @@ def print_verdict(console: Console, facts: dict[str, Any]) -> None:
     else:
         count = len(verdict["findings"])
         console.print(f"verdict: {verdict['level']}, for {count} reason{'s' if count > 1 else ''}")
-
-
-def _table(title: str, headings: Sequence[str], right: Sequence[int] = ()) -> Table:
-    table = Table(title=title, title_justify="left")
-    for k, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if k in right else "left")
-    return table
 
 
 def _counts(facts: dict[str, Any]) -> Table:
@@ -107,7 +102,7 @@ def _counts(facts: dict[str, Any]) -> Table:
                 table.add_row(label, f"{value:g}, its payload among it")
                 table.add_row("payload", _payload(facts["payload"]))
                 continue
-            table.add_row(label, (_some(value) or "none") if isinstance(value, list) else f"{value:g}")
+            table.add_row(label, (few(value, _LISTED) or "none") if isinstance(value, list) else f"{value:g}")
     return table
 
 
@@ -117,12 +112,6 @@ def _payload(carried: dict[str, Any]) -> str:
     x, y = carried["offset"]
     beside = f", {x:g}, {y:g} m from it" if x or y else ""
     return f"{carried['mass']:g} kg{inertia} at {carried['point']}{beside}"
-
-
-def _some(names: Sequence[Any]) -> str:
-    """As many names as fit in a few lines."""
-    text = ", ".join(map(str, names[:_LISTED]))
-    return f"{text} and {len(names) - _LISTED} more" if len(names) > _LISTED else text
 
 
 def _print_some(console: Console, lines: Sequence[str], count: int, what: str = "") -> None:
@@ -135,11 +124,11 @@ def _print_some(console: Console, lines: Sequence[str], count: int, what: str = 
 
 def _print_starts(console: Console, facts: dict[str, Any]) -> None:
     headings = ("assembly", "gap of the angles given", "closed to [m, rad]", "rates to [1/s]", "remaining gap", "where")
-    table = _table("assemblies, rigid", headings, right=(1, 2, 3, 4))
+    table = framed_table("assemblies, rigid", headings, right=(1, 2, 3, 4))
     for start in facts["starts"]:
         numbers = ["" if start[key] is None else f"{start[key]:.2g}" for key in ("gap_before", "position", "velocity")]
         gap = "none" if start["closes"] else (f"{start['gap']:.3g}" if start["gap"] else "")
-        table.add_row(start["assembly"], *numbers, gap, _some(start["where"]))
+        table.add_row(start["assembly"], *numbers, gap, few(start["where"], _LISTED))
     if facts["starts"]:
         console.print(table)
 
@@ -152,12 +141,12 @@ def _print_drives(console: Console, facts: dict[str, Any]) -> None:
     sets = [" ".join(motors) for motors in drives["minimal_sets"]]
     if sets:
         more = " at least" if drives["more_sets"] else ""
-        console.print(f"sets of motors that suffice,{more} {len(sets)}: {_some(sets)}", soft_wrap=True)
+        console.print(f"sets of motors that suffice,{more} {len(sets)}: {few(sets, _LISTED)}", soft_wrap=True)
 
 
 def _links(facts: dict[str, Any]) -> Table:
     headings = ("body", "kind", "length [m]", "mass [kg]", "elements", "coord.", "f1, f2, f3 [Hz]")
-    table = _table("bodies, each held in its own frame", headings, right=range(2, 7))
+    table = framed_table("bodies, each held in its own frame", headings, right=range(2, 7))
     for link in facts["links"][:_LISTED]:
         lowest = ", ".join(f"{f:.1f}" for f in link["frequencies_hz"][:_FREQUENCIES_SHOWN])
         length = "" if link["length"] is None else f"{link['length']:g}"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from paraflex.cli.commands.requests import flags
+from paraflex.cli.commands.requests import conflict, flags
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults
@@ -74,9 +74,7 @@ def _check_coefficients(request: RunRequest, options: IntegrationOptions) -> Non
         if value is None:
             continue
         if options.automatic_gains:
-            raise InputError(
-                "means nothing with --automatic-gains", field=flag, value=value, remedy="leave one of them out"
-            )
+            raise conflict("means nothing with --automatic-gains", flag, value)
         if options.treatment is not Treatment.BAUMGARTE:
             raise InputError(
                 f"means nothing where {options.treatment.value} keeps the constraints", field=flag, value=value,

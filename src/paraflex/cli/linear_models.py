@@ -12,7 +12,8 @@ import numpy as np
 from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
-from paraflex.cli.request import asked_model, at_fault, find_modes, find_path, flagged, of_assembly, plan_study
+from paraflex.cli.commands.requests import conflict, flagged
+from paraflex.cli.request import asked_model, asked_of, at_fault, find_modes, find_path, of_assembly, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed
@@ -48,18 +49,16 @@ class AskedModels(NamedTuple):
 def asked_models(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
     """What makes the linear models, once all that can be checked before is checked."""
     _check(request)
-    return _of_results(request, command) if _names_results(request.model.name) else _of_model(request, command)
+    if _names_results(request.model.name):
+        return _of_results(request, command)
+    model = asked_model(request.model)
+    modes = _modes(model, request)
+    return lambda: _models(model, modes, request, command)
 
 
 def _names_results(name: str) -> bool:
     """Whether a name is that of results, not of a model."""
     return Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names())
-
-
-def _of_model(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
-    model = asked_model(request.model)
-    modes = _modes(model, request)
-    return lambda: _models(model, modes, request, command)
 
 
 def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
@@ -94,9 +93,7 @@ def _check(request: LinearRequest) -> None:
             continue
         for other, given in (("--pose", request.pose), ("--balanced", request.balanced or None)):
             if given is not None:
-                raise InputError(
-                    f"is about a motion, {other} about rest", field=flag, value=value, remedy="leave one of them out"
-                )
+                raise conflict(f"is about a motion, {other} about rest", flag, value)
     if request.at is not None and not (math.isfinite(request.at) and request.at >= 0.0):
         raise InputError("not a time of the motion", field="--at", value=request.at, remedy="give it in s, from 0 on")
     if request.along is not None and not 2 <= request.along <= _MOST_MOMENTS:
@@ -104,9 +101,7 @@ def _check(request: LinearRequest) -> None:
             "not a number of moments", field="--along", value=request.along, remedy=f"from 2 to {_MOST_MOMENTS}"
         )
     if request.pose is not None and request.assembly is not None:
-        raise InputError(
-            "names the pose as --pose does", field="--assembly", value=request.assembly, remedy="leave one of them out"
-        )
+        raise conflict("names the pose as --pose does", "--assembly", request.assembly)
 
 
 def _modes(model: Model, request: LinearRequest) -> list[ActuationMode]:
@@ -277,10 +272,4 @@ def _parameters(model: Model, modes: Iterable[ActuationMode], request: LinearReq
     asked = {name: getattr(request, name) for name in ("pose", "balanced", "at", "along", "path", "assembly", "forces",
                                                         "prescribed", "coordinates")}  # fmt: skip
     run = {name: value for name, value in asked.items() if value not in (None, False, [], "motors")}
-    return {
-        "model": dict(model.parameters),
-        "run": {
-            "mechanism": model.source, "set": dict(model.settings), command: True,
-            "modes": [mode.name for mode in modes],
-        } | run,
-    }  # fmt: skip
+    return asked_of(model, {command: True, "modes": [mode.name for mode in modes]} | run)

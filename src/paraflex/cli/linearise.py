@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import xarray as xr
 
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import LineariseRequest
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, moments_along
 from paraflex.cli.linearise_tables import print_linear
-from paraflex.cli.request import flagged
 from paraflex.folders import LINEAR_MODELS
 from paraflex.results.linear_data import linear_dataset
 from paraflex.results.linear_summary import linear_summary
-
-if TYPE_CHECKING:
-    from paraflex.report import Page
 
 
 def linearise_command(request: LineariseRequest) -> int:
     """Linearise in every mode, print poles and zeros, and write files where that is asked for; the exit code."""
     make = asked_models(request, "linearise")
-    _COMMAND.run(request, lambda: _data(make(), request))
+    _COMMAND.run(request.files, lambda: _data(make(), request))
     return COMPLETE
 
 
@@ -33,10 +28,4 @@ def _data(found: AskedModels, request: LineariseRequest) -> xr.Dataset:
         return linear_dataset(found.models, along=along, parameters=found.parameters)
 
 
-def _page(data: xr.Dataset) -> Page:
-    from paraflex.report.linear import linear_page
-
-    return linear_page(data)
-
-
-_COMMAND = DatasetCommand(LINEAR_MODELS, ("linear.nc", "linear.json"), linear_summary, print_linear, _page, doubts=())
+_COMMAND = DatasetCommand(LINEAR_MODELS, ("linear.nc", "linear.json"), linear_summary, print_linear, doubts=())

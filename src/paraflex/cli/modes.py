@@ -15,7 +15,7 @@ from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
 from paraflex.cli.commands.models import ModesRequest
 from paraflex.cli.request import asked_model, find_path
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import framed_table, plain_console
 from paraflex.dynamics import build_system, closure_of, mobility, reach
 from paraflex.errors import ActuationError
 from paraflex.files import Model
@@ -127,9 +127,8 @@ def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: i
 def _table(model: Model, rows: list[dict[str, Any]]) -> Table:
     declared = rows[0]["declared"]
     title = f"{model.mechanism.name}: {'actuation modes' if declared else 'sets of motors'}"
-    table = Table(title=title, title_justify="left")
-    for heading in ("mode", "active motors", "redundancy", "worst condition number", "drives the path"):
-        table.add_column(heading)
+    heads = ("mode", "active motors", "redundancy", "worst condition number", "drives the path")
+    table = framed_table(title, heads)
     for row in rows:
         drives = {True: "yes", False: row.get("reason", "no"), None: ""}[row.get("drives_path")]
         table.add_row(row["mode"], ", ".join(row["motors"]), str(row.get("redundancy", "")), _condition(row), drives)

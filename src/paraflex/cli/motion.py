@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-import xarray as xr
 from rich.console import Console
 from rich.progress import TimeElapsedColumn
 
@@ -21,12 +20,7 @@ from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import model_parameters
 from paraflex.cli.reduced import asked_reduction, kept_coordinates
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    acting_controllers,
-    at_fault,
-    controllers_said,
-    of_assembly,
-)
+from paraflex.cli.request import acting_controllers, asked_of, at_fault, controllers_said, of_assembly
 from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
@@ -57,7 +51,6 @@ def run_motion(
     model: Model,
     mechanism: Mechanism,
     options: IntegrationOptions,
-    console: Console,
     how: dict[str, Any],
 ) -> int:
     """Run a mechanism's own motion and write its results, how it was integrated among them; the exit code."""
@@ -98,18 +91,12 @@ def _run_held(
         few = asked_reduction(request, full, kept)
         start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
         run = _simulate(console, model, few, options, controllers, start=start)
-    parameters = {
-        "model": dict(model.parameters),
-        "run": {
-            "mechanism": model.source,
-            "set": dict(model.settings),
-            "duration": study.duration,
-            "samples": study.samples,
-            "controllers": controllers_said(model, controllers),
-        }
-        | model_parameters(request, mechanism, kept)
-        | how,
+    asked = {
+        "duration": study.duration,
+        "samples": study.samples,
+        "controllers": controllers_said(model, controllers),
     }
+    parameters = asked_of(model, asked | model_parameters(request, mechanism, kept) | how)
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     if run is not full:
@@ -117,7 +104,7 @@ def _run_held(
         data = beside_full(data, motion_dataset(full, options=options), *sizes)
     summary = motion_summary(data)
     write_numbers(data, summary, folder)
-    tell(summary, lambda out: _report(out, summary, data), as_json=request.json)
+    tell(summary, lambda out: _report(out, summary), as_json=request.json)
     finished = run.solution.status in DONE_STATUSES
     try:
         place = write_drawn_run(data, folder, request, began)
@@ -131,6 +118,23 @@ def _run_held(
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 
+def free_run(
+    model: Model,
+    mechanism: Mechanism,
+    options: IntegrationOptions,
+    controllers: Sequence[ControllerDescription],
+    start: State | str | None,
+    on_progress: Callable[[float], None] | None = None,
+) -> MotionRun:
+    """Run a mechanism without a path, as a model's study says, under controllers or under its torques."""
+    study = model.study
+    assert study.duration is not None
+    how: dict[str, Any] = {"samples": study.samples, "start": start, "options": options, "on_progress": on_progress}
+    if controllers:
+        return simulate_controlled_motion(mechanism, study.duration, controllers, **how)
+    return simulate_motion(mechanism, study.duration, torques=study.torques, **how)
+
+
 def _simulate(
     console: Console,
     model: Model,
@@ -142,7 +146,6 @@ def _simulate(
     start: State | None = None,
 ) -> MotionRun:
     study, progress = model.study, bars(console, TimeElapsedColumn())
-    assert study.duration is not None
     bar = progress.add_task(mechanism.name, total=study.duration)
 
     def report(reached: float) -> None:
@@ -155,20 +158,7 @@ def _simulate(
             # The table and the summary say what the run doubts.
             warnings.simplefilter("ignore", ValidityWarning)
             warnings.simplefilter("ignore", ResultWarning)
-            if controllers:
-                return simulate_controlled_motion(
-                    mechanism, study.duration, controllers, samples=study.samples, start=begun, options=options,
-                    on_progress=report,
-                )  # fmt: skip
-            return simulate_motion(
-                mechanism,
-                study.duration,
-                samples=study.samples,
-                torques=study.torques,
-                start=begun,
-                options=options,
-                on_progress=report,
-            )
+            return free_run(model, mechanism, options, controllers, begun, report)
     except (IntegrationError, ControllerError) as error:
         return error.partial
     except AssemblyError as error:
@@ -207,7 +197,7 @@ def _ended(summary: dict) -> str:
     return f"{status}, {steps}; " + ("no sample was reached" if time is None else f"the last sample is t = {time:g} s")
 
 
-def _report(out: Console, summary: dict, data: xr.Dataset) -> None:
+def _report(out: Console, summary: dict) -> None:
     final = summary["final"]
     out.print(f"{summary['mechanism']}: {_ended(summary)}")
     if summary["event"]:

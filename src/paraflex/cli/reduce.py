@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import xarray as xr
 
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import ReduceRequest
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, pose_asked
 from paraflex.cli.reduce_tables import print_reduction
-from paraflex.cli.request import flagged
 from paraflex.errors import InputError
 from paraflex.folders import REDUCED_MODELS
 from paraflex.linear import PosesAlong, poses_along
 from paraflex.linear.reduced import ReductionMethod
 from paraflex.results.reduction_data import reduction_dataset, reduction_summary
-
-if TYPE_CHECKING:
-    from paraflex.report import Page
 
 _METHODS = (ReductionMethod.CRAIG_BAMPTON.value, ReductionMethod.MODAL.value)
 
@@ -27,7 +22,7 @@ _METHODS = (ReductionMethod.CRAIG_BAMPTON.value, ReductionMethod.MODAL.value)
 def reduce_command(request: ReduceRequest) -> int:
     """Reduce the models of every mode, print what is left of them, write files where that is asked for; exit code."""
     make = asked_models(request, "reduce")
-    _COMMAND.run(request, lambda: _data(make(), request))
+    _COMMAND.run(request.files, lambda: _data(make(), request))
     return COMPLETE
 
 
@@ -57,12 +52,4 @@ def _along(found: AskedModels, request: ReduceRequest) -> list[PosesAlong]:
         raise (error.at("--along") if error.field == "count" else error) from None
 
 
-def _page(data: xr.Dataset) -> Page:
-    from paraflex.report.reduction import reduction_page
-
-    return reduction_page(data)
-
-
-_COMMAND = DatasetCommand(
-    REDUCED_MODELS, ("reduced.nc", "reduced.json"), reduction_summary, print_reduction, _page, doubts=()
-)
+_COMMAND = DatasetCommand(REDUCED_MODELS, ("reduced.nc", "reduced.json"), reduction_summary, print_reduction, doubts=())

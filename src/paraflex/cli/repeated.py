@@ -5,24 +5,25 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 
 import xarray as xr
 from typer.main import get_command
 
+from paraflex.cli.along import asked_tasks, own_method
 from paraflex.cli.commands.requests import filled
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import integration_options
-from paraflex.cli.motion import own_motion, start_of
-from paraflex.cli.reduced import asked_reduction, kept_coordinates
-from paraflex.cli.request import acting_controllers, asked_model, find_path, plan_study
+from paraflex.cli.motion import free_run, own_motion, start_of
+from paraflex.cli.request import acting_controllers, asked_model, find_path
 from paraflex.cli.run import asked_mechanism
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
-from paraflex.control import simulate_controlled, simulate_controlled_motion
 from paraflex.errors import InputError
 from paraflex.files import Model
-from paraflex.mechanism import parse_mode, proportional_segments
-from paraflex.motion import MotionRun, simulate_motion
+from paraflex.mechanism import parse_mode
+from paraflex.motion import MotionRun
 from paraflex.report.provenance import asked, run_command_line
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results
@@ -87,25 +88,10 @@ def _runs(
     if path is None:
         study = own_motion(model, request.plan)
         start = start_of(model, mechanism, study.assembly, balanced=request.balanced) or study.assembly
-        if controllers:
-            assert study.duration is not None
-            yield simulate_controlled_motion(
-                mechanism, study.duration, controllers, samples=study.samples, start=start, options=options
-            )
-            return
-        yield simulate_motion(
-            mechanism, study.duration, samples=study.samples, torques=study.torques, start=start, options=options
-        )
+        yield free_run(replace(model, study=study), mechanism, options, controllers, start)
         return
-    task = plan_study(model, mechanism, *find_path(model, path), request.plan, request.after)
-    if request.segments is not None:
-        task = task.in_segments(proportional_segments(mechanism, request.segments))
-    kept = kept_coordinates(request, model.study)
-    if kept is not None:
-        chosen = [parse_mode(mechanism, mode) for mode in modes]
-        task = task.remodelled(asked_reduction(request, task, kept, chosen))
+    chosen = [parse_mode(mechanism, mode) for mode in modes]
+    task, _ = asked_tasks(request, model, mechanism, find_path(model, path), chosen)
+    run = own_method(request, options, controllers) or partial(simulate, options=options, warning=False)
     for mode in modes:
-        if controllers:
-            yield simulate_controlled(task, mode, controllers, options=options, balanced=request.balanced)
-        else:
-            yield simulate(task, mode, options=options, warning=False)
+        yield run(task, mode)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import few, plain_console
 from paraflex.errors import InputError
 from paraflex.folders import (
     COMPARISON,
@@ -69,8 +69,7 @@ def say_replaced(folder: Path) -> None:
     if kind:
         said.append(f"{folder} holds {_described(folder, kind)}; it will be replaced (--out another folder keeps both)")
     if foreign:
-        more = f" and {len(foreign) - _NAMED} more" if len(foreign) > _NAMED else ""
-        said.append(f"{folder} holds files that are not of paraflex and stay: {', '.join(foreign[:_NAMED])}{more}")
+        said.append(f"{folder} holds files that are not of paraflex and stay: {few(foreign, _NAMED)}")
     for line in said:
         plain_console(stderr=True).print(line, soft_wrap=True)
 

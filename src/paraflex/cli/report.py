@@ -26,6 +26,9 @@ from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
 from paraflex.writing import read_json
 
+# Pages of kinds of results that nothing beside their dataset is needed for.
+_PAGES = {"motion": motion_page, "linear": linear_page, "statics": statics_page, "reduction": reduction_page}
+
 
 def report_command(request: ReportRequest) -> None:
     """Write a report."""
@@ -64,14 +67,8 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
     kind = kind_of(data)
     if kind == "verification":
         return verification_page(data, _beside(folder / "verify.json"))
-    if kind == "motion":
-        return motion_page(data)
-    if kind == "linear":
-        return linear_page(data)
-    if kind == "statics":
-        return statics_page(data)
-    if kind == "reduction":
-        return reduction_page(data)
+    if kind in _PAGES:
+        return _PAGES[kind](data)
     if kind == "laws":
         raise InputError(
             "a comparison of control laws has no report", field=str(folder),

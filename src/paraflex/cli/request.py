@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from typing import Any
 
 from paraflex.cli.commands.options import FramesChoice, ModelChoice, PlanChoice
-from paraflex.cli.commands.requests import flags
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.control.described import NONE, ControllerDescription
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
@@ -30,20 +30,18 @@ def asked_model(choice: ModelChoice) -> Model:
     return load(choice.name, set=found)
 
 
+def asked_of(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
+    """What was asked for, for provenance: a model, its file, --set and the rest of a run."""
+    return {
+        "model": dict(model.parameters),
+        "run": {"mechanism": model.source, "set": dict(model.settings)} | dict(run),
+    }
+
+
 def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:
     """The mechanism with all beams in the frames and of the curvature asked for; None leaves them as they are."""
     with flagged(frames):
         return mechanism.with_beams(reference=frames.reference, curvature=frames.curvature)
-
-
-@contextmanager
-def flagged(request: object) -> Iterator[None]:
-    """An error that names an option's field, in whatever table, names the option's flag instead."""
-    try:
-        yield
-    except InputError as error:
-        flag = flags(request).get(error.field.rpartition(".")[2])
-        raise (error if flag is None else error.at(flag)) from None
 
 
 def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
@@ -55,9 +53,9 @@ def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
 
 
 def find_paths(model: Model, names: Sequence[str]) -> dict[str, EndEffectorPath]:
-    """Paths of the model or of files by name: those asked for, else those of the study, else its one or the first."""
+    """Paths of the model or of files by name: those asked for, else the study's first, or the model's."""
     found = {}
-    for name in names or model.study.paths or (None,):
+    for name in names or (None,):
         path, called = find_path(model, name)
         if called in found:
             raise InputError("is named twice", field="--path", value=called, remedy="name each path once")

@@ -8,12 +8,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 from paraflex.cli.along import run_along
+from paraflex.cli.commands.requests import conflict, flagged
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, find_modes, find_paths, flagged, with_frames
-from paraflex.cli.tables import plain_console
+from paraflex.cli.request import asked_model, find_modes, find_paths, with_frames
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.folders import RUN
@@ -30,8 +30,8 @@ def run_command(request: RunRequest) -> int:
     if not model.paths and not request.paths:
         mechanism = _without_path(model, request)
         check_stops(mechanism, options, request.stop_at)
-        return run_motion(request, model, mechanism, options, plain_console(stderr=True), how)
-    paths, modes = find_paths(model, request.paths), find_modes(model, request.modes)
+        return run_motion(request, model, mechanism, options, how)
+    paths, modes = find_paths(model, request.paths or model.study.paths), find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     with ExitStack() as held:
         followed = {
@@ -64,10 +64,7 @@ def _without_path(model: Model, request: RunRequest) -> Mechanism:
     if request.segments is None:
         return mechanism
     if model.start is not None:
-        raise InputError(
-            "the file's [start] speaks of links that are not cut", field="--segments", value=request.segments,
-            remedy="leave one of them out",
-        )  # fmt: skip
+        raise conflict("the file's [start] speaks of links that are not cut", "--segments", request.segments)
     return finite_segments(mechanism, proportional_segments(mechanism, request.segments)).mechanism
 
 
@@ -83,13 +80,10 @@ def _check_fidelity(request: RunRequest) -> None:
     if len(asked) > 1:
         raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
     if request.reduced and any(flag != "--geometry" for flag in asked):
-        raise InputError(f"means nothing with {asked[0]}", field="--reduced", value=request.reduced,
-                         remedy="leave one of them out")  # fmt: skip
+        raise conflict(f"means nothing with {asked[0]}", "--reduced", request.reduced)
     for name, given in asdict(request.frames).items():
         if given is not None and (request.rigid or request.segments is not None):
-            raise InputError(
-                f"means nothing with {asked[0]}", field=f"--{name}", value=given, remedy="leave one of them out"
-            )
+            raise conflict(f"means nothing with {asked[0]}", f"--{name}", given)
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
     for flag, value in given_flags(request).items():

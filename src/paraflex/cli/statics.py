@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import xarray as xr
 
 from paraflex.cli import COMPLETE, TROUBLE
 from paraflex.cli.commands.models import StaticsRequest
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
-from paraflex.cli.request import asked_model, of_assembly
+from paraflex.cli.request import asked_model, asked_of, of_assembly
 from paraflex.cli.statics_tables import print_statics
 from paraflex.equilibria import Statics, StaticsDefaults, statics
 from paraflex.equilibria.given import coordinate_named
@@ -21,31 +21,17 @@ from paraflex.files.fields import number_in
 from paraflex.folders import EQUILIBRIA
 from paraflex.results.statics_data import statics_dataset, statics_summary
 
-if TYPE_CHECKING:
-    from paraflex.report import Page
-
-# The options that arguments of `statics` come from.
-_FLAGS = {
-    "loads": "--load", "torques": "--torque", "moved": "--move", "held": "--hold", "steps": "--steps",
-    "stiffness": "--stiffness", "assembly": "--assembly", "buckling": "--buckling",
-}  # fmt: skip
 _NONE = "none"
 
 
 def statics_command(request: StaticsRequest) -> int:
     """Find the equilibria, print them, and write files where that is asked for; the exit code."""
     model = asked_model(request.model)
-    data = _COMMAND.run(request, lambda: _data(model, request))
+    data = _COMMAND.run(request.files, lambda: _data(model, request))
     return COMPLETE if data["status"].item() == "complete" else TROUBLE
 
 
-def _page(data: xr.Dataset) -> Page:
-    from paraflex.report.statics import statics_page
-
-    return statics_page(data)
-
-
-_COMMAND = DatasetCommand(EQUILIBRIA, ("statics.nc", "statics.json"), statics_summary, print_statics, _page)
+_COMMAND = DatasetCommand(EQUILIBRIA, ("statics.nc", "statics.json"), statics_summary, print_statics)
 
 
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
@@ -55,7 +41,7 @@ def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
 
 def _found(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> Statics:
     """The equilibria, or those until one is not found."""
-    with _flagged():
+    with flagged(request, first=True):
         try:
             return statics(
                 model, **vars(asked), warning=False,
@@ -73,11 +59,11 @@ def _asked(model: Model, request: StaticsRequest) -> StaticsDefaults:
     """What is given: of loads, torques and travel what options say, if any does; the rest as the model has it."""
     mechanism = model.mechanism
     units = dict(zip([motor.name for motor in mechanism.motors], mechanism.motor_units(), strict=True))
-    with _flagged():
+    with flagged(request, first=True):
         loads, moved = (
-            {name: _number(text, coordinate_named(mechanism, name, f"{field}.{name}"), field)
-             for name, text in _pairs(given, _FLAGS[field]).items()}
-            for field, given in (("loads", request.loads), ("moved", request.moved))
+            {name: _in_unit(text, getattr(coordinate_named(mechanism, name, f"{field}.{name}"), unit), f"{flag} {name}")
+             for name, text in _pairs(getattr(request, field), flag).items()}
+            for field, flag, unit in (("loads", "--load", "effort_unit"), ("moved", "--move", "unit"))
         )  # fmt: skip
         torques = {
             name: _in_unit(text, units.get(name, "N m"), f"--torque {name}")
@@ -108,11 +94,6 @@ def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
     return found
 
 
-def _number(text: str, one: Any, field: str) -> float:
-    unit = one.unit if field == "moved" else one.effort_unit
-    return _in_unit(text, unit, f"{_FLAGS[field]} {one.name}")
-
-
 def _in_unit(text: str, unit: str, field: str) -> float:
     try:
         return number_in(text, unit)
@@ -120,21 +101,8 @@ def _in_unit(text: str, unit: str, field: str) -> float:
         raise error.at(field) from None
 
 
-@contextmanager
-def _flagged() -> Iterator[None]:
-    """An error that names an argument of `statics` names the option instead."""
-    try:
-        yield
-    except InputError as error:
-        flag = _FLAGS.get(error.field.partition(".")[0])
-        raise (error if flag is None else error.at(flag)) from None
-
-
 def _parameters(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> dict[str, Any]:
     """What was asked for."""
     given = {name: value for name, value in (vars(asked) | {"assembly": request.assembly}).items()
              if value is not None and value != {}}  # fmt: skip
-    return {
-        "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "set": dict(model.settings), "statics": True} | given,
-    }
+    return asked_of(model, {"statics": True} | given)

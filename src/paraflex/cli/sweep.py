@@ -17,8 +17,6 @@ from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.sweep import SweepStudy
 from paraflex.studies import SweepResult, load_sweep
 
-REPORT = "report.html"
-
 
 def sweep_command(request: SweepRequest) -> int:
     """Do what is left of a sweep; the exit code."""
@@ -58,7 +56,7 @@ def _write_report(console: Console, folder: Path, result: SweepResult) -> None:
         console.print(f"no report: paraflex report {folder} writes it", soft_wrap=True)
         return
     save_study_report(folder, console)
-    console.print(f"report: {folder / REPORT}", soft_wrap=True)
+    console.print(f"report: {folder / 'report.html'}", soft_wrap=True)
 
 
 def _report(console: Console, result: SweepResult) -> None:

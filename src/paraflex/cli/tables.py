@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -170,6 +170,14 @@ def plain_table(
     return table
 
 
+def framed_table(title: str, headings: Iterable[str], right: Container[int] = ()) -> Table:
+    """A table in a frame; `right` are the numbers of its columns of numbers."""
+    table = Table(title=title, title_justify="left")
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if k in right else "left")
+    return table
+
+
 def print_titled(console: Console, title: str, table: Table) -> None:
     """A table below a title that is not broken at the table's width, as one of its own would be."""
     console.print(title, soft_wrap=True)
@@ -271,3 +279,9 @@ def failures(console: Console, result: StudyResult, whose: str = "") -> None:
 def number(value: float | None, form: str) -> str:
     """A number in a form; nothing for None."""
     return "" if value is None else format(value, form)
+
+
+def few(names: Sequence[Any], most: int) -> str:
+    """The first of some names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(map(str, names[:most]))}{more}"

@@ -9,18 +9,11 @@ from rich.console import Console
 
 from paraflex.cli.agreement import print_agreement
 from paraflex.cli.bars import counting
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import VerifyRequest
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    asked_model,
-    find_mode,
-    find_modes,
-    find_path,
-    flagged,
-    plan_study,
-    with_frames,
-)
+from paraflex.cli.request import asked_model, asked_of, find_mode, find_modes, find_path, plan_study, with_frames
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels
@@ -62,19 +55,9 @@ def _verify(
             compile_kernels(geometry, console.print)
     began = time.perf_counter()
     task = plan_study(model, mechanism, path, path_name, request.plan)
-    parameters = {
-        "model": dict(model.parameters),
-        "run": {
-            "mechanism": model.source,
-            "set": dict(model.settings),
-            "path": path_name,
-            "modes": [mode.name for mode in modes],
-        }
-        | asdict(request.frames)
-        | asdict(options)
-        | {"method": options.method.name, "method_parameters": options.method.values},
-    }
-    study = VerificationStudy(task, modes, models, options, parameters, model.study.error)
+    asked = {"path": path_name, "modes": [mode.name for mode in modes]} | asdict(request.frames) | asdict(options)
+    asked |= {"method": options.method.name, "method_parameters": options.method.values}
+    study = VerificationStudy(task, modes, models, options, asked_of(model, asked), model.study.error)
     with counting(console) as report:
         verification = study.run(on_progress=report)
     summary = verification.to_dict()
@@ -89,9 +72,7 @@ def _verify(
     tell(summary, show, as_json=request.json)
     try:
         if data is not None:
-            from paraflex.report import verification_page
-
-            write_drawn(data, folder, (lambda: verification_page(data, summary)) if request.report else None)
+            write_drawn(data, folder, report=request.report)
             if not request.json:
                 say_where(began, "numbers, figures", folder.path, report=request.report)
     finally:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import xarray as xr
 
@@ -13,10 +13,6 @@ from paraflex.errors import OutputError
 from paraflex.folders import ResultsFolder
 from paraflex.results import save_results
 from paraflex.writing import write_json
-
-if TYPE_CHECKING:
-    # Imported when a page is made: it takes a second.
-    from paraflex.report import Page
 
 _LATER = "paraflex plot and paraflex report draw them"
 
@@ -35,25 +31,21 @@ def write_numbers(
 
 def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest, began: float) -> str:
     """Add the figures of a run, and the report if it is wanted; a line that says where all is."""
-    from paraflex.cli.report import page_of
-
-    write_drawn(data, folder, (lambda: page_of(data, folder.path)) if request.report else None)
+    write_drawn(data, folder, report=request.report)
     return where(began, "results, figures", folder.path, report=request.report)
 
 
-def write_drawn(
-    results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, page: Callable[[], Page] | None = None
-) -> None:
-    """Add figures, and a report where one is wanted, to results that are written: an interruption costs these alone."""
+def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, *, report: bool = False) -> None:
+    """Add figures, and the report of a dataset, to results that are written: an interruption costs these alone."""
     from paraflex.plots import save_figures
 
     try:
         with folder.amended() as new:
             save_figures(results, new / "figures")
-            if page is not None:
-                from paraflex.report import save_page
+            if report and isinstance(results, xr.Dataset):
+                from paraflex.cli.report import page_of, save_page  # it takes a second
 
-                save_page(page(), new / "report.html")
+                save_page(page_of(results, folder.path), new / "report.html")
     except KeyboardInterrupt as interrupt:
         interrupt.args = (f"the numbers are in {folder.path}; {_LATER}",)
         raise

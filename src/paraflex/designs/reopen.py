@@ -15,7 +15,6 @@ from paraflex.designs.run import Task, dataset_of, ready, run_mode
 from paraflex.designs.samples import Varied
 from paraflex.designs.setting import Setting, digest, versions
 from paraflex.errors import InputError
-from paraflex.files.overlay import Place
 
 _AGAIN = "run the study again, in a new folder"
 
@@ -139,7 +138,7 @@ def _setting(content: Mapping[str, Any], had: Mapping[str, str]) -> Setting:
         data=data,
         source=str(data["name"]),
         names=tuple(each["name"] for each in parameters),
-        places=tuple(tuple(_place(place) for place in each["places"]) for each in parameters),
+        places=tuple(tuple(map(tuple, each["places"])) for each in parameters),
         whole=tuple(each["whole"] for each in parameters),
         paths=tuple(content["paths"]),
         modes=tuple(content["modes"]),
@@ -153,7 +152,3 @@ def _setting(content: Mapping[str, Any], had: Mapping[str, str]) -> Setting:
         balanced=content.get("balanced", False),
         statics=content.get("statics", False),
     )
-
-
-def _place(place: Sequence[str | int]) -> Place:
-    return tuple(place)

@@ -140,10 +140,10 @@ class RigidLink:
 
     def curve(self, drawn: Outline, history: Trajectory) -> Array:
         """Places of the stations of the body (k, s, 2) [m]."""
-        r, angle = history.states[0][:, self.columns[:2]], self.frame(history).angle
         # Any of its joints gives the distance of the body's frame from the centre of mass.
         point, station = next(iter(drawn.points.items()))
-        return turned(r, angle, drawn.places - drawn.places[station] + self.points[point])
+        places = drawn.places - drawn.places[station] + self.points[point]
+        return turned(history.states[0][:, self.columns[:2]], self.frame(history).angle, places)
 
     def turn(self, point: str, history: Trajectory) -> Turn:
         """Rotation of the material at a named point."""

@@ -19,7 +19,7 @@ from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arrays import Array
 from paraflex.dynamics import System, still_signals
 from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
-from paraflex.engines.tree import Tree, body_motion, joint_state, place, spanning_tree
+from paraflex.engines.tree import Tree, body_motion, joint_state, spanning_tree
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
@@ -114,10 +114,10 @@ def _model(mujoco: Any, system: System, tree: Tree, step: float) -> Any:
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     bodies = {GROUND: spec.worldbody}
     for link in tree.links:
-        own = place(system, link.own)
+        own = system.marker(link.own).x0
         s = system.body(link.name).integrals
         centre = s.S1 / s.m
-        body = bodies[link.parent].add_body(name=link.name, pos=[*(place(system, link.other) - own), 0.0])
+        body = bodies[link.parent].add_body(name=link.name, pos=[*(system.marker(link.other).x0 - own), 0.0])
         body.mass, body.ipos = s.m, [*centre, 0.0]
         body.inertia = [s.I0 + s.J - s.m * float(centre @ centre)] * 3
         body.explicitinertial = True
@@ -145,22 +145,24 @@ def _add_relation(mujoco: Any, spec: Any, one: Relation, tree: Tree, step: float
     """Let the hinge of the second joint follow that of the first, by a polynomial of degree one."""
     hinge = {link.joint.name: link for link in tree.links}
     first, second = (hinge[name] for name in one.joints)
-    kind, of = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
-    equality = _equality(spec, one.name, kind, of, second.name, first.name, step)
+    of_joints = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
+    equality = _add_equality(spec, one.name, of_joints, [second.name, first.name], step)
     assert one.phase is not None
     equality.data[:2] = second.sign * one.phase, second.sign * one.transmission * first.sign
 
 
 def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, step: float) -> None:
-    sites = [f"{joint.name} {side}" for side in "ab"]
-    for name, ref in zip(sites, (joint.a, joint.b), strict=True):
-        bodies[ref.body].add_site(name=name, pos=[*place(system, ref), 0.0])
-    _equality(spec, joint.name, mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_SITE, sites[0], sites[1], step)
+    sites = []
+    for side, ref in (("a", joint.a), ("b", joint.b)):
+        name = f"{joint.name} {side}"
+        bodies[ref.body].add_site(name=name, pos=[*system.marker(ref).x0, 0.0])
+        sites.append(name)
+    _add_equality(spec, joint.name, (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_SITE), sites, step)
 
 
-def _equality(spec: Any, name: str, kind: Any, of: Any, first: str, second: str, step: float) -> Any:
-    """A constraint of two joints or sites, as stiff as MuJoCo allows."""
-    equality = spec.add_equality(name=name, type=kind, objtype=of, name1=first, name2=second)
+def _add_equality(spec: Any, name: str, kinds: tuple[Any, Any], pair: list[str], step: float) -> Any:
+    """An equality constraint of two objects of one kind, as stiff as steps allow."""
+    equality = spec.add_equality(name=name, type=kinds[0], objtype=kinds[1], name1=pair[0], name2=pair[1])
     equality.solref = [_TIME_CONSTANT * step, 1.0]
     equality.solimp = [_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0]
     return equality

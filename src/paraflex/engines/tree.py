@@ -117,11 +117,6 @@ def _split(joints: list[Joint]) -> tuple[list[Joint], list[Joint]]:
     return kept, closing
 
 
-def place(system: System, ref: PointRef) -> Array:
-    """Place (2,) of a named point in its rigid body, or in the ground frame [m]."""
-    return system.marker(ref).x0
-
-
 def joint_state(task: TrackingTask, tree: Tree) -> tuple[Array, Array]:
     """Angles and rates of the hinges at the task's start, each (links,)."""
 
@@ -143,7 +138,7 @@ def body_motion(system: System, tree: Tree, hinges: tuple[Array, Array, Array]) 
     def arm(ref: PointRef) -> tuple[Array, Array, Array]:
         """Vector from a body's origin to a point of it, and its derivatives."""
         angle = system.body(ref.body).angle
-        x, y = place(system, ref)
+        x, y = system.marker(ref).x0
         c, s, w = np.cos(q[:, angle]), np.sin(q[:, angle]), v[:, angle, None]
         turned = np.column_stack([c * x - s * y, s * x + c * y])
         quarter = np.column_stack([-turned[:, 1], turned[:, 0]])
@@ -154,7 +149,7 @@ def body_motion(system: System, tree: Tree, hinges: tuple[Array, Array, Array]) 
         for values, angles in zip(out, hinges, strict=True):
             values[:, body.angle] = angles @ tree.angles[link.name]
         if link.parent == GROUND:
-            hinge = [np.broadcast_to(place(system, link.other), (k, 2)), np.zeros((k, 2)), np.zeros((k, 2))]
+            hinge = [np.broadcast_to(system.marker(link.other).x0, (k, 2)), np.zeros((k, 2)), np.zeros((k, 2))]
         else:
             origin = system.body(link.parent).position
             hinge = [values[:, origin] + part for values, part in zip(out, arm(link.other), strict=True)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -106,16 +106,13 @@ class ShapeIntegrals:
 
     def in_basis(self, basis: Array) -> ShapeIntegrals:
         """The same body in other flexible coordinates, u_old = basis @ u_new."""
-        return ShapeIntegrals(
-            m=self.m,
-            S1=self.S1,
+        return replace(
+            self,
             S2=self.S2 @ basis,
-            I0=self.I0,
             I1=self.I1 @ basis,
             I2=basis.T @ self.I2 @ basis,
             G1=self.G1 @ basis,
             G2=basis.T @ self.G2 @ basis,
-            J=self.J,
             Jf=self.Jf @ basis,
             Jff=basis.T @ self.Jff @ basis,
             K=basis.T @ self.K @ basis,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
+from paraflex.files.said import check_fields
 from paraflex.files.schema import (
     AssumedModesTable,
     BeamTable,
@@ -103,16 +104,8 @@ def read_section(name: str, table: SectionTable) -> Section:
         kind = "rectangle"
     made: Any = Section if kind is None else SHAPES[kind]
     own = {each.name: each for each in fields(made) if each.name != "shape"}
-    for key, value in given.items():
-        if key not in own:
-            what = "section by its area" if kind is None else f"{kind} section"
-            raise InputError(
-                f"a {what} has no {key}", field=f"section.{name}.{key}", value=value, remedy="leave it out"
-            )
-    for key, each in own.items():
-        if each.default is MISSING and key not in given:
-            remedy = f"give {SectionTable.model_fields[key].description}"
-            raise InputError("is missing", field=f"section.{name}.{key}", remedy=remedy)
+    what, described = "section by its area" if kind is None else f"{kind} section", SectionTable.model_fields
+    check_fields(given, own, what, f"section.{name}", lambda each: f"{described[each.name].description}")
     try:
         return Section(**given) if kind is None else Section.of(made(**given))
     except InputError as error:

@@ -8,10 +8,10 @@ from typing import Any
 
 from paraflex.control.described import TABLE, ControllerDescription, check_controllers
 from paraflex.control.described_laws import LAWS
-from paraflex.errors import InputError, fields_within
+from paraflex.errors import InputError, within
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components
-from paraflex.files.said import fields_said
+from paraflex.files.said import fields_said, unsayable
 from paraflex.files.schema import ControllerTable, ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.loads import InTime
@@ -27,7 +27,7 @@ def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, Contr
     """
     parameters, found = evaluate_parameters(table.parameters), {}
     for name, one in table.controller.items():
-        with fields_within(f"{TABLE}.{name}"):
+        with within(f"{TABLE}.{name}"):
             found[name] = _read(name, one, parameters, table.study.duration)
     check_controllers(found, mechanism)
     return found
@@ -69,8 +69,6 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
                 sensor: components_table((law,), "torque")["torque"] for sensor, law in one.reference.items()
             }
         except (InputError, KeyError):
-            raise InputError(
-                "a model file cannot say this", field=f"{TABLE}.{one.name}.reference", value=dict(one.reference),
-                remedy="give numbers or expressions of the time",
-            ) from None  # fmt: skip
+            remedy = "give numbers or expressions of the time"
+            raise unsayable(f"{TABLE}.{one.name}.reference", dict(one.reference), remedy) from None
     return said

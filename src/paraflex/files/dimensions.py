@@ -6,7 +6,7 @@ import ast
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from paraflex.files.expressions import CONSTANTS, ExpressionError, expression_of, tree_of
+from paraflex.files.expressions import CONSTANTS, ExpressionError, expressed_in, tree_of
 from paraflex.units import ANGLE, PLAIN, Dimension, spelt, unit_named
 
 # That of a name; None where it is not known, such as that of the time or of a parameter without a unit.
@@ -50,7 +50,7 @@ def dimensions_of_parameters(table: Mapping[str, Any]) -> dict[str, Dimension | 
         return found[name]
 
     for name, entry in table.items():
-        with expression_of(f"parameters.{name}", entry):
+        with expressed_in(f"parameters.{name}", entry):
             of(name)
     return found
 

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError, suggestion
 from paraflex.files.jets import FUNCTIONS, Jet
 from paraflex.limits import EXPRESSION_LETTERS, PARAMETER_CHAIN
@@ -45,8 +45,8 @@ class ExpressionError(ValueError):
 
 
 @contextmanager
-def expression_of(field: str, value: object) -> Iterator[None]:
-    """Errors of an expression become those of the field that has it."""
+def expressed_in(field: str, value: object) -> Iterator[None]:
+    """Context in which what is wrong with an expression is wrong with the value of a field."""
     try:
         yield
     except ExpressionError as error:
@@ -64,10 +64,10 @@ def evaluate(text: str, parameters: Mapping[str, float]) -> float:
         It does not parse, has anything else in it, names an unknown parameter, or has no finite value.
     """
     _refuse_ambiguous(text, parameters)
-    return _evaluate(text, lambda name: _look_up(name, parameters))
+    return _finite(_arithmetic(text, lambda name: _look_up(name, parameters)))
 
 
-def evaluate_in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Jet:
+def evaluate_in_time(text: str, parameters: Mapping[str, float], t: Array) -> Jet:
     """Value, rate and acceleration at times t of an expression as above in which t is the time [s].
 
     Raises
@@ -133,7 +133,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
         entry = table[name]
         if isinstance(entry, str):
             _refuse_ambiguous(entry, table)
-            values[name] = _evaluate(entry, lambda other: value_of(other, (*open_names, name)))
+            values[name] = _finite(_arithmetic(entry, lambda other: value_of(other, (*open_names, name))))
         else:
             values[name] = _float(entry)
         return values[name]
@@ -144,14 +144,14 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
             raise InputError("not usable as a name", field=field, value=name, remedy="letters, digits and _; not pi")
         if isinstance(entry, bool) or not isinstance(entry, (int, float, str)):
             raise InputError("neither a number nor an expression", field=field, value=entry, remedy="give one of them")
-        with expression_of(field, entry):
+        with expressed_in(field, entry):
             value = value_of(name, ())
         if not math.isfinite(value):
             raise InputError("not a finite number", field=field, value=entry, remedy="give a number")
     return values
 
 
-def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64]) -> Any:
+def _in_time(text: str, parameters: Mapping[str, float], t: Array) -> Any:
     if TIME_NAME in parameters:
         raise ExpressionError(
             f'"{TIME_NAME}" is the time in this expression', f'give the parameter "{TIME_NAME}" another name'
@@ -165,10 +165,6 @@ def _in_time(text: str, parameters: Mapping[str, float], t: NDArray[np.float64])
     # What is not finite has no warning but is reported with its time.
     with np.errstate(all="ignore"):
         return _arithmetic(text, value_of)
-
-
-def _evaluate(text: str, value_of: Callable[[str], float]) -> float:
-    return _finite(_arithmetic(text, value_of))
 
 
 def _finite(value: Any) -> float:

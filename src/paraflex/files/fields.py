@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from paraflex.errors import InputError
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
-from paraflex.files.expressions import ExpressionError, evaluate, expression_of, names_in
+from paraflex.files.expressions import ExpressionError, evaluate, expressed_in, names_in
 from paraflex.mechanism import JOINT_KINDS
 from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, quantities_in, spelt, unit_named
 
@@ -61,7 +61,7 @@ def field_at(schema: type[BaseModel], data: Any, place: Sequence[Any]) -> FileFi
             description = info.description or f"a [{part}.NAME] table"
             model = info.annotation
         else:
-            model = _inner(model, data)
+            model = _inner(model)
         model = _resolve(model, data)
     return FileField(owner, description, model)
 
@@ -98,8 +98,8 @@ def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
     table = data.get("parameters", {})
     parameters = dimensions_of_parameters(table if isinstance(table, dict) else {})
     with_units = any(dimension is not None for dimension in parameters.values())
-    for place, text in leaves(data):
-        if not isinstance(text, str) or not (with_units or quantities_in(text)):
+    for place, text in _texts(data, ()):
+        if not (with_units or quantities_in(text)):
             continue
         found = field_at(schema, data, place)
         if takes_number(found.annotation) and text not in _words_of(found.annotation):
@@ -121,7 +121,7 @@ def check_unit(
     InputError
         Of another dimension, or a sum of unlike quantities.
     """
-    with expression_of(field, text):
+    with expressed_in(field, text):
         given = dimension_of(text, parameters)
     if units is None or given in (None, PLAIN) or given in [unit_named(unit).dimension for unit in units]:
         return
@@ -151,13 +151,13 @@ def number_in(text: str, unit: str) -> float:
     return number
 
 
-def leaves(data: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
-    """Every value of data that is no table or list, and its place."""
-    if isinstance(data, (dict, list)):
-        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
-            yield from leaves(value, (*place, key))
-    else:
+def _texts(data: Any, place: Place) -> Iterator[tuple[Place, str]]:
+    """Every text of data, and its place."""
+    if isinstance(data, str):
         yield place, data
+    elif isinstance(data, (dict, list)):
+        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+            yield from _texts(value, (*place, key))
 
 
 def _words_of(annotation: Any) -> Iterator[Any]:
@@ -240,7 +240,7 @@ def _below(data: Any, key: Any) -> Any:
     return data[key] if isinstance(data, list) and isinstance(key, int) and key < len(data) else None
 
 
-def _inner(annotation: Any, data: Any) -> Any:
+def _inner(annotation: Any) -> Any:
     """What a dict or list annotation holds."""
     arguments = typing.get_args(annotation)
     return arguments[-1] if typing.get_origin(annotation) in (dict, list) and arguments else annotation

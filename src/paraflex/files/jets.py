@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from paraflex.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -18,9 +20,9 @@ class Jet:
     What has no derivative at an instant comes out as no finite number there.
     """
 
-    value: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
+    value: Array
+    rate: Array
+    acceleration: Array
 
     # NumPy must leave `array * jet` to the jet.
     __array_ufunc__ = None
@@ -32,11 +34,11 @@ class Jet:
         return cls(t, np.ones_like(t), np.zeros_like(t))
 
     @classmethod
-    def constant(cls, value: float, like: NDArray[np.float64]) -> Jet:
+    def constant(cls, value: float, like: Array) -> Jet:
         """What does not change, at as many instants as an array has."""
         return cls(np.full_like(like, value), np.zeros_like(like), np.zeros_like(like))
 
-    def through(self, f: NDArray[np.float64], df: NDArray[np.float64], ddf: NDArray[np.float64]) -> Jet:
+    def through(self, f: Array, df: Array, ddf: Array) -> Jet:
         """The jet of f(self), from f and its first two derivatives at the value."""
         return Jet(f, df * self.rate, ddf * self.rate**2 + df * self.acceleration)
 
@@ -60,7 +62,7 @@ class Jet:
             return exp(log(self) * other)
         n, x = float(other), self.value
 
-        def term(factor: float, power: float) -> NDArray[np.float64]:
+        def term(factor: float, power: float) -> Array:
             # A factor of zero ends the row of derivatives: 0 * 0^-1 would spoil t^1 at t = 0.
             return factor * x**power if factor else np.zeros_like(x)
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.files.expressions import (
     check_in_time,
     evaluate,
     evaluate_in_time,
-    expression_of,
+    expressed_in,
     is_constant,
     names_in,
 )
@@ -51,13 +51,13 @@ class ExpressionLaw:
     knots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        with expression_of(self.field, self.text):
+        with expressed_in(self.field, self.text):
             check_in_time(self.text, self.parameters)
         spoken_of = names_in(self.text)
         used = {name: value for name, value in self.parameters.items() if name in spoken_of}
         object.__setattr__(self, "parameters", used)
 
-    def evaluate(self, t: NDArray[np.float64]) -> Values:
+    def evaluate(self, t: Array) -> Values:
         """Value, rate and acceleration at times t.
 
         Raises
@@ -65,7 +65,7 @@ class ExpressionLaw:
         InputError
             One of them is no finite number at some time.
         """
-        with expression_of(self.field, self.text):
+        with expressed_in(self.field, self.text):
             jet = evaluate_in_time(self.text, self.parameters, t)
         return jet.value, jet.rate, jet.acceleration
 
@@ -104,12 +104,8 @@ def _try(law: AngleLaw, duration: float | None) -> None:
 
 def quantities(entry: PrescribedTable) -> set[str]:
     """Which of "angle" and "displacement" a [prescribed.NAME] table speaks of."""
-    return {name for table in (entry, *(entry.pieces or [])) for name in _quantities_in(table)}
-
-
-def _quantities_in(table: PrescribedTable | PieceTable) -> dict[str, Any]:
-    """The angle and the displacement of a table, as far as it gives them."""
-    return {name: law for name in ("angle", "displacement") if (law := getattr(table, name)) is not None}
+    said: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
+    return {name for table in said for name in ("angle", "displacement") if getattr(table, name) is not None}
 
 
 def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
@@ -295,21 +291,30 @@ def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
         return TabulatedLaw(times, values)
     if entry.pieces is not None:
         return _pieces(entry.pieces, parameters)
-    for name, law in _quantities_in(entry).items():
-        return _expression(law, parameters, name, entry.speed or 0.0)
-    return ConstantSpeed(0.0, entry.speed or 0.0, from_assembly=True)
+    field, given = _place(entry)
+    if given is None:
+        return ConstantSpeed(0.0, entry.speed or 0.0, from_assembly=True)
+    return _expression(given, parameters, field, entry.speed or 0.0)
+
+
+def _place(table: PrescribedTable | PieceTable) -> tuple[str, Any]:
+    """Name and law of the angle or displacement that a table gives; None of one that gives neither."""
+    return ("angle", table.angle) if table.displacement is None else ("displacement", table.displacement)
 
 
 def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseLaw:
     laws = []
     for number, piece in enumerate(pieces):
-        given = _quantities_in(piece)
-        if len(given) != 1:
+        field = f"pieces.{number}"
+        if (piece.angle is None) == (piece.displacement is None):
             raise InputError(
-                "a piece needs one law, an angle or a displacement", field=f"pieces.{number}",
+                "a piece needs one law, an angle or a displacement",
+                field=field,
                 remedy="give its angle, or its displacement where the joint slides",
-            )  # fmt: skip
-        laws += [_expression(law, parameters, f"pieces.{number}.{name}") for name, law in given.items()]
+            )
+        name, given = _place(piece)
+        assert given is not None
+        laws.append(_expression(given, parameters, f"{field}.{name}"))
     return PiecewiseLaw(tuple(laws), tuple(_ends(pieces)))
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from typing import Any
 
 from paraflex.control.shaped import ShapedPath
 from paraflex.control.shaping import Shaper, ShaperKind
-from paraflex.errors import InputError, fields_within
+from paraflex.errors import InputError, within
 from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import quantities, read_components, read_law
+from paraflex.files.said import check_fields
 from paraflex.files.schema import (
     AssemblyTable,
     JointTable,
@@ -96,15 +97,9 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
     kind = JOINT_KINDS[entry.type]
     given = {key: getattr(entry, key) for key in entry.model_fields_set - {"type", "points"}}
     own = {each.name: each for each in fields(kind)[3:]}
-    for key, value in given.items():
-        if key not in own:
-            raise InputError(
-                f"a {entry.type} joint has no {key}", field=f"joint.{name}.{key}", value=value, remedy="leave it out"
-            )
-    for key, each in own.items():
-        if each.default is MISSING and key not in given:
-            remedy = f"give {each.metadata.get('description', 'it')}"
-            raise InputError("is missing", field=f"joint.{name}.{key}", remedy=remedy)
+    check_fields(
+        given, own, f"{entry.type} joint", f"joint.{name}", lambda each: each.metadata.get("description", "it")
+    )
     return kind(name, a, b, **given)
 
 
@@ -113,7 +108,7 @@ def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
     made = []
     for name, entry in table.prescribed.items():
         _check_quantity(name, entry, table.joint.get(entry.joint))
-        with fields_within(f"prescribed.{name}"):
+        with within(f"prescribed.{name}"):
             law = read_law(entry, parameters, table.study.duration)
         made.append(PrescribedAngle(name, entry.joint, law))
     return tuple(made)
@@ -138,7 +133,7 @@ def _assembly(name: str, entry: AssemblyTable) -> Assembly:
 def _load(_: Group, name: str, entry: Any, table: ModelTable) -> Load:
     """A load from its table."""
     kind = {"force": PointForce, "torque": AppliedTorque}[entry.type]
-    with fields_within(f"load.{name}"):
+    with within(f"load.{name}"):
         given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
     return kind(name, entry.point, *(given if entry.type == "torque" else (given,)))
 
@@ -183,7 +178,7 @@ def read_paths(tables: Mapping[str, PathTable]) -> dict[str, Path]:
     found: dict[str, Path] = {}
     # Sequences name the others.
     for name in sorted(tables, key=lambda name: tables[name].type == "sequence"):
-        with fields_within(f"path.{name}"):
+        with within(f"path.{name}"):
             found[name] = read_path(tables[name], found)
     return {name: found[name] for name in tables}
 
@@ -226,5 +221,5 @@ def read_shaper(table: ShaperTable) -> Shaper:
         Numbers that make no shaper.
     """
     said = {name: value for name, value in table if name != "type" and value is not None}
-    with fields_within("shaper"):
+    with within("shaper"):
         return Shaper(ShaperKind(table.type), **said)

@@ -10,8 +10,9 @@ from typing import Any
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.control.described import NONE, ControllerDescription, check_together
 from paraflex.control.shaped import shape_torques
+from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults, conditions
-from paraflex.errors import InputError, fields_within, suggestion
+from paraflex.errors import InputError, suggestion, within
 from paraflex.files.controllers import read_controllers
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
@@ -20,6 +21,7 @@ from paraflex.files.merge import merged, same
 from paraflex.files.overlay import plain, with_values
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
 from paraflex.files.rows import with_names, with_rows
+from paraflex.files.said import unsayable
 from paraflex.files.schema import ModelTable, PathFile
 from paraflex.files.start import read_start
 from paraflex.files.study import StudyDefaults, check_study
@@ -353,7 +355,7 @@ def model_from(data: dict[str, Any], source: str, text: str = "") -> Model:
 
 def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any]) -> dict[str, Any]:
     with naming(source):
-        return with_rows(with_values(parse_toml(text), settings), folder)
+        return with_rows(with_values(parse_toml(text, source), settings), folder)
 
 
 def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
@@ -387,9 +389,9 @@ def load_path(file: str | FilePath) -> Path:
     source = str(file)
     with naming(source):
         data = with_rows(read_toml(FilePath(file), source), FilePath(file).parent)
-        table = validate(PathFile, data, source)
-        with fields_within("path"):
-            return read_path(table.path)
+    table = validate(PathFile, data, source)
+    with naming(source), within("path"):
+        return read_path(table.path)
 
 
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
@@ -401,10 +403,8 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
         "orientation": table.study.orientation or 0.0,
         "torques": read_torques(table),
         "controllers": tuple(table.study.controllers),
+        "shaper": _study_shaper(table),
     }
-    if table.study.shaper is not None:
-        with fields_within("study"):
-            said["shaper"] = read_shaper(table.study.shaper)
     study = StudyDefaults(**said)
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
@@ -426,12 +426,17 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     return model
 
 
+def _study_shaper(table: ModelTable) -> Shaper | None:
+    with within("study"):
+        return None if table.study.shaper is None else read_shaper(table.study.shaper)
+
+
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
     said = dict(table.statics)
     for name in ("held", "stiffness"):
         said[name] = None if said[name] is None else tuple(said[name])
     found = StaticsDefaults(**said)
-    with fields_within("statics"):
+    with within("statics"):
         conditions(mechanism, found)
     return found
 
@@ -440,13 +445,13 @@ def _data(model: Model) -> dict[str, Any]:
     """The data of a file from which a model is read: those it came from as far as they still say so."""
     data = dict(model.parameters)
     if not data:
-        return _checked(model, _tables(model))
+        return _checked(model, model_tables(model))
     if "payload" in data and _carrier(model_from(data, model.source)) != _carrier(model):
         # The body's own numbers, which are written, then include the payload.
         data.pop("payload")
     for each in (False, True, True):
         found = model_from(data, model.source)
-        now, wanted = (_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
+        now, wanted = (model_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
         if same(now, wanted):
             return data
         data = merged(data, now, wanted)
@@ -459,12 +464,6 @@ def _carrier(model: Model) -> tuple[Any, ...]:
     return effector, [body for body in model.mechanism.bodies if effector and body.name == effector.point.body]
 
 
-def _tables(model: Model, **options: Any) -> dict[str, Any]:
-    return model_tables(
-        model.mechanism, model.paths, model.study, model.start, model.statics, model.controllers, **options
-    )
-
-
 def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     """Data that say what they are to say.
 
@@ -473,10 +472,8 @@ def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     InputError
         They do not.
     """
-    wanted, found = (_tables(one) for one in (model, model_from(data, model.source)))
+    wanted, found = (model_tables(one) for one in (model, model_from(data, model.source)))
     for key, value in wanted.items():
         if not same(value, found.get(key)):
-            raise InputError(
-                "a model file cannot say this", field=key, value=value, remedy="make it of what a file has"
-            )
+            raise unsayable(key, value, "make it of what a file has")
     return data

@@ -9,7 +9,7 @@ from typing import Any
 
 from paraflex.errors import InputError, suggestion
 from paraflex.files.expressions import ExpressionError, evaluate, evaluate_parameters
-from paraflex.files.fields import Place, field_at, has_tables, is_table, leaves, takes_number
+from paraflex.files.fields import Place, field_at, has_tables, is_table, takes_number
 from paraflex.files.schema import ModelTable
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
@@ -159,7 +159,10 @@ def _followed(data: Mapping[str, Any], parts: Sequence[str]) -> Place:
     inside: Any = data
     for part in parts:
         key: str | int = int(part) if isinstance(inside, list) and part.isdigit() else part
-        if not ((isinstance(inside, dict) and key in inside) or (isinstance(inside, list) and _has(inside, key))):
+        if not (
+            (isinstance(inside, dict) and key in inside)
+            or (isinstance(inside, list) and isinstance(key, int) and key < len(inside))
+        ):
             break
         inside = inside[key]  # pyright: ignore[reportArgumentType, reportCallIssue]
         place.append(key)
@@ -176,7 +179,15 @@ def _at(data: Any, place: Place) -> Any:
 
 def number_places(data: Mapping[str, Any]) -> Iterator[Place]:
     """Every number of a model's data, and every expression that has a value."""
-    return (place for place, value in leaves(data) if _is_number(value, data))
+
+    def walk(inside: Any, place: Place) -> Iterator[Place]:
+        if isinstance(inside, (dict, list)):
+            for key, value in inside.items() if isinstance(inside, dict) else enumerate(inside):
+                yield from walk(value, (*place, key))
+        elif _is_number(inside, data):
+            yield place
+
+    yield from walk(data, ())
 
 
 def number_at(data: Mapping[str, Any], place: Place) -> float:
@@ -211,10 +222,6 @@ def _parts(field: str) -> list[str]:
         if found[4] == "":
             return parts
     raise InputError("not the name of a field", field=field, remedy='say "body.link1.length"')
-
-
-def _has(inside: list, key: str | int) -> bool:
-    return isinstance(key, int) and key < len(inside)
 
 
 def _is_number(value: Any, data: Mapping[str, Any]) -> bool:

@@ -29,8 +29,7 @@ T = typing.TypeVar("T", bound=BaseModel)
 
 def read_toml(path: Path, source: str) -> dict[str, Any]:
     """Parse a TOML file; see `read_text` and `parse_toml` for the errors."""
-    with naming(source):
-        return parse_toml(read_text(path, source))
+    return parse_toml(read_text(path, source), source)
 
 
 def read_text(path: Path, source: str) -> str:
@@ -92,7 +91,7 @@ def exists(path: Path) -> bool:
         return False
 
 
-def parse_toml(text: str) -> dict[str, Any]:
+def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The data of a TOML text.
 
     Raises
@@ -100,21 +99,19 @@ def parse_toml(text: str) -> dict[str, Any]:
     InputError
         It is not TOML.
     """
-    if _DEEP_KEY.search(text):
-        raise InputError(
-            "not valid TOML: a name of too many parts", field="file", remedy=f"at most {KEY_PARTS} between dots"
-        )
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise _not_toml(str(error)) from error
-    except (ValueError, RecursionError):
-        raise InputError(
-            "not valid TOML: a number of too many digits, or too many brackets in one another", field="file",
-            remedy="name a model file",
-        ) from None  # fmt: skip
-    _check_names(data)
-    return data
+    with naming(source):
+        if _DEEP_KEY.search(text):
+            remedy = f"at most {KEY_PARTS} between dots"
+            raise InputError("not valid TOML: a name of too many parts", field="file", remedy=remedy)
+        try:
+            data = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise _not_toml(str(error)) from error
+        except (ValueError, RecursionError):
+            problem = "not valid TOML: a number of too many digits, or too many brackets in one another"
+            raise InputError(problem, field="file", remedy="name a model file") from None
+        _check_names(data)
+        return data
 
 
 def _check_names(data: dict[str, Any]) -> None:
@@ -125,8 +122,8 @@ def _check_names(data: dict[str, Any]) -> None:
         inner = value.items() if isinstance(value, dict) else [("", each) for each in value]
         for name, each in inner:
             if len(name) > NAME_LETTERS:
-                problem, remedy = f"a name of {len(name)} letters", f"at most {NAME_LETTERS}"
-                raise InputError(problem, field=table or "file", value=name, remedy=remedy)
+                remedy = f"at most {NAME_LETTERS}"
+                raise InputError(f"a name of {len(name)} letters", field=table or "file", value=name, remedy=remedy)
             if isinstance(each, dict | list):
                 left.append((f"{table}.{name}".strip("."), each))
 
@@ -166,12 +163,14 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
         try:
             checked = schema.model_validate(data, context={"parameters": parameters})
         except ValidationError as error:
-            raise _other_kind(schema, data, source) or _first_problem(schema, data, error) from None
+            raise _first_problem(schema, data, error, source) from None
         check_units(schema, data)
     return checked
 
 
-def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError) -> InputError:
+def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
+    if (problem := _other_kind(schema, data, source)) is not None:
+        return problem
     problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
     location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)

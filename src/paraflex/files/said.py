@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, fields
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, fields
 from typing import Any
+
+from paraflex.errors import InputError
 
 
 def fields_said(given: Any, *left_out: str) -> dict[str, Any]:
@@ -15,3 +18,24 @@ def fields_said(given: Any, *left_out: str) -> dict[str, Any]:
         if field.name not in left_out and (default is MISSING or value != default):
             out[field.name] = value
     return out
+
+
+def check_fields(
+    given: Mapping[str, Any],
+    own: Mapping[str, Field[Any]],
+    what: str,
+    place: str,
+    described: Callable[[Field[Any]], str],
+) -> None:
+    """Refuse what a table gives and its class does not have, and what the class needs and is not given."""
+    for key, value in given.items():
+        if key not in own:
+            raise InputError(f"a {what} has no {key}", field=f"{place}.{key}", value=value, remedy="leave it out")
+    for key, each in own.items():
+        if each.default is MISSING and key not in given:
+            raise InputError("is missing", field=f"{place}.{key}", remedy=f"give {described(each)}")
+
+
+def unsayable(field: str, value: object, remedy: str) -> InputError:
+    """The error for what a model has and its file has no words for."""
+    return InputError("a model file cannot say this", field=field, value=value, remedy=remedy)

@@ -111,9 +111,9 @@ class _Table(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
 
 
-def _optional(description: str) -> Any:
-    """A field that is None by default."""
-    return Field(default=None, description=description)
+def _optional(description: str, default: Any = None) -> Any:
+    """A field that a file may leave out."""
+    return Field(default=default, description=description)
 
 
 _UNTIL = _optional("the time in s at which the next piece takes over")
@@ -281,22 +281,21 @@ class LumpTable(_Table):
     """A lumped mass."""
 
     mass: Number = Field(description="the mass in kg")
-    inertia: Number = Field(default=0.0, description="the moment of inertia in kg m^2")
+    inertia: Number = _optional("the moment of inertia in kg m^2", 0.0)
 
 
 class DampingTable(_Table):
     """Structural damping of a body: by ratios, by a loss factor, or in proportion to mass and stiffness."""
 
-    ratios: list[Number] = Field(
-        default=[],
-        description="the damping ratio of each mode of the body as its joints hold it; the last serves the rest",
+    ratios: list[Number] = _optional(
+        "the damping ratio of each mode of the body as its joints hold it; the last serves the rest", []
     )
-    loss_factor: Number = Field(
-        default=0.0, description="twice the damping ratio of a vibration at the frequency, in proportion to stiffness"
+    loss_factor: Number = _optional(
+        "twice the damping ratio of a vibration at the frequency, in proportion to stiffness", 0.0
     )
-    frequency: Number = Field(default=0.0, description="the frequency in Hz that the loss factor is meant for")
-    mass: Number = Field(default=0.0, description="the part in proportion to mass in 1/s, of the body as it is held")
-    stiffness: Number = Field(default=0.0, description="the part in proportion to stiffness in s")
+    frequency: Number = _optional("the frequency in Hz that the loss factor is meant for", 0.0)
+    mass: Number = _optional("the part in proportion to mass in 1/s, of the body as it is held", 0.0)
+    stiffness: Number = _optional("the part in proportion to stiffness in s", 0.0)
 
 
 ReferenceName = Literal["pinned", "cantilever", "free"]
@@ -311,12 +310,12 @@ class BeamTable(_Table):
     length: Number = Field(description="the length in m")
     section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one a span")
     material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one a span")
-    points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
+    points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
     elements: Count | list[Count] | None = _optional(
         "elements per span, one number or one a span; by default 1, and where a joint slides along "
         "the beam so many that none is longer than a third of it"
     )
-    lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
+    lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
     reference: ReferenceName | None = _optional(
         'how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default'
     )
@@ -324,16 +323,14 @@ class BeamTable(_Table):
         'curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default'
     )
     modes: Count | None = _optional("how many modes of lowest frequency to keep")
-    reduction: ReductionName = Field(
-        default="modal",
-        description='what is kept with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
+    reduction: ReductionName = _optional(
+        'what is kept with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
         "held, and static shapes of these",
+        "modal",
     )
     damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = Field(default=True, description="false for a rigid beam")
-    frames: Count = Field(
-        default=1, description="floating frames of equal length, joined rigidly: more of them for large deflections"
-    )
+    flexible: Yes = _optional("false for a rigid beam", True)
+    frames: Count = _optional("floating frames of equal length, joined rigidly: more of them for large deflections", 1)
 
 
 class RigidTable(_Table):
@@ -342,8 +339,8 @@ class RigidTable(_Table):
     type: Literal["rigid"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     mass: Number = Field(description="the mass in kg")
     inertia: Number = Field(description="the moment of inertia about the centre of mass in kg m^2")
-    centre_of_mass: Pair = Field(default=[0.0, 0.0], description="[x, y] in the body frame in m")
-    points: dict[str, Pair] = Field(default={}, description="[x, y] of each named point in the body frame in m")
+    centre_of_mass: Pair = _optional("[x, y] in the body frame in m", [0.0, 0.0])
+    points: dict[str, Pair] = _optional("[x, y] of each named point in the body frame in m", {})
 
 
 if TYPE_CHECKING:
@@ -370,15 +367,15 @@ class AssumedModesTable(_Table):
     length: Number = Field(description="the length in m")
     section: Text = Field(description="the name of a [section.NAME] table")
     material: Text = Field(description="the name of a [material.NAME] table")
-    transverse_sines: Count = Field(default=0, description="how many sin(n pi z), from n = 1 on")
-    transverse_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
-    axial_sines: Count = Field(default=0, description="how many sin(n pi z), from n = 1 on")
-    axial_polynomials: list[list[Number]] = Field(default=[], description="a list of coefficients, ascending in z")
-    points: dict[str, Number] = Field(default={}, description="the distance of each named point from the start in m")
-    lumps: dict[str, Text] = Field(default={}, description="the name of a [lump.NAME] table for each point")
+    transverse_sines: Count = _optional("how many sin(n pi z), from n = 1 on", 0)
+    transverse_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
+    axial_sines: Count = _optional("how many sin(n pi z), from n = 1 on", 0)
+    axial_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
+    points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
+    lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
     modes: Count | None = _optional("how many modes of lowest frequency to keep")
     damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = Field(default=True, description="false for a rigid bar")
+    flexible: Yes = _optional("false for a rigid bar", True)
 
 
 class ModalPointTable(_Table):
@@ -403,10 +400,10 @@ class ModalTable(_Table):
     G1: list[Number] = Field(description="int (x N_y - y N_x) dm")
     G2: list[list[Number]] = Field(description="rows of the skew int (N_x^T N_y - N_y^T N_x) dm")
     I2: list[list[Number]] | None = _optional("rows of int N^T N dm")
-    points: dict[str, ModalPointTable] = Field(default={}, description="position, shape and slope of each named point")
+    points: dict[str, ModalPointTable] = _optional("position, shape and slope of each named point", {})
     modes: Count | None = _optional("how many modes of lowest frequency to keep")
     damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = Field(default=True, description="false for a rigid body")
+    flexible: Yes = _optional("false for a rigid body", True)
 
 
 class PieceTable(_Table):
@@ -444,7 +441,7 @@ class AssemblyTable(BaseModel):
 
     extra_description: ClassVar[str] = "the angle of the body in rad"
 
-    points: dict[str, Pair] = Field(default={}, description='[x, y] in m for each "body.point"')
+    points: dict[str, Pair] = _optional('[x, y] in m for each "body.point"', {})
 
     @property
     def angles(self) -> dict[str, float]:
@@ -481,37 +478,36 @@ class RatesTable(_Table):
 class VelocityTable(_Table):
     """Velocities at the start; the rest follows."""
 
-    angular: dict[str, Number] = Field(default={}, description="the rate of each body's angle in rad/s")
-    point: dict[str, Pair] = Field(default={}, description='[x, y] in m/s for each "body.point"')
+    angular: dict[str, Number] = _optional("the rate of each body's angle in rad/s", {})
+    point: dict[str, Pair] = _optional('[x, y] in m/s for each "body.point"', {})
 
 
 class StartTable(_Table):
     """How a model without a path starts."""
 
-    deflection: dict[str, dict[str, Pair | DeflectionTable]] = Field(
-        default={}, description="[axial, transverse] in m, or a table of axial, transverse, slope, for points of beams"
+    deflection: dict[str, dict[str, Pair | DeflectionTable]] = _optional(
+        "[axial, transverse] in m, or a table of axial, transverse, slope, for points of beams", {}
     )
     velocity: VelocityTable = VelocityTable()
-    coordinates: dict[str, CoordinatesTable] = Field(default={}, description="x, y, phi and flexible of bodies")
-    rates: dict[str, RatesTable] = Field(default={}, description="rates of x, y, phi and flexible of bodies")
+    coordinates: dict[str, CoordinatesTable] = _optional("x, y, phi and flexible of bodies", {})
+    rates: dict[str, RatesTable] = _optional("rates of x, y, phi and flexible of bodies", {})
 
 
 class EndEffectorTable(_Table):
     """The point that is to follow a path."""
 
     point: Text = Field(description='"body.point"')
-    coordinates: list[Text] = Field(default=["x", "y"], description='task coordinates from "x", "y", "angle"')
+    coordinates: list[Text] = _optional('task coordinates from "x", "y", "angle"', ["x", "y"])
 
 
 class PayloadTable(_Table):
     """What the end-effector carries, fixed to its point."""
 
     mass: Number = Field(description="the mass in kg")
-    inertia: Number = Field(default=0.0, description="the moment of inertia about its centre of mass in kg m^2")
-    offset: Pair = Field(
-        default=[0.0, 0.0],
-        description="[x, y] in m from the end-effector's point to its centre of mass, in the frame of the body that "
-        "carries it",
+    inertia: Number = _optional("the moment of inertia about its centre of mass in kg m^2", 0.0)
+    offset: Pair = _optional(
+        "[x, y] in m from the end-effector's point to its centre of mass, in the frame of the body that carries it",
+        [0.0, 0.0],
     )
 
 
@@ -522,9 +518,7 @@ class ShaperTable(_Table):
     frequencies: Number | list[Number] = Field(
         description="the undamped natural frequencies of the modes in Hz, one number or a list"
     )
-    damping: Number | list[Number] = Field(
-        default=0.0, description="the damping ratio of all modes, or a list with one for each"
-    )
+    damping: Number | list[Number] = _optional("the damping ratio of all modes, or a list with one for each", 0.0)
     tolerance: Number | None = _optional('of "ei", the residual at its frequency as a fraction, by default 0.05')
 
 
@@ -538,7 +532,7 @@ class PolygonTable(_PathTable):
     type: Literal["polygon"]
     corners: list[Pair] = Field(description="a list of [x, y] in m")
     max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
-    closed: Yes = Field(default=True, description="whether the path returns to start")
+    closed: Yes = _optional("whether the path returns to start", True)
 
 
 class LineTable(_PathTable):
@@ -557,8 +551,8 @@ class CircleTable(_PathTable):
     centre: Pair = Field(description="[x, y] in m")
     radius: Number = Field(description="the radius in m")
     max_acceleration: Number = Field(description="the largest acceleration along the path in m/s^2")
-    start_angle: Number = Field(default=0.0, description="the angle of the first point in rad")
-    sweep: Number = Field(default=6.283185307179586, description="the angle swept in rad, positive counter-clockwise")
+    start_angle: Number = _optional("the angle of the first point in rad", 0.0)
+    sweep: Number = _optional("the angle swept in rad, positive counter-clockwise", 6.283185307179586)
 
 
 class PointsTable(_PathTable):
@@ -588,7 +582,7 @@ class SequenceTable(_PathTable):
 
     type: Literal["sequence"]
     paths: list[Text] = Field(description="names of other [path.NAME] tables, in order")
-    dwell: Number = Field(default=0.0, description="the rest between two of them in s")
+    dwell: Number = _optional("the rest between two of them in s", 0.0)
 
 
 PathTable = Annotated[
@@ -631,13 +625,13 @@ class ControllerTable(_Table):
     """A sampled controller: what stands around its law."""
 
     period: Number = Field(description="the time between samples in s")
-    delay: Number = Field(default=0.0, description="the time from a sample until its torques act in s")
-    inputs: list[Text] = Field(
-        default=[],
-        description='sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the '
+    delay: Number = _optional("the time from a sample until its torques act in s", 0.0)
+    inputs: list[Text] = _optional(
+        'sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the '
         "encoders of its motors",
+        [],
     )
-    outputs: list[Text] = Field(default=[], description="motors; by default all of a mode")
+    outputs: list[Text] = _optional("motors; by default all of a mode", [])
     reference: ReferenceEntry | None = _optional(
         'what is taken off the readings: "plan", the planned motion; "open-loop", what sensors read where '
         "the planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the "
@@ -649,10 +643,10 @@ class ControllerTable(_Table):
     )
     rates: NumbersOf | None = _optional("the largest change of torques in N m/s or N/s, of all motors or by motor")
     quantise: NumbersOf | None = _optional("the resolution of readings, in the unit of the sensor, of all or by sensor")
-    filters: dict[str, Number | list[list[Number]]] = Field(
-        default={},
-        description="by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients "
+    filters: dict[str, Number | list[list[Number]]] = _optional(
+        "by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients "
         "of numerator and denominator in descending powers of s",
+        {},
     )
 
 
@@ -661,13 +655,9 @@ class PIDTable(ControllerTable):
 
     type: Literal["pid"]
     stiffness: NumbersOf = Field(description="the proportional gain in N m/rad or N/m, of all motors or by motor")
-    damping: NumbersOf = Field(
-        default=0.0, description="the derivative gain in N m s/rad or N s/m, of all motors or by motor"
-    )
-    integral: NumbersOf = Field(
-        default=0.0, description="the integral gain in N m/rad/s or N/m/s, of all motors or by motor"
-    )
-    project: Yes = Field(default=True, description="whether torques that only strain links are taken out")
+    damping: NumbersOf = _optional("the derivative gain in N m s/rad or N s/m, of all motors or by motor", 0.0)
+    integral: NumbersOf = _optional("the integral gain in N m/rad/s or N/m/s, of all motors or by motor", 0.0)
+    project: Yes = _optional("whether torques that only strain links are taken out", True)
     cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
@@ -676,9 +666,9 @@ class StateSpaceTable(ControllerTable):
 
     type: Literal["state-space"]
     D: Matrix = Field(description="rows of the matrix from readings to torques")
-    A: Matrix = Field(default=[], description="rows of the matrix of states; none without states")
-    B: Matrix = Field(default=[], description="rows of the matrix from readings to states")
-    C: Matrix = Field(default=[], description="rows of the matrix from states to torques")
+    A: Matrix = _optional("rows of the matrix of states; none without states", [])
+    B: Matrix = _optional("rows of the matrix from readings to states", [])
+    C: Matrix = _optional("rows of the matrix from states to torques", [])
 
 
 class ComputedTorqueTable(ControllerTable):
@@ -686,7 +676,7 @@ class ComputedTorqueTable(ControllerTable):
 
     type: Literal["computed-torque"]
     frequency: Number = Field(description="the frequency of the end-effector's error, as of an oscillator, in Hz")
-    damping_ratio: Number = Field(default=0.7, description="the damping ratio of the end-effector's error")
+    damping_ratio: Number = _optional("the damping ratio of the end-effector's error", 0.7)
     cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
@@ -718,14 +708,14 @@ class LQGTable(ControllerTable):
     disturbance: NumbersOf | None = _optional(
         "the standard deviation of random torques in N m or N, of all motors or by motor; by default a tenth of effort"
     )
-    integrators: dict[str, Number] = Field(
-        default={}, description="by sensor the time constant in s with which its error under constant loads decays"
+    integrators: dict[str, Number] = _optional(
+        "by sensor the time constant in s with which its error under constant loads decays", {}
     )
-    coloured: dict[str, tuple[Number, Number | list[list[Number]]]] = Field(
-        default={},
-        description='disturbances that last, by motor or as "link.tip.x" by point and axis: the standard deviation in '
+    coloured: dict[str, tuple[Number, Number | list[list[Number]]]] = _optional(
+        'disturbances that last, by motor or as "link.tip.x" by point and axis: the standard deviation in '
         "N m or N and the cut-off frequency in Hz, or lists of the coefficients of numerator and denominator of a "
         "filter in descending powers of s",
+        {},
     )
     states: Count | None = _optional("the states of the reduced model, by default 16, or all of fewer")
     at: Number | None = _optional("the time of the planned motion that it is designed about in s, by default its start")
@@ -740,20 +730,18 @@ class StudyDefaultsTable(_Table):
     """What `paraflex run` does unless asked otherwise."""
 
     path: Text | None = _optional("the name of a [path.NAME] table")
-    paths: list[Text] = Field(
-        default=[],
-        description="in its place several names: runs and studies of many designs take all, others the first",
+    paths: list[Text] = _optional(
+        "in its place several names: runs and studies of many designs take all, others the first", []
     )
-    modes: list[Text] = Field(default=[], description="actuation modes by name, signs or motor names")
+    modes: list[Text] = _optional("actuation modes by name, signs or motor names", [])
     duration: Number | None = _optional("the duration in s, dwell included")
-    samples: Count = Field(default=701, description="the number of samples kept")
+    samples: Count = _optional("the number of samples kept", 701)
     assembly: Text | None = _optional("the name of an [assembly.NAME] table")
-    torques: dict[str, TorqueEntry] = Field(
-        default={},
-        description="torques of motors in N m, without a path: numbers, expressions of the time t, or tables",
+    torques: dict[str, TorqueEntry] = _optional(
+        "torques of motors in N m, without a path: numbers, expressions of the time t, or tables", {}
     )
-    controllers: list[Text] = Field(
-        default=[], description="names of [controller.NAME] tables that act, beside the torques planned along a path"
+    controllers: list[Text] = _optional(
+        "names of [controller.NAME] tables that act, beside the torques planned along a path", []
     )
     shaper: ShaperTable | None = _optional(
         'the input shaper of torques planned along a path, as { type = "zvd", frequencies = ["9 Hz"] }: none by default'
@@ -772,14 +760,14 @@ class StudyDefaultsTable(_Table):
         'whose errors choose the steps: "positions", or "forces", the default of rigid bodies'
     )
     step: Number | None = _optional("a fixed step in s, with methods that take one")
-    after: Literal["free", "hold"] = Field(
-        default="free", description='what the active motors do after the path: "free" or "hold", by brakes'
+    after: Literal["free", "hold"] = _optional(
+        'what the active motors do after the path: "free" or "hold", by brakes', "free"
     )
     reduced: Count | None = _optional(
         "flexible coordinates that runs keep, all bodies together; all by default, or with 0"
     )
-    error: Literal["motion", "whole"] = Field(
-        default="motion", description='which tracking error ranks modes: of the "motion", or the "whole" run with dwell'
+    error: Literal["motion", "whole"] = _optional(
+        'which tracking error ranks modes: of the "motion", or the "whole" run with dwell', "motion"
     )
 
 
@@ -797,45 +785,43 @@ NumbersByName = Annotated[dict[str, Number], BeforeValidator(_quoted, json_schem
 class StaticsTable(_Table):
     """What `paraflex statics` finds unless asked otherwise."""
 
-    loads: NumbersByName = Field(
-        default={}, description='the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"'
+    loads: NumbersByName = _optional(
+        'the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"', {}
     )
-    torques: NumbersByName = Field(default={}, description="the torque of each motor in N m")
-    moved: NumbersByName = Field(
-        default={}, description='the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start'
+    torques: NumbersByName = _optional("the torque of each motor in N m", {})
+    moved: NumbersByName = _optional(
+        'the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start', {}
     )
     held: list[Text] | None = _optional("coordinates that stay; by default the joints of motors without a torque")
-    steps: Count = Field(default=STEPS, description="how many equal steps of all that is given")
+    steps: Count = _optional("how many equal steps of all that is given", STEPS)
     stiffness: list[Text] | None = _optional("coordinates with a stiffness; by default those loaded or moved")
-    buckling: Count = Field(default=FACTORS, description="how many factors of buckling about every equilibrium")
+    buckling: Count = _optional("how many factors of buckling about every equilibrium", FACTORS)
 
 
 class _Parts(_Table):
     name: Text = Field(description="a name for the mechanism")
-    description: Text = Field(default="", description="a sentence or two")
-    geometry: Literal["linear", "second-order"] = Field(
-        default="second-order", description='the shape of beams: "second-order", or "linear" as in the paper'
+    description: Text = _optional("a sentence or two", "")
+    geometry: Literal["linear", "second-order"] = _optional(
+        'the shape of beams: "second-order", or "linear" as in the paper', "second-order"
     )
-    reference: ReferenceName = Field(
-        default="pinned",
-        description='how frames are fixed to beams: "pinned" (along the chord), "cantilever" (the paper\'s) or "free"',
+    reference: ReferenceName = _optional(
+        'how frames are fixed to beams: "pinned" (along the chord), "cantilever" (the paper\'s) or "free"', "pinned"
     )
-    curvature: CurvatureName = Field(
-        default="separate",
-        description='curvature of beams at lumped moments of inertia: "separate", or "shared" as in the paper',
+    curvature: CurvatureName = _optional(
+        'curvature of beams at lumped moments of inertia: "separate", or "shared" as in the paper', "separate"
     )
-    parameters: dict[str, Any] = Field(default={}, description="numbers by name, for expressions of them in quotes")
+    parameters: dict[str, Any] = _optional("numbers by name, for expressions of them in quotes", {})
     section: dict[str, SectionTable] = {}
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}
-    ground: dict[str, Pair] = Field(default={}, description="[x, y] of each ground point in m")
+    ground: dict[str, Pair] = _optional("[x, y] of each ground point in m", {})
     body: dict[str, Annotated[BeamTable | RigidTable | AssumedModesTable | ModalTable, Field(discriminator="type")]] = (
         Field(description="at least one [body.NAME] table")
     )
-    joint: dict[str, JointEntry] = Field(
-        default={}, description='["body.point", "body.point"] for each revolute joint, a table for others'
+    joint: dict[str, JointEntry] = _optional(
+        '["body.point", "body.point"] for each revolute joint, a table for others', {}
     )
-    motor: dict[str, Text] = Field(default={}, description="the joint of each motor")
+    motor: dict[str, Text] = _optional("the joint of each motor", {})
     prescribed: dict[str, PrescribedTable] = {}
 
 
@@ -848,13 +834,13 @@ _WithGroups = create_model("_WithGroups", __base__=_Parts, **_GROUPS)
 class ModelTable(_WithGroups):
     """A model file."""
 
-    gravity: Pair = Field(default=[0.0, 0.0], description="[x, y] of free fall in m/s^2")
+    gravity: Pair = _optional("[x, y] of free fall in m/s^2", [0.0, 0.0])
     end_effector: EndEffectorTable | None = None
     payload: PayloadTable | None = None
-    assembly: dict[str, AssemblyTable] = Field(
-        default={}, description="approximate angles of all bodies in rad for each assembly, or places of points in m"
+    assembly: dict[str, AssemblyTable] = _optional(
+        "approximate angles of all bodies in rad for each assembly, or places of points in m", {}
     )
-    mode: dict[str, list[Text]] = Field(default={}, description="the motors of each actuation mode")
+    mode: dict[str, list[Text]] = _optional("the motors of each actuation mode", {})
     path: dict[str, PathTable] = Field(default={})
     controller: dict[str, AnyControllerTable] = Field(default={})
     start: StartTable | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from paraflex.control.shaping import Shaper
-from paraflex.errors import InputError, fields_within
+from paraflex.errors import InputError, within
 from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions, check_times, find_method
 from paraflex.kinematics import Path
 from paraflex.mechanism import Mechanism, parse_mode
@@ -133,6 +133,6 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
             "no such number of flexible coordinates", field="study.reduced", value=study.reduced,
             remedy="say how many to keep, 0 or nothing for all",
         )  # fmt: skip
-    with fields_within("study"):
+    with within("study"):
         check_times(study.duration, study.samples)
         study.integration()

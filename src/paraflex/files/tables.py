@@ -6,17 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from itertools import count
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from paraflex.control.described import ControllerDescription
 from paraflex.control.shaped import ShapedPath
 from paraflex.control.shaping import Shaper
-from paraflex.equilibria.given import StaticsDefaults
-from paraflex.errors import InputError, fields_within
+from paraflex.errors import InputError, within
 from paraflex.files.controllers import controller_table
 from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
-from paraflex.files.said import fields_said
+from paraflex.files.said import fields_said, unsayable
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
@@ -42,6 +40,9 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.quantities import joint_pair
 
+if TYPE_CHECKING:
+    from paraflex.files.model import Model
+
 _BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
 # What all beams of a file may have in common at its top, and what they have where it says nothing.
 _SHARED = {"reference": "pinned", "curvature": "separate"}
@@ -50,22 +51,13 @@ _NAMED_TABLES = {"section": "section", "material": "material", "lump": "lumps"}
 
 
 def model_tables(
-    mechanism: Mechanism,
-    paths: Mapping[str, Path],
-    study: StudyDefaults,
-    start: Start | None,
-    statics: StaticsDefaults,
-    controllers: Mapping[str, ControllerDescription],
-    *,
-    file: Mapping[str, Any] | None = None,
-    before: Mechanism | None = None,
-    each: bool = False,
+    model: Model, *, file: Mapping[str, Any] | None = None, before: Mechanism | None = None, each: bool = False
 ) -> dict[str, Any]:
     """What a model file says of a model; what is as it is where a file says nothing is left out.
 
     Parameters
     ----------
-    mechanism, paths, study, start, statics, controllers
+    model : Model
     file : mapping, optional
         Data of a file whose names for sections, materials and lumps are kept.
     before : Mechanism, optional
@@ -78,6 +70,7 @@ def model_tables(
     InputError
         A member that a file has no words for.
     """
+    mechanism, study = model.mechanism, model.study
     if mechanism.bases:
         raise InputError(
             "a file has no words for flexible coordinates that a reduction has chosen", field="bases",
@@ -90,7 +83,7 @@ def model_tables(
         "description": mechanism.description,
         "geometry": "" if mechanism.geometry.value == "second-order" else mechanism.geometry.value,
         **{key: value for key, value in shared.items() if value != _SHARED[key]},
-        "parameters": law_parameters(_laws(mechanism, study, controllers)),
+        "parameters": law_parameters(_laws(model)),
         "section": {name: _section(one, name, file or {}) for name, one in names["section"].values.items()},
         "material": {name: fields_said(material) for name, material in names["material"].values.items()},
         "lump": {name: {"mass": mass, "inertia": inertia} for name, (mass, inertia) in names["lump"].values.items()},
@@ -104,13 +97,13 @@ def model_tables(
         "end_effector": {} if mechanism.end_effector is None else fields_said(mechanism.end_effector),
         "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
         "mode": {mode.name: mode.motors for mode in mechanism.modes},
-        "path": {name: _path(path, name, paths) for name, path in paths.items()},
-        "controller": {name: controller_table(one) for name, one in controllers.items()},
-        "start": {} if start is None else _start(start),
+        "path": {name: _path(path, name, model.paths) for name, path in model.paths.items()},
+        "controller": {name: controller_table(one) for name, one in model.controllers.items()},
+        "start": {} if model.start is None else _start(model.start),
         "study": fields_said(study)
         | ({"torques": _torques(study)} if study.torques else {})
         | ({} if study.shaper is None else {"shaper": _shaper(study.shaper)}),
-        "statics": fields_said(statics),
+        "statics": fields_said(model.statics),
     }
     return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
 
@@ -129,19 +122,18 @@ def _member(member: Any) -> dict[str, Any]:
     together = {"points": ["a", "b"] if hasattr(member, "a") else [], "joints": joint_pair(member)}
     pairs = {key: [getattr(member, name) for name in names] for key, names in together.items() if names}
     if isinstance(member, PointForce | AppliedTorque):
-        with fields_within(f"load.{member.name}"):
+        with within(f"load.{member.name}"):
             return {"point": member.point} | components_table(member.components, member.kind)
     return pairs | fields_said(member, "name", *(name for names in together.values() for name in names))
 
 
-def _laws(
-    mechanism: Mechanism, study: StudyDefaults, controllers: Mapping[str, ControllerDescription]
-) -> Iterator[tuple[str, AngleLaw]]:
-    """Laws in time of a mechanism, each with its place in a file."""
-    yield from ((f"prescribed.{one.name}.law", one.law) for one in mechanism.prescribed)
-    yield from ((f"load.{load.name}.{load.kind}", law) for load in mechanism.loads for law in load.laws)
-    yield from ((f"study.torques.{name}", law) for name, law in study.torques.items() if isinstance(law, AngleLaw))
-    for one in controllers.values():
+def _laws(model: Model) -> Iterator[tuple[str, AngleLaw]]:
+    """Laws in time of a model, each with its place in a file."""
+    torques = model.study.torques
+    yield from ((f"prescribed.{one.name}.law", one.law) for one in model.mechanism.prescribed)
+    yield from ((f"load.{load.name}.{load.kind}", law) for load in model.mechanism.loads for law in load.laws)
+    yield from ((f"study.torques.{name}", law) for name, law in torques.items() if isinstance(law, AngleLaw))
+    for one in model.controllers.values():
         for sensor, law in one.reference.items() if isinstance(one.reference, Mapping) else ():
             if isinstance(law, AngleLaw):
                 yield f"controller.{one.name}.reference.{sensor}", law
@@ -164,7 +156,7 @@ def _plain(value: Any, field: str) -> Any:
     try:
         return float(value)
     except (TypeError, ValueError):
-        raise _unwritable(field, value, "give a number") from None
+        raise unsayable(field, value, "give a number") from None
 
 
 def _text(text: str, field: str) -> str:
@@ -173,10 +165,6 @@ def _text(text: str, field: str) -> str:
     except UnicodeEncodeError:
         raise InputError("not text in UTF-8", field=field, value=ascii(text), remedy="write it otherwise") from None
     return text
-
-
-def _unwritable(field: str, value: object, remedy: str) -> InputError:
-    return InputError("a model file cannot say this", field=field, value=value, remedy=remedy)
 
 
 def _agreed(mechanism: Mechanism) -> dict[str, str]:
@@ -226,14 +214,14 @@ def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
         if kind == "lump":
             for lump in given:
                 if (body.name, lump.point) in out:
-                    raise _unwritable(f"body.{body.name}.lumps", lump.point, "make one lump of those at a point")
+                    raise unsayable(f"body.{body.name}.lumps", lump.point, "make one lump of those at a point")
                 out[body.name, lump.point] = (lump.mass, lump.inertia)
         else:
             for k, each in enumerate(given if isinstance(given, tuple) else (given,)):
                 shape = getattr(each, "shape", None)
                 if shape is not None and Section.of(shape) != each:
                     remedy = "give Section.rectangle(...), round(...) or tube(...), or no shape"
-                    raise _unwritable(f"body.{body.name}.section", each, remedy)
+                    raise unsayable(f"body.{body.name}.section", each, remedy)
                 out[body.name, k] = each
     return out
 
@@ -281,7 +269,7 @@ def _functions(functions: Sequence[ShapeFunction], field: str, direction: str) -
     sines = [function.half_waves for function in functions if isinstance(function, Sine)]
     polynomials = [function.coefficients for function in functions[len(sines) :] if isinstance(function, Polynomial)]
     if sines != list(range(1, len(sines) + 1)) or len(sines) + len(polynomials) != len(functions):
-        raise _unwritable(field, functions, "give the sines from 1 on without gaps, then the polynomials")
+        raise unsayable(field, functions, "give the sines from 1 on without gaps, then the polynomials")
     said = {f"{direction}_sines": len(sines), f"{direction}_polynomials": polynomials}
     return {key: value for key, value in said.items() if value}
 
@@ -291,7 +279,7 @@ def _joint(joint: Joint) -> Any:
 
 
 def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, Any]:
-    with fields_within(f"prescribed.{prescribed.name}"):
+    with within(f"prescribed.{prescribed.name}"):
         law = law_table(prescribed.law, "displacement" if mechanism.slides(prescribed.joint) else "angle")
     return {"joint": prescribed.joint} | law
 
@@ -300,12 +288,12 @@ def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
     if isinstance(path, ShapedPath):
         said = _path(path.path, name, paths)
         if "shaper" in said:
-            raise _unwritable(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
+            raise unsayable(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
         return said | {"shaper": _shaper(path.shaper)}
     if isinstance(path, SequencePath):
         names = [next((other for other, one in paths.items() if one == part), "") for part in path.paths]
         if not all(names):
-            raise _unwritable(f"path.{name}.paths", "a path without a name", "put each of its paths among the model's")
+            raise unsayable(f"path.{name}.paths", "a path without a name", "put each of its paths among the model's")
         return {"type": "sequence", "paths": names} | fields_said(path, "paths")
     if isinstance(path, TabulatedPath):
         columns = [*zip(*path.points, strict=True), *([] if path.times is None else [path.times])]
@@ -313,7 +301,7 @@ def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
     for kind, made in PATHS.items():
         if type(path) is made:
             return {"type": kind} | fields_said(path)
-    raise _unwritable(
+    raise unsayable(
         f"path.{name}",
         type(path).__name__,
         "give a Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath",
@@ -328,7 +316,7 @@ def _torques(study: StudyDefaults) -> dict[str, Any]:
     """Torques of motors: a number or an expression alone where that says it."""
     said = {}
     for name, law in study.torques.items():
-        with fields_within(f"study.torques.{name}"):
+        with within(f"study.torques.{name}"):
             table = components_table((law,), "torque")
         said[name] = table.get("torque", table)
     return said
@@ -336,7 +324,7 @@ def _torques(study: StudyDefaults) -> dict[str, Any]:
 
 def _assembly(assembly: Assembly) -> dict[str, Any]:
     if "points" in assembly.angles:
-        raise _unwritable(f"assembly.{assembly.name}", "points", 'call the body "points" something else')
+        raise unsayable(f"assembly.{assembly.name}", "points", 'call the body "points" something else')
     return {**assembly.angles} | ({"points": assembly.points} if assembly.points else {})
 
 

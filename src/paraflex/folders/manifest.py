@@ -6,7 +6,6 @@ import hashlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from paraflex.errors import InputError
@@ -14,8 +13,6 @@ from paraflex.folders.changes import MANIFEST, NEW, READY, files_in, is_inside
 from paraflex.folders.lock import LOCK, finish_change
 from paraflex.seals import damaged
 from paraflex.writing import read_json
-
-_hash = partial(hashlib.blake2b, digest_size=16)
 
 # Kinds of results, and by which files a folder without a manifest, of an earlier release, is known to hold them.
 RUN = "run"
@@ -180,3 +177,7 @@ def _is_listed(file: Path) -> bool:
 def _is_derived(name: str) -> bool:
     """Whether a file is made of the files of numbers, and can be made again."""
     return name == _REPORT or name.startswith(("figures/", "export/"))
+
+
+def _hash(data: bytes = b"") -> hashlib.blake2b:
+    return hashlib.blake2b(data, digest_size=16)

@@ -60,7 +60,7 @@ CAUSES = {
     ),
     NOT_FINITE: Breakdown(
         "positions, velocities or accelerations are no longer finite numbers",
-        f"{_UNITS_REMEDY}, or choose an implicit method or a shorter step",
+        f"{_UNITS_REMEDY}, or choose a smaller tolerance or a shorter step",
     ),
     ERROR_TEST: Breakdown(
         "the error test asks for steps below the smallest one",

@@ -269,7 +269,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         by_cycle=int(options.step is None and options.per is TolerancePer.CYCLE),
         force_part=options.force_part(system),
         force_control=int(options.control is Control.FORCES),
-        no_change=_NO_CHANGE_FLEXIBLE if system.n_flexible or options.step else _NO_CHANGE,
+        no_change=_NO_CHANGE_FLEXIBLE if system.n_flexible else _NO_CHANGE,
         newton_fraction=options.newton_fraction or method.newton_fraction,
         alpha=options.alpha,
         beta=options.beta,

@@ -182,4 +182,4 @@ def empty_samples(times: Array, system: System, asked: NDArray[np.bool_] | None 
     for array in arrays.values():
         array.fill(np.nan)
     asked = np.ones(times.size, dtype=bool) if asked is None else np.ascontiguousarray(asked)
-    return Samples(times=times, asked=asked, **arrays)
+    return Samples(times=times, asked=asked, solved=np.zeros(times.size, dtype=bool), **arrays)

@@ -230,7 +230,9 @@ class _Varied:
         system, initial, stages = problem.system, problem.initial, run.scheme.c.size
         self.march = make_march(system.n, system.m, stages, inputs_of(system.mechanism).acting)
         self.march.q[:], self.march.v[:] = initial.q, initial.v
-        self.workspace, self.samples = system.workspace(), empty_samples(problem.times, system)
+        self.workspace = system.workspace()
+        # They are solved where those of the run are.
+        self.samples = empty_samples(problem.times, system)._replace(solved=run.samples.solved)
         self.workspace.redundant[:] = run.workspace.redundant
         self.tangent, self.space = make_tangent(system.packed), make_krylov(system.n, system.m)
         self.moved = [
@@ -274,7 +276,7 @@ class _Varied:
         torques = self.march.torques
         for y, direction, moved in zip(self.variations, self.directions, self.moved, strict=True):
             self._vary_times(chunk, y, direction)
-            rest = (*arguments, y, *room, torques, self.workspace)
+            rest = (*arguments, y, *room, torques, self.workspace, self.samples)
             sensitivity_steps(system.packed, chunk.signals, *moved, self.pieces, *rest)
             self._check(chunk, y.left)
 

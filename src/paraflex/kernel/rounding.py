@@ -18,8 +18,8 @@ from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import SAMPLE, WORK
-from paraflex.kernel.samples import step_work, write_samples
-from paraflex.kernel.stage import equations, place
+from paraflex.kernel.samples import begin_sample, place_samples, sample_energies as write_energies, step_work
+from paraflex.kernel.stage import equations, note_torques, place
 from paraflex.kernel.step import input_power, stage_start
 from paraflex.kernel.tangent import note_slopes
 
@@ -159,21 +159,9 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             copy(march.v, march.vs)
             weights = baumgarte_weights(controls, controls.alpha, controls.beta, 0.0)
             history.left[k] = solve_to_rounding(
-                system,
-                signals,
-                t,
-                0.0,
-                0.0,
-                weights,
-                controls.dependent_part,
-                march,
-                march.stage_a[1, 0],
-                march.stage_lam[0],
-                history.least,
-                direction,
-                space,
-                work,
-            )
+                system, signals, t, 0.0, 0.0, weights, controls.dependent_part, march, march.stage_a[1, 0],
+                march.stage_lam[0], history.least, direction, space, work,
+            )  # fmt: skip
             march.power[0] = input_power(system, signals, t, march.q, march.v, march.stage_lam[0], march.torques, work)
         copy(march.q, march.stage_q[0])
         copy(march.v, march.stage_v[0])
@@ -190,21 +178,9 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             copy(history.a[k, i], march.stage_a[1, i])
             copy(history.lam[k, i], march.stage_lam[i])
             left = solve_to_rounding(
-                system,
-                signals,
-                time,
-                g,
-                b,
-                weights,
-                controls.dependent_part,
-                march,
-                march.stage_a[1, i],
-                march.stage_lam[i],
-                history.least,
-                direction,
-                space,
-                work,
-            )
+                system, signals, time, g, b, weights, controls.dependent_part, march, march.stage_a[1, i],
+                march.stage_lam[i], history.least, direction, space, work,
+            )  # fmt: skip
             history.left[k] = max(history.left[k], left)
             copy(work.q, march.stage_q[i])
             copy(work.v, march.stage_v[i])
@@ -215,7 +191,19 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             copy(march.stage_a[1, i], history.a[k, i])
             copy(march.stage_lam[i], history.lam[k, i])
             history.power[k, i] = march.power[i]
-        write_samples(system, tableau, t, h, march, work, out)
+        first, g = place_samples(tableau, t, h, march, out), tableau.A[last, last] * h
+        for i in range(first, march.counts[SAMPLE]):
+            if out.solved[i]:
+                begin_sample(out.q[i], out.v[i], out.a[i], g, g * g, march)
+                note_torques(signals, out.times[i], march.torques)
+                left = solve_to_rounding(
+                    system, signals, out.times[i], g, g * g, weights, controls.dependent_part, march, out.a[i],
+                    out.lam[i], history.least, direction, space, work,
+                )  # fmt: skip
+                history.left[k] = max(history.left[k], left)
+                copy(work.q, out.q[i])
+                copy(work.v, out.v[i])
+        write_energies(system, tableau, t, h, first, march, work, out)
         march.clock[WORK] += step_work(tableau, h, march)
         copy(march.stage_q[last], march.q)
         copy(march.stage_v[last], march.v)

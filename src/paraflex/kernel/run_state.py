@@ -145,6 +145,7 @@ class Samples(NamedTuple):
 
     times: NDArray[np.float64]
     asked: NDArray[np.bool_]  # (times,) those that are kept; others serve to find the largest loads
+    solved: NDArray[np.bool_]  # (times,) those where the equations of motion were solved, and no curve is
     q: NDArray[np.float64]  # (times, n)
     v: NDArray[np.float64]
     a: NDArray[np.float64]

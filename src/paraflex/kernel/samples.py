@@ -49,13 +49,6 @@ def interpolate(q0, v0, a0, q1, v1, a1, h, x):
 
 
 @routine
-def write_samples(system, tableau, t, h, march, work, out):
-    """Fill every sample time within the step from t to t + h, without solving the equations of motion there."""
-    first = place_samples(tableau, t, h, march, out)
-    sample_energies(system, tableau, t, h, first, march, work, out)
-
-
-@routine
 def place_samples(tableau, t, h, march, out):
     """Interpolate the state, accelerations and multipliers at every sample time in the step; the first of them."""
     piece, first = 0, march.counts[SAMPLE]
@@ -89,19 +82,21 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
     for i in range(first, march.counts[SAMPLE]):
         needed = out.asked[i] or march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN
         if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
-            solve_sample(system, signals, controls, i, march, work, out, aside)
+            out.solved[i] = solve_sample(system, signals, controls, i, march, work, out, aside)
 
 
 @routine
 def solve_sample(system, signals, controls, i, march, work, out, aside):
-    """Solve one sample with the factor of the step, or with a factor made there where that one does not serve."""
+    """Solve one sample with the factor of the step, or with a factor made there where that one does not serve.
+
+    Whether the sample is the solution; else it is as it was.
+    """
     q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
     g, b, weights = march.clock[STAGE_G], march.clock[STAGE_B], INDEX_1
     if controls.treatment == BAUMGARTE:
         weights, _ = constraint_weights(controls, march.clock[TRIED])
-    for j in range(q.size):
-        march.qs[j], march.vs[j] = q[j] - b * a[j], v[j] - g * a[j]
-        march.eq[j] = a[j]
+    begin_sample(q, v, a, g, b, march)
+    copy(a, march.eq)
     copy(lam, march.guess_lam)
     solved = solve_at(system, signals, out.times[i], weights, g, b, march, work, a, lam, march.torques)
     if not solved:
@@ -122,8 +117,17 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
     if march.clock[SAMPLE_CHANGE] <= controls.no_change:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
+        solved = False
     for j in range(q.size):
         q[j], v[j] = march.qs[j] + b * a[j], march.vs[j] + g * a[j]
+    return solved
+
+
+@inlined
+def begin_sample(q, v, a, g, b, march):
+    """Explicit parts of a sample into march.qs and march.vs: such that q and v stay where a does."""
+    for j in range(q.size):
+        march.qs[j], march.vs[j] = q[j] - b * a[j], v[j] - g * a[j]
 
 
 @routine

@@ -35,7 +35,7 @@ from paraflex.kernel.sensitivity_samples import (
     DIFFERENCE_STEP,
     PLACES,
     WEIGHTS,
-    sensitivity_at_samples,
+    sensitivity_at_sample,
     work_sensitivity,
 )
 from paraflex.kernel.signals import piece_at
@@ -163,23 +163,48 @@ def power_sensitivity(moved, signals, times, i, q, v, lam, torques, sensitivity,
     sensitivity.power[i] = total / DIFFERENCE_STEP
 
 
+@inlined
+def moved_times(t, d_t):
+    """A time at the points of the difference."""
+    step = DIFFERENCE_STEP * d_t
+    return t + PLACES[0] * step, t + PLACES[1] * step, t + PLACES[2] * step, t + PLACES[3] * step
+
+
+@inlined
+def moved_weights(controls, sensitivity, e, length, d_length):
+    """Weights of the constraints in a step at a point of the difference."""
+    alpha, beta = sensitivity.gains[e, 0], sensitivity.gains[e, 1]
+    return baumgarte_weights(controls, alpha, beta, length + PLACES[e] * DIFFERENCE_STEP * d_length)
+
+
+@routine
+def stage_sensitivity(
+    system, signals, moved, moved_signals, pieces, controls, t, d_t, length, d_length, g, q, v, a, lam, least, i,
+    torques, sensitivity, direction, space, work,
+):  # fmt: skip
+    """Derivatives of a stage, or a sample, from those without its own a; the last relative correction."""
+    weights = (
+        moved_weights(controls, sensitivity, 0, length, d_length),
+        moved_weights(controls, sensitivity, 1, length, d_length),
+        moved_weights(controls, sensitivity, 2, length, d_length),
+        moved_weights(controls, sensitivity, 3, length, d_length),
+    )
+    note_friction(system, q, v, work.mu, work.compliance)
+    take_pieces(signals, t, moved_signals, pieces)
+    find_parametric(moved, pieces, moved_times(t, d_t), weights, q, v, a, lam, torques, sensitivity, work)
+    note_torques(signals, t, torques)
+    here = baumgarte_weights(controls, controls.alpha, controls.beta, length)
+    return respond_to_parameter(
+        system, g, g * g, here, controls.dependent_part, q, v, a, lam, least, i, torques, sensitivity, direction, space,
+        work,
+    )  # fmt: skip
+
+
 @releases_lock
 def sensitivity_steps(
-    system,
-    signals,
-    moved,
-    moved_signals,
-    pieces,
-    tableau,
-    controls,
-    count,
-    history,
-    sensitivity,
-    direction,
-    space,
-    torques,
-    work,
-):
+    system, signals, moved, moved_signals, pieces, tableau, controls, count, history, sensitivity, direction, space,
+    torques, work, out,
+):  # fmt: skip
     """Derivatives of the motion by one parameter over the first `count` steps of a history.
 
     Parameters
@@ -189,7 +214,7 @@ def sensitivity_steps(
     pieces : tuple of 4 Signals
         Scratch, from `make_piece`.
     history : History
-        After `solve_steps_to_rounding`.
+        After `solve_steps_to_rounding`, and its samples `out`.
     sensitivity : Sensitivity
         Where the last steps left it: its q[0] and v[0] and, unless the first step restarts, its a[0] and lam[0].
     direction : Tangent
@@ -201,77 +226,43 @@ def sensitivity_steps(
         h, sensitivity.left[k] = history.h[k], 0.0
         dt, dh = sensitivity.t[k], sensitivity.h[k]
         for i in range(0 if history.restart[k] != 0 else 1, last + 1):
-            length = h if i > 0 else 0.0
-            t, d_t = history.t[k] + tableau.c[i] * length, dt + (tableau.c[i] * dh if i > 0 else 0.0)
+            length, d_length = (h, dh) if i > 0 else (0.0, 0.0)
+            t, d_t = history.t[k] + tableau.c[i] * length, dt + tableau.c[i] * d_length
             g = tableau.A[i, i] * length
             if i > 0:
                 start_sensitivity(tableau, i, k, g, history, sensitivity)
                 copy(sensitivity.a[i - 1], sensitivity.a[i])
                 copy(sensitivity.lam[i - 1], sensitivity.lam[i])
-            times = (
-                t + PLACES[0] * DIFFERENCE_STEP * d_t, t + PLACES[1] * DIFFERENCE_STEP * d_t,
-                t + PLACES[2] * DIFFERENCE_STEP * d_t, t + PLACES[3] * DIFFERENCE_STEP * d_t,
-            )  # fmt: skip
-            d_length = dh if i > 0 else 0.0
-            weights = (
-                baumgarte_weights(
-                    controls,
-                    sensitivity.gains[0, 0],
-                    sensitivity.gains[0, 1],
-                    length + PLACES[0] * DIFFERENCE_STEP * d_length,
-                ),
-                baumgarte_weights(
-                    controls,
-                    sensitivity.gains[1, 0],
-                    sensitivity.gains[1, 1],
-                    length + PLACES[1] * DIFFERENCE_STEP * d_length,
-                ),
-                baumgarte_weights(
-                    controls,
-                    sensitivity.gains[2, 0],
-                    sensitivity.gains[2, 1],
-                    length + PLACES[2] * DIFFERENCE_STEP * d_length,
-                ),
-                baumgarte_weights(
-                    controls,
-                    sensitivity.gains[3, 0],
-                    sensitivity.gains[3, 1],
-                    length + PLACES[3] * DIFFERENCE_STEP * d_length,
-                ),
-            )
             q, v, a, lam = history.q[k, i], history.v[k, i], history.a[k, i], history.lam[k, i]
-            note_friction(system, q, v, work.mu, work.compliance)
-            take_pieces(signals, t, moved_signals, pieces)
-            find_parametric(moved, pieces, times, weights, q, v, a, lam, torques, sensitivity, work)
-            note_torques(signals, t, torques)
-            here = baumgarte_weights(controls, controls.alpha, controls.beta, length)
-            left = respond_to_parameter(
-                system,
-                g,
-                g * g,
-                here,
-                controls.dependent_part,
-                q,
-                v,
-                a,
-                lam,
-                history.least,
-                i,
-                torques,
-                sensitivity,
-                direction,
-                space,
-                work,
-            )
+            left = stage_sensitivity(
+                system, signals, moved, moved_signals, pieces, controls, t, d_t, length, d_length, g, q, v, a, lam,
+                history.least, i, torques, sensitivity, direction, space, work,
+            )  # fmt: skip
             sensitivity.left[k] = max(sensitivity.left[k], left)
-            power_sensitivity(moved, pieces, times, i, q, v, lam, torques, sensitivity, work)
+            power_sensitivity(moved, pieces, moved_times(t, d_t), i, q, v, lam, torques, sensitivity, work)
         if sensitivity.taken[0] == 0 and sensitivity.times[0] <= history.t[k]:
-            copy(sensitivity.q[0], sensitivity.sample_q[0])
-            copy(sensitivity.v[0], sensitivity.sample_v[0])
-            copy(sensitivity.a[0], sensitivity.sample_a[0])
-            copy(sensitivity.lam[0], sensitivity.sample_lam[0])
+            keep_sample(0, 0, sensitivity)
             sensitivity.taken[0] = 1
-        sensitivity_at_samples(tableau, k, history, sensitivity)
+        g, dg, sample = tableau.A[last, last] * h, tableau.A[last, last] * dh, last + 1
+        i = sensitivity.taken[0]
+        while i < sensitivity.times.size and sensitivity.times[i] <= history.t[k] + h * (1.0 + 1e-12):
+            sensitivity_at_sample(tableau, k, i, history, sensitivity)
+            if out.solved[i]:
+                for j in range(sensitivity.f.size):
+                    da, jump = sensitivity.sample_a[i, j], out.a[i, j] - sensitivity.moved_v[j]
+                    sensitivity.q[sample, j] = sensitivity.sample_q[i, j] - g * g * da + 2.0 * g * dg * jump
+                    sensitivity.v[sample, j] = sensitivity.sample_v[i, j] - g * da + dg * jump
+                copy(sensitivity.sample_a[i], sensitivity.a[sample])
+                copy(sensitivity.sample_lam[i], sensitivity.lam[sample])
+                left = stage_sensitivity(
+                    system, signals, moved, moved_signals, pieces, controls, out.times[i], sensitivity.sample_times[i],
+                    h, dh, g, out.q[i], out.v[i], out.a[i], out.lam[i], history.least, sample, torques, sensitivity,
+                    direction, space, work,
+                )  # fmt: skip
+                sensitivity.left[k] = max(sensitivity.left[k], left)
+                keep_sample(sample, i, sensitivity)
+            i += 1
+        sensitivity.taken[0] = i
         done, d_done = work_sensitivity(tableau, k, history, sensitivity)
         sensitivity.work[0] += done
         sensitivity.work[1] += d_done
@@ -280,6 +271,15 @@ def sensitivity_steps(
         copy(sensitivity.a[last], sensitivity.a[0])
         copy(sensitivity.lam[last], sensitivity.lam[0])
         sensitivity.power[0] = sensitivity.power[last]
+
+
+@routine
+def keep_sample(stage, i, sensitivity):
+    """Take the derivatives of a stage as those of sample i."""
+    copy(sensitivity.q[stage], sensitivity.sample_q[i])
+    copy(sensitivity.v[stage], sensitivity.sample_v[i])
+    copy(sensitivity.a[stage], sensitivity.sample_a[i])
+    copy(sensitivity.lam[stage], sensitivity.sample_lam[i])
 
 
 @routine

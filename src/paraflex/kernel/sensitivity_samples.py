@@ -1,4 +1,4 @@
-"""Derivatives of a run at its samples within a step: those of the results of `samples.write_samples`."""
+"""Derivatives of a run at its samples within a step, before the equations of motion are solved there."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, fill
-from paraflex.kernel.compiling import by_reference, routine
+from paraflex.kernel.compiling import by_reference, inlined, routine
 from paraflex.kernel.samples import interpolate
 
 # Central differences of fourth order over this part of a parameter's size, and their places and weights.
@@ -23,10 +23,10 @@ class Sensitivity(NamedTuple):
     t: NDArray[np.float64]  # (steps,) of when steps begin
     h: NDArray[np.float64]  # and of their lengths
     gains: NDArray[np.float64]  # (4, 2) Baumgarte's alpha and beta at the places of the difference
-    q: NDArray[np.float64]  # (stages, n) of the step at hand; the first is where the last one ended
+    q: NDArray[np.float64]  # (stages + 1, n) of the step at hand, the first where the last one ended, and of a sample
     v: NDArray[np.float64]
     a: NDArray[np.float64]
-    lam: NDArray[np.float64]  # (stages, m)
+    lam: NDArray[np.float64]  # (stages + 1, m)
     power: NDArray[np.float64]  # (stages,)
     f: NDArray[np.float64]  # (n,) R_s of the equations of motion
     rows: NDArray[np.float64]  # (m,) and of the rows
@@ -54,10 +54,10 @@ def make_sensitivity(
         t=apart(steps),
         h=apart(steps),
         gains=apart((4, 2)),
-        q=apart((stages, n)),
-        v=apart((stages, n)),
-        a=apart((stages, n)),
-        lam=apart((stages, m)),
+        q=apart((stages + 1, n)),
+        v=apart((stages + 1, n)),
+        a=apart((stages + 1, n)),
+        lam=apart((stages + 1, m)),
         power=apart(stages),
         f=apart(n),
         rows=apart(m),
@@ -109,59 +109,49 @@ def multiplier_sensitivity(tableau, k, fraction, d_fraction, history, sensitivit
 
 
 @routine
-def sensitivity_at_samples(tableau, k, history, sensitivity):
-    """Derivatives at every sample time within step k: those of the results of `samples.write_samples`."""
+def sensitivity_at_sample(tableau, k, i, history, sensitivity):
+    """Derivatives at sample i, within step k, of the curves there; their accelerations into sensitivity.moved_v."""
     t, h, last = history.t[k], history.h[k], tableau.c.size - 1
-    piece, i = 0, sensitivity.taken[0]
-    while i < sensitivity.times.size and sensitivity.times[i] <= t + h * (1.0 + 1e-12):
-        time, d_time = sensitivity.times[i], sensitivity.sample_times[i] - sensitivity.t[k]
-        while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
-            piece += 1
-        s0, s1 = tableau.dense[piece], tableau.dense[piece + 1]
-        width, d_width = (tableau.c[s1] - tableau.c[s0]) * h, (tableau.c[s1] - tableau.c[s0]) * sensitivity.h[k]
-        z = min(max((time - t - tableau.c[s0] * h) / width, 0.0), 1.0)
-        d_z = (d_time - tableau.c[s0] * sensitivity.h[k] - z * d_width) / width
-        shifts = d_z != 0.0 or d_width != 0.0
-        for j in range(sensitivity.q.shape[1]):
-            sensitivity.sample_q[i, j], sensitivity.sample_v[i, j], sensitivity.sample_a[i, j] = interpolate(
-                sensitivity.q[s0, j],
-                sensitivity.v[s0, j],
-                sensitivity.a[s0, j],
-                sensitivity.q[s1, j],
-                sensitivity.v[s1, j],
-                sensitivity.a[s1, j],
-                width,
-                z,
-            )
-            if shifts:
-                for e in range(4):
-                    q, v, a = interpolate(
-                        history.q[k, s0, j], history.v[k, s0, j], history.a[k, s0, j],
-                        history.q[k, s1, j], history.v[k, s1, j], history.a[k, s1, j],
-                        width + PLACES[e] * DIFFERENCE_STEP * d_width, z + PLACES[e] * DIFFERENCE_STEP * d_z,
-                    )  # fmt: skip
-                    sensitivity.sample_q[i, j] += WEIGHTS[e] * q / DIFFERENCE_STEP
-                    sensitivity.sample_v[i, j] += WEIGHTS[e] * v / DIFFERENCE_STEP
-                    sensitivity.sample_a[i, j] += WEIGHTS[e] * a / DIFFERENCE_STEP
-        multiplier_sensitivity(
-            tableau,
-            k,
-            (time - t) / h,
-            (d_time - (time - t) / h * sensitivity.h[k]) / h,
-            history,
-            sensitivity,
-            sensitivity.sample_lam[i],
-        )
-        work, d_work = work_sensitivity(tableau, k, history, sensitivity)
-        done = min(max((time - t) / h, 0.0), 1.0)
-        d_done, left = (d_time - done * sensitivity.h[k]) / h, 1.0 - done
-        first, end = history.power[k, 0], history.power[k, last]
-        sensitivity.sample_work[i] = (
-            sensitivity.work[1] + done * done * (3.0 - 2.0 * done) * d_work + 6.0 * done * left * d_done * work
-        )
-        bend = done * left * (left * first - done * end)
-        d_bend = (left - done) * (left * first - done * end) - done * left * (first + end)
-        sensitivity.sample_work[i] += sensitivity.h[k] * bend + h * d_done * d_bend
-        sensitivity.sample_work[i] += h * done * left * (left * sensitivity.power[0] - done * sensitivity.power[last])
-        i += 1
-    sensitivity.taken[0] = i
+    time, d_time = sensitivity.times[i], sensitivity.sample_times[i] - sensitivity.t[k]
+    piece = 0
+    while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
+        piece += 1
+    s0, s1 = tableau.dense[piece], tableau.dense[piece + 1]
+    width, d_width = (tableau.c[s1] - tableau.c[s0]) * h, (tableau.c[s1] - tableau.c[s0]) * sensitivity.h[k]
+    z = min(max((time - t - tableau.c[s0] * h) / width, 0.0), 1.0)
+    d_z = (d_time - tableau.c[s0] * sensitivity.h[k] - z * d_width) / width
+    shifts = d_z != 0.0 or d_width != 0.0
+    for j in range(sensitivity.q.shape[1]):
+        sensitivity.sample_q[i, j], sensitivity.sample_v[i, j], sensitivity.sample_a[i, j] = interpolate(
+            sensitivity.q[s0, j], sensitivity.v[s0, j], sensitivity.a[s0, j],
+            sensitivity.q[s1, j], sensitivity.v[s1, j], sensitivity.a[s1, j], width, z,
+        )  # fmt: skip
+        sensitivity.moved_v[j] = curve(history, k, s0, s1, j, width, z)[2]
+        if shifts:
+            for e in range(4):
+                moved = PLACES[e] * DIFFERENCE_STEP
+                q, v, a = curve(history, k, s0, s1, j, width + moved * d_width, z + moved * d_z)
+                sensitivity.sample_q[i, j] += WEIGHTS[e] * q / DIFFERENCE_STEP
+                sensitivity.sample_v[i, j] += WEIGHTS[e] * v / DIFFERENCE_STEP
+                sensitivity.sample_a[i, j] += WEIGHTS[e] * a / DIFFERENCE_STEP
+    done = min(max((time - t) / h, 0.0), 1.0)
+    d_done, left = (d_time - (time - t) / h * sensitivity.h[k]) / h, 1.0 - done
+    multiplier_sensitivity(tableau, k, (time - t) / h, d_done, history, sensitivity, sensitivity.sample_lam[i])
+    work, d_work = work_sensitivity(tableau, k, history, sensitivity)
+    first, end = history.power[k, 0], history.power[k, last]
+    sensitivity.sample_work[i] = (
+        sensitivity.work[1] + done * done * (3.0 - 2.0 * done) * d_work + 6.0 * done * left * d_done * work
+    )
+    bend = done * left * (left * first - done * end)
+    d_bend = (left - done) * (left * first - done * end) - done * left * (first + end)
+    sensitivity.sample_work[i] += sensitivity.h[k] * bend + h * d_done * d_bend
+    sensitivity.sample_work[i] += h * done * left * (left * sensitivity.power[0] - done * sensitivity.power[last])
+
+
+@inlined
+def curve(history, k, s0, s1, j, width, z):
+    """Coordinate j, its velocity and acceleration between two stages of step k."""
+    return interpolate(
+        history.q[k, s0, j], history.v[k, s0, j], history.a[k, s0, j],
+        history.q[k, s1, j], history.v[k, s1, j], history.a[k, s1, j], width, z,
+    )  # fmt: skip

@@ -575,12 +575,8 @@ def _points(values: Sequence[Sequence[float]], field: str, at_least: int, column
         points = np.array(values, dtype=float)
     except (TypeError, ValueError):
         points = np.zeros((0, 0))
-    if (
-        points.ndim != 2
-        or points.shape[1] not in columns
-        or points.shape[0] < at_least
-        or not np.all(np.isfinite(points))
-    ):
+    shaped = points.ndim == 2 and points.shape[1] in columns and len(points) >= at_least
+    if not (shaped and np.all(np.isfinite(points))):
         raise InputError(
             "not a list of points", field=field, value=values,
             remedy=f"give at least {at_least} of [x, y] in metres{', or all of [x, y, angle]' if 3 in columns else ''}",

@@ -16,8 +16,8 @@ from paraflex.mechanism.bodies import Body, FlexibleBeam
 from paraflex.mechanism.cut import Cut
 from paraflex.mechanism.joints import PointRef, WeldJoint
 from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.segments import FIRST_END, LAST_END, moved, rebuilt
-from paraflex.mechanism.sensors import DeflectionSensor, Sensor, StrainGauge
+from paraflex.mechanism.segments import FIRST_END, LAST_END, frame_read, moved, rebuilt
+from paraflex.mechanism.sensors import Sensor, StrainGauge
 
 # Places nearer than this part of the beam are one.
 _SAME = 1e-9
@@ -65,7 +65,7 @@ def _check(mechanism: Mechanism, beams: set[str]) -> None:
                 value=getattr(mechanism.body(joint.a.body), "frames", None), remedy="leave it out, or give it elements",
             )  # fmt: skip
     for sensor in mechanism.sensors:
-        frame = sensor.point.body if isinstance(sensor, DeflectionSensor) else getattr(sensor, "body", "")
+        frame = frame_read(sensor)
         if frame in beams and not isinstance(sensor, StrainGauge):
             raise InputError(
                 f"reads in the frame of {frame}, which has several", field=f"sensor.{sensor.name}",

@@ -114,7 +114,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         places |= {PointRef(body.name, point): PointRef(names[i], point) for point, i in owners.items()}
 
     segmented = rebuilt(
-        replace(mechanism, sensors=tuple(one for one in mechanism.sensors if _remains(one, counts))),
+        replace(mechanism, sensors=tuple(one for one in mechanism.sensors if frame_read(one) not in counts)),
         bodies, joints, Cut(mechanism, carriers, places),
         name=f"{mechanism.name}, finite segments",
         springs=(*mechanism.springs, *springs), dampers=(*mechanism.dampers, *dampers),
@@ -148,10 +148,9 @@ def rebuilt(
     )
 
 
-def _remains(member: Sensor, cut: Mapping[str, int]) -> bool:
-    """Whether a member has a meaning in segments: of sensors those that need no frame and no inside of a cut beam."""
-    frame = member.point.body if isinstance(member, DeflectionSensor) else getattr(member, "body", "")
-    return frame not in cut
+def frame_read(sensor: Sensor) -> str:
+    """The body in whose frame or inside a sensor measures; empty of one that needs none."""
+    return sensor.point.body if isinstance(sensor, DeflectionSensor) else getattr(sensor, "body", "")
 
 
 def is_hinge(joint: Joint) -> bool:

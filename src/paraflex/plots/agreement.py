@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,12 +14,11 @@ from paraflex.plots.layout import is_narrow, panels
 from paraflex.plots.runs import draw_actual, draw_curves, finish_over_time
 from paraflex.plots.scales import mark_powers
 from paraflex.plots.selection import names_of, select_model, select_run
-from paraflex.plots.style import BLUE, VERMILLION, keep_flat, look_of
+from paraflex.plots.style import PAIR, keep_flat, look_of
 from paraflex.plots.time_series import most_deflected
 from paraflex.plots.workspace import deviated_paths
 
 _MODEL_NAMES = {
-    "rigid": "rigid",
     "ked": "KED",
     "linear": "linear geometry",
     "second-order": "second-order geometry",
@@ -28,7 +26,6 @@ _MODEL_NAMES = {
     "exudyn": "Exudyn",
     "mujoco": "MuJoCo",
 }
-_PAIR: tuple[dict[str, Any], ...] = ({"color": BLUE, "linestyle": "-"}, {"color": VERMILLION, "linestyle": (0, (4, 2))})
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
 _SMALLEST_DISTANCE = 1e-8
 # Links that a page holds in one column.
@@ -54,7 +51,7 @@ def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure
     for column, (variable, quantity) in zip(axes.T, columns, strict=True):
         scale = max(float(np.ptp(run[variable].values, axis=0).max()) for run in runs)
         for panel, body in zip(column, bodies, strict=True):
-            for run, model, look in zip(runs, models, _PAIR, strict=True):
+            for run, model, look in zip(runs, models, PAIR, strict=True):
                 draw_actual(panel, run, time, run[variable].sel(body=body).values, label=printed(model), **look)
             keep_flat(panel, scale)
             panel.set_title(f"{symbol(str(body))}: {QUANTITIES[quantity].name}")
@@ -91,7 +88,7 @@ def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnifica
         Of the deviations; by default one at which they can be seen.
     """
     runs = [select_run(select_model(data, model), mode) for model in models]
-    return deviated_paths(dict(zip(map(printed, models), runs, strict=True)), magnification, _PAIR)
+    return deviated_paths(dict(zip(map(printed, models), runs, strict=True)), magnification, PAIR)
 
 
 @drawn

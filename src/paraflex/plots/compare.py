@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,10 +18,9 @@ from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.planned import PlannedFigure
 from paraflex.plots.save import write_figures
 from paraflex.plots.selection import one_run
-from paraflex.plots.style import BLUE, VERMILLION, journal_style
+from paraflex.plots.style import PAIR, journal_style
 from paraflex.results.comparison import MotionPair, RunComparison
 
-_PAIR: tuple[dict[str, Any], ...] = ({"color": BLUE, "linestyle": "-"}, {"color": VERMILLION, "linestyle": (0, (4, 2))})
 # Panels of a figure: parts that differ most.
 _MOST = 6
 _COMPONENTS = ("x", "y")
@@ -58,7 +56,7 @@ def overlaid_motion(comparison: RunComparison, name: str, mode: str = "") -> Fig
     with journal_style():
         figure, axes = panels(len(curves), 1)
         for panel, (title, values) in zip(axes[:, 0], curves, strict=True):
-            for run, own, label, look in zip(runs, values, comparison.names, _PAIR, strict=True):
+            for run, own, label, look in zip(runs, values, comparison.names, PAIR, strict=True):
                 panel.plot(run["time"].values, unit.factor * own, label=plain(label), **look)
             panel.set_title(title)
             panel.set_ylabel("" if unit.name == "1" else f"[{unit.name}]")

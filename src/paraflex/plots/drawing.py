@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain, three_digits
-from paraflex.plots.layout import page_width
+from paraflex.plots.layout import MM, page_width
 from paraflex.plots.marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
 from paraflex.plots.scene import (
     Limits,
@@ -37,7 +37,6 @@ Array = NDArray[np.float64]
 
 # Bodies named under a picture; of more there is no room.
 _MOST_NAMED = 9
-_MM = 1.0 / 25.4
 # Room above and below a drawing [mm].
 _HEAD, _FOOT = 5.0, 5.5
 
@@ -231,11 +230,9 @@ def mechanism_drawing(
     until = run["time"].values
     magnify = default_magnification([run]) if magnify is None else magnify
     shown = scene(run, np.append(until[until < time], time), magnify, point)
-    limits = shown.limits
-    aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), 0.4, 1.25))
+    limits, aspect = shown.limits.filling(0.4, 1.25)
     height = width * aspect + _HEAD + _FOOT
-    figure = Figure(figsize=(width * _MM, height * _MM), facecolor=look.ground)
-    limits = limits.fitted(1.0 / aspect)
+    figure = Figure(figsize=(width * MM, height * MM), facecolor=look.ground)
     axes = bare(figure.add_axes((0.0, _FOOT / height, 1.0, 1.0 - (_HEAD + _FOOT) / height)), limits)
     sketch = Sketch(axes, shown, limits, look, width=0.5)
     sketch.show(len(shown.time) - 1)

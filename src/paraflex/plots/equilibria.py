@@ -133,10 +133,8 @@ def _pictures(runs: list[tuple[xr.Dataset, str]], look: Theme) -> tuple[Figure, 
     columns = 1 if is_narrow() else min(len(runs), 3)
     samples = [as_samples(data) for data, _ in runs]
     scenes = [scene(data, data["time"].values) for data in samples]
-    limits = common_limits(scenes)
-    aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), 0.35, 1.6))
-    aspect = min(aspect, 0.6) if columns == 1 else aspect
-    limits, wide = limits.fitted(1.0 / aspect), width / columns
+    limits, aspect = common_limits(scenes).filling(0.35, 0.6 if columns == 1 else 1.6)
+    wide = width / columns
     rows = -(-len(runs) // columns)
     high = wide * aspect + _TITLE
     figure = Figure(figsize=(width * MM, rows * high * MM), facecolor=look.ground)

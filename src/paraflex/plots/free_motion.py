@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from paraflex.plots.energy import ENERGIES
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import ROUNDING, axis_label, peak, plain, symbol
-from paraflex.plots.layout import label_outer_time, lay_out, panels
+from paraflex.plots.layout import panels
 from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time
 from paraflex.plots.selection import names_of, one_run, point_number
 from paraflex.plots.style import COLOURS, DASHES, keep_flat, look_of
@@ -38,10 +38,7 @@ def motion_overview(data: xr.Dataset) -> Figure:
         look = {"color": COLOURS[-1 - k], "linestyle": DASHES[k]}
         axes[2, 0].plot(time, data[variable].values, label=name, **look)
     axes[2, 0].set_ylabel(axis_label("energy"))
-    for panel in axes.flat:
-        panel.set_xlim(time[0], time[-1])
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=40.0)
+    return finish_over_time(figure, axes, data, panel_height=40.0)
 
 
 @drawn
@@ -68,10 +65,8 @@ def coordinates(data: xr.Dataset) -> Figure:
             label, look = (_mode_name(names[k]), place) if kind == "eta" else (symbol(body), bodies.index(body))
             draw_curves(panel, data, {label: factor * values[:, k]}, first=look)
         keep_flat(panel, peak(factor * values[:, members]) or 1.0)
-        panel.set_xlim(data["time"].values[[0, -1]])
         panel.set_ylabel(axis_label(quantity, direction=kind, short=kind == "eta"))
-    label_outer_time(axes)
-    return lay_out(figure, axes, panel_height=34.0)
+    return finish_over_time(figure, axes, data, panel_height=34.0)
 
 
 @drawn

@@ -88,6 +88,14 @@ def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figu
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
+def panel_grid(count: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
+    """So many `panels` in rows of some columns, the first of `axes.flat`; the others are hidden."""
+    figure, axes = panels(-(-count // columns), columns, width=width)
+    for panel in axes.flat[count:]:
+        panel.set_visible(False)
+    return figure, axes
+
+
 def label_outer_time(axes: NDArray[Any]) -> None:
     """Name the time axis below the lowest panel of each column and remove its numbers from the others."""
     for column in arranged(axes).T:

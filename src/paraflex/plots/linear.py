@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import logarithmic_number, plain, symbol
-from paraflex.plots.layout import TWO_COLUMNS, is_narrow, label_outer_time, lay_out, panels
+from paraflex.plots.layout import TWO_COLUMNS, is_narrow, label_outer_time, lay_out, panel_grid, panels
 from paraflex.plots.scales import mark_powers
-from paraflex.plots.selection import default_mode, names_of, place_of
+from paraflex.plots.selection import default_mode, names_of, place_of, select_run
 from paraflex.plots.style import BLACK, COLOURS, DASHES, ZERO, look_of
 from paraflex.results.linear_data import HOLDINGS
 from paraflex.results.linear_summary import (
@@ -46,13 +46,7 @@ def singular_values(data: xr.Dataset) -> Figure:
 
     Gains are singular values of the frequency response: zeros show where the least gain dips.
     """
-    modes, maps = names_of(data, "mode"), names_of(data, "map")
-    if not maps:
-        raise InputError(
-            "no motors, and no end-effector", field="data", remedy="draw bode for other inputs and outputs"
-        )
-    columns = 1 if is_narrow() else len(maps)
-    figure, axes = panels(-(-len(maps) // columns), columns)
+    modes, (figure, axes, maps) = names_of(data, "mode"), _map_panels(data)
     for panel, name in zip(axes.flat, maps, strict=False):
         for k, mode in enumerate(modes):
             gains = gains_of(data, mode, name)
@@ -81,7 +75,7 @@ def bode(
         A column of panels for each; by default the own encoder of each motor, then the end-effector's coordinates.
     """
     mode = default_mode(data) if mode is None else mode
-    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    run = select_run(data, mode)
     joints, motors = json.loads(data.attrs["motor_joints"]), motors_of_mode(data, mode)
     chosen = inputs or motors or names_of(data, "input")
     own = [""] if outputs is None and set(chosen) <= set(joints) else []
@@ -115,13 +109,7 @@ def pole_zero_map(data: xr.Dataset) -> Figure:
     A panel for the motors to their own encoders, whose zeros are the poles with these motors held, and one for the
     motors to the end-effector. The right half plane is shaded: zeros there are of non-minimum phase.
     """
-    modes, maps = names_of(data, "mode"), names_of(data, "map")
-    if not maps:
-        raise InputError(
-            "no motors, and no end-effector", field="data", remedy="draw bode for other inputs and outputs"
-        )
-    columns = 1 if is_narrow() else len(maps)
-    figure, axes = panels(-(-len(maps) // columns), columns)
+    modes, (figure, axes, maps) = names_of(data, "mode"), _map_panels(data)
     most = 2.0 * np.pi * float(data["frequency"].values[-1])
     poles = [_within(poles_of(data, mode, "free"), most) for mode in modes]
     same = common_poles(data) is not None
@@ -161,7 +149,7 @@ def poles_along_path(data: xr.Dataset, mode: str | None = None) -> Figure:
             "these linear models are about one instant", field="data", remedy="linearise with --along, or give along="
         )
     mode = default_mode(data) if mode is None else mode
-    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    run = select_run(data, mode)
     figure, axes = panels(2, len(HOLDINGS))
     for column, holding in enumerate(HOLDINGS):
         held = run.sel(holding=holding)
@@ -178,6 +166,16 @@ def poles_along_path(data: xr.Dataset, mode: str | None = None) -> Figure:
     axes[1, 0].set_ylabel("real part [1/s]")
     label_outer_time(axes)
     return lay_out(figure, axes, panel_height=48.0)
+
+
+def _map_panels(data: xr.Dataset) -> tuple[Figure, NDArray[Any], list[str]]:
+    """A panel for the motors to their own encoders, and one to the end-effector; the names of these maps."""
+    maps = names_of(data, "map")
+    if not maps:
+        raise InputError(
+            "no motors, and no end-effector", field="data", remedy="draw bode for other inputs and outputs"
+        )
+    return *panel_grid(len(maps), 1 if is_narrow() else len(maps)), maps
 
 
 def _channel(run: xr.Dataset, name: str, output: str) -> Complex:

@@ -59,9 +59,7 @@ def _panels(rows: dict[str, list[DrawnMode]], scenes: dict[DrawnMode, Scene], mo
     """A panel for each shape, a row for each way to hold the motors, or more where a column of print is narrow."""
     look, width = theme(theme_name), page_width(TWO_COLUMNS)
     columns = min(2 if is_narrow() else 4, max(map(len, rows.values())))
-    limits = common_limits([*scenes.values()])
-    aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), 0.4, 1.6))
-    limits, wide = limits.fitted(1.0 / aspect), width / columns
+    (limits, aspect), wide = common_limits([*scenes.values()]).filling(0.4, 1.6), width / columns
     high = wide * aspect + _TITLE
     lines = {holding: -(-len(shown) // columns) for holding, shown in rows.items()}
     height = sum(lines.values()) * high + len(rows) * _ROW

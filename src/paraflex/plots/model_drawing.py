@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from paraflex.mechanism import GROUND, Mechanism
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import three_digits
-from paraflex.plots.layout import TWO_COLUMNS, page_width
+from paraflex.plots.layout import MM, TWO_COLUMNS, page_width
 from paraflex.plots.marks import moving_marks, still_marks
 from paraflex.plots.model_acting import Acting, acting_arrows, load_places
 from paraflex.plots.model_sensors import SENSOR, SensorMark, sensor_marks
@@ -28,7 +28,6 @@ from paraflex.results.posed import Posed
 
 Array = NDArray[np.float64]
 
-_MM = 1.0 / 25.4
 _MM_OF_POINT = 25.4 / 72.0
 # Room round the panel: left, right, below with the legend, above with the title [mm].
 _LEFT, _RIGHT, _BELOW, _ABOVE = 13.0, 2.5, 15.5, 8.0
@@ -68,7 +67,7 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
     look, mechanism = theme(theme_name), posed.mechanism
     with journal_style():
         shown = _scene(posed)
-        limits, aspect = _limits(shown)
+        limits, aspect = shown.limits.filling(_FLATTEST, _TALLEST)
         acting, sensors = acting_arrows(posed, shown, limits), sensor_marks(posed, limits)
         entries = _entries(posed, shown, acting, sensors, limits, look)
         rows = _rows([words for words, _ in entries], page_width(width))
@@ -122,13 +121,6 @@ def _scene(posed: Posed) -> Scene:
     return shown if posed.mechanism.end_effector is not None else replace(shown, trail=None, followed=None)
 
 
-def _limits(shown: Scene) -> tuple[Limits, float]:
-    """Limits of the panel, and its height by its width."""
-    limits = shown.limits
-    aspect = float(np.clip((limits.top - limits.bottom) / (limits.right - limits.left), _FLATTEST, _TALLEST))
-    return limits.fitted(1.0 / aspect), aspect
-
-
 def _rows(words: list[str], width: float) -> int:
     """Rows that the legend takes."""
     return max(1, int(np.ceil(sum(0.58 * _TEXT * len(text) + _ENTRY for text in words) * _MM_OF_POINT / width)))
@@ -137,7 +129,7 @@ def _rows(words: list[str], width: float) -> int:
 def _panel(limits: Limits, aspect: float, width: float, rows: int, look: Theme) -> tuple[Figure, Axes]:
     inside, below = width - _LEFT - _RIGHT, _BELOW + (rows - 1) * _ROW
     height = inside * aspect + below + _ABOVE
-    figure = Figure(figsize=(width * _MM, height * _MM), facecolor=look.ground)
+    figure = Figure(figsize=(width * MM, height * MM), facecolor=look.ground)
     axes = figure.add_axes((_LEFT / width, below / height, inside / width, inside * aspect / height))
     axes.set_facecolor(look.ground)
     axes.set_xlim(limits.left, limits.right)
@@ -347,7 +339,7 @@ def _payload_colours(look: Theme) -> dict[str, Any]:
 
 def _title(figure: Figure, posed: Posed, look: Theme) -> None:
     """Name, pose and, where the loops do not close, which joints are open."""
-    height = figure.get_figheight() / _MM
+    height = figure.get_figheight() / MM
     y = 1.0 - 4.0 / height
     figure.text(
         0.012, y, posed.mechanism.name, color=look.ink, fontsize=9.0, fontweight="bold", va="center", parse_math=False

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import ROUNDING, axis_label, display_unit, effort_label, peak, plain, symbol, three_digits
-from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, panels
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, panel_grid
 from paraflex.plots.runs import draw_actual, finish_over_time
 from paraflex.plots.selection import names_of, samples, select_run
 from paraflex.plots.style import BLUE, VERMILLION, ZERO, keep_flat, look_of
@@ -89,8 +89,4 @@ def _outcome(run: xr.Dataset) -> str:
 def _mode_panels(count: int) -> tuple[Figure, NDArray[Any]]:
     """A panel for each mode, at most three side by side; unused ones are hidden."""
     columns = 2 if count == 4 or (is_narrow() and count > 1) else min(count, 3)
-    rows = math.ceil(count / columns)
-    figure, axes = panels(rows, columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)
-    for panel in axes.flat[count:]:
-        panel.set_visible(False)
-    return figure, np.asarray(axes)
+    return panel_grid(count, columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import metric_name, plain
-from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panels
+from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, lay_out, panel_grid, panels
 from paraflex.plots.scales import LIST_LINE, list_lines
 from paraflex.plots.style import BLUE, VERMILLION, ZERO
 
@@ -86,13 +86,10 @@ def sobol_bars(figures: Mapping[str, Any]) -> Figure:
     if not panels_of:
         raise InputError("no metric varies", field="figures", remedy="widen the ranges, or choose another metric")
     columns = min(len(panels_of), 2)
-    rows = -(-len(panels_of) // columns)
-    figure, axes = panels(rows, columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)
+    figure, axes = panel_grid(len(panels_of), columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)
     for panel, (name, parameters) in zip(axes.flat, panels_of.items(), strict=False):
         _draw_bars(panel, parameters)
         panel.set_title(_panel_name(name, list(panels_of)), loc="left")
-    for panel in axes.flat[len(panels_of) :]:
-        panel.set_visible(False)
     for panel in axes.flat:
         panel.set_xlabel("share of the variance" if panel.get_visible() else "")
     most = max(len(parameters) for parameters in panels_of.values())

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, peak, symbol
-from paraflex.plots.layout import is_narrow, lay_out, panels
+from paraflex.plots.layout import is_narrow, lay_out, panel_grid, panels
 from paraflex.plots.runs import END_EFFECTOR, START, draw_actual, draw_desired
 from paraflex.plots.selection import moving_directions, names_of, of_point, one_run, point_label, select_run
 from paraflex.plots.style import BLUE, keep_flat
@@ -57,10 +57,8 @@ def link_phases(data: xr.Dataset, mode: str | None = None) -> Figure:
     bodies = names_of(run, "body")[:_MOST_PANELS]
     columns = 2 if is_narrow() or len(bodies) in (2, 3, 4) else min(len(bodies), 4)
     columns = min(columns, len(bodies))
-    figure, axes = panels(-(-len(bodies) // columns), columns)
+    figure, axes = panel_grid(len(bodies), columns)
     angles, rates = (run[name].transpose("time", "body").values for name in ("angle", "angular_velocity"))
-    for panel in axes.flat[len(bodies) :]:
-        panel.set_visible(False)
     for k, (panel, body) in enumerate(zip(axes.flat, bodies, strict=False)):
         panel.plot(angles[:, k], rates[:, k], color=BLUE, label="actual")
         if "angle_desired" in run:

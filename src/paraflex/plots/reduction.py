@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain, symbol
-from paraflex.plots.layout import is_narrow, lay_out, panels
+from paraflex.plots.layout import is_narrow, lay_out, panel_grid, panels
 from paraflex.plots.scales import mark_powers
-from paraflex.plots.selection import default_mode, names_of, place_of
+from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import BLACK, COLOURS, DASHES
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS
@@ -35,11 +35,9 @@ _PANELS = 6
 def reduced_responses(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Largest gain of a mode's inputs to every output: of the full model, and of reduced ones over it."""
     check_kind(data, "reduction")
-    mode = default_mode(data) if mode is None else mode
-    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    run = one_run(data, mode)
     outputs = names_of(data, "output")[:_PANELS]
-    columns = 1 if is_narrow() else min(len(outputs), 2)
-    figure, axes = panels(-(-len(outputs) // columns), columns)
+    figure, axes = panel_grid(len(outputs), 1 if is_narrow() else min(len(outputs), 2))
     for panel, output in zip(axes.flat, outputs, strict=False):
         gains = run["gain"].sel(output=output)
         for k, name in enumerate(names_of(data, "variant")):
@@ -55,8 +53,6 @@ def reduced_responses(data: xr.Dataset, mode: str | None = None) -> Figure:
         panel.set_ylim(max(0.5 * low, top * 10.0**-_DECADES), 2.0 * top)
         panel.set_yscale("log")
         mark_powers(panel)
-    for panel in axes.flat[len(outputs) :]:
-        panel.set_visible(False)
     return lay_out(figure, axes, panel_height=46.0)
 
 
@@ -85,8 +81,7 @@ def reduction_errors(data: xr.Dataset) -> Figure:
 def held_frequency_by_states(data: xr.Dataset, mode: str | None = None) -> Figure:
     """Lowest frequency of a mode with its motors held, by method and number of states, and that of the full model."""
     check_kind(data, "reduction")
-    mode = default_mode(data) if mode is None else mode
-    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    run = one_run(data, mode)
     figure, axes = panels(1, 1)
     panel = axes[0, 0]
     for k, name in enumerate(names_of(data, "reduction")):
@@ -98,7 +93,7 @@ def held_frequency_by_states(data: xr.Dataset, mode: str | None = None) -> Figur
     panel.axhline(exact, color=BLACK, linewidth=0.8, label=f"full model, {data.attrs['full_states']} states")
     panel.set_xlabel("states")
     panel.set_ylabel("lowest frequency [Hz]")
-    panel.set_title(f"motors of {plain(mode)} held")
+    panel.set_title(f"motors of {plain(str(run['mode'].item()))} held")
     panel.set_yscale("log")
     mark_powers(panel)
     return lay_out(figure, axes, panel_height=62.0)
@@ -110,8 +105,7 @@ def bases_along_path(data: xr.Dataset, mode: str | None = None) -> Figure:
     check_kind(data, "reduction")
     if "along_error" not in data:
         raise InputError("these reduced models are of one pose", field="data", remedy="reduce along a path: --along 21")
-    mode = default_mode(data) if mode is None else mode
-    run = data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
+    run = one_run(data, mode)
     figure, axes = panels(3, 1) if is_narrow() else panels(1, 3)
     quantities = [("responses", run["along_error"])]
     quantities += [(f"frequencies, motors {name}", run["along_frequency_error"].sel(holding=name)) for name in HOLDINGS]

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from paraflex.plots.labels import peak, symbol
-from paraflex.plots.layout import figure_width, is_narrow, label_outer_time, lay_out, panels
+from paraflex.plots.layout import figure_width, is_narrow, label_outer_time, lay_out, panel_grid, panels
 from paraflex.plots.selection import names_of, run_label, samples
 from paraflex.plots.style import BLACK, BLUE, SHADE, look_of
 
@@ -67,11 +67,7 @@ def draw_desired(axes: Axes, x: ArrayLike, y: ArrayLike) -> None:
 
 def listed_panels(count: int) -> tuple[Figure, NDArray[Any]]:
     """So many panels below one another, the first of `axes.flat`; in two columns where one is too long."""
-    columns = 1 if count <= _MOST_ROWS else 2
-    figure, axes = panels(-(-count // columns), columns)
-    for panel in axes.flat[count:]:
-        panel.set_visible(False)
-    return figure, axes
+    return panel_grid(count, 1 if count <= _MOST_ROWS else 2)
 
 
 def largest_columns(values: NDArray[np.float64]) -> list[int]:

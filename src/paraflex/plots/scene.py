@@ -38,6 +38,16 @@ _STILL_POINT = 1e-6
 # of these leaves them below the second.
 MAGNIFICATIONS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 _SHOWN_BENDING, _UNSEEN_BENDING = 0.08, 0.005
+# Kinds of results in which nothing moves: what they are, and what draws them.
+_MOTIONLESS = {
+    "linear": ("these are linear models, not a run",
+               "their report.html shows mode shapes in motion, paraflex plot draws mode_shapes"),
+    **dict.fromkeys(("statics", "reduction"), (
+        "these are no run, and nothing moves in them",
+        "paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models")),
+    "laws": ("a comparison of control laws keeps no motions",
+             "paraflex plot draws law_comparison; paraflex run --controller NAME keeps the motion of one law"),
+}  # fmt: skip
 # Shares of all places in percent between which a run is that does not come apart.
 _RUN_SHARES = (0.2, 99.8)
 
@@ -54,6 +64,11 @@ class Limits(NamedTuple):
     def size(self) -> float:
         """The larger side."""
         return max(self.right - self.left, self.top - self.bottom)
+
+    def filling(self, flattest: float, tallest: float) -> tuple[Limits, float]:
+        """The limits extended to fill a panel, and its height by its width, between the flattest and the tallest."""
+        aspect = float(np.clip((self.top - self.bottom) / (self.right - self.left), flattest, tallest))
+        return self.fitted(1.0 / aspect), aspect
 
     def fitted(self, ratio: float) -> Limits:
         """The limits extended to the proportions of a panel of that width by height."""
@@ -165,21 +180,9 @@ def run_times(data: xr.Dataset) -> tuple[float, float]:
 
 def check_shapes(data: xr.Dataset) -> None:
     """Check that results have the variables for drawings."""
-    if kind_of(data) == "linear":
-        raise InputError(
-            "these are linear models, not a run", field="results",
-            remedy="their report.html shows mode shapes in motion, paraflex plot draws mode_shapes",
-        )  # fmt: skip
-    if kind_of(data) in ("statics", "reduction"):
-        raise InputError(
-            "these are no run, and nothing moves in them", field="results",
-            remedy="paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
-        )  # fmt: skip
-    if kind_of(data) == "laws":
-        raise InputError(
-            "a comparison of control laws keeps no motions", field="results",
-            remedy="paraflex plot draws law_comparison; paraflex run --controller NAME keeps the motion of one law",
-        )  # fmt: skip
+    if kind_of(data) in _MOTIONLESS:
+        problem, remedy = _MOTIONLESS[kind_of(data)]
+        raise InputError(problem, field="results", remedy=remedy)
     if "shape" not in data:
         raise InputError(
             "these results hold no shapes of links: they are of an earlier version", field="results",
@@ -510,9 +513,7 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
         springs={name: ends[chosen] for name, ends in shown.springs.items()},
         gears=tuple(DrawnGear(gear.name, tuple(line[chosen] for line in gear.lines)) for gear in shown.gears),
         trail=None if shown.trail is None else shown.trail[chosen],
-        loads=tuple(
-            DrawnLoad(load.name, load.place[chosen], load.force[chosen], load.torque[chosen]) for load in shown.loads
-        ),
+        loads=tuple(DrawnLoad(load.name, *(each[chosen] for each in load[1:])) for load in shown.loads),
     )
 
 

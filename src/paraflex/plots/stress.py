@@ -14,7 +14,7 @@ from paraflex.errors import InputError
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, effort_label, peak, symbol
 from paraflex.plots.layout import lay_out, panels
-from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time, largest_over_time, shown_of
+from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time, largest_columns, largest_over_time, shown_of
 from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import ZERO, look_of
 from paraflex.results.loads import sliding_joints
@@ -87,7 +87,7 @@ def joint_motions(data: xr.Dataset, mode: str | None = None) -> Figure:
     for row, (own, labels) in zip(axes, shown, strict=False):
         joints = run.isel(joint=np.flatnonzero(own))
         speeds = joints["joint_speed"].transpose("time", "joint").values
-        largest = sorted(np.argsort([-peak(each) for each in speeds.T], kind="stable")[:MOST_LINES])
+        largest = largest_columns(speeds)
         for panel, name, label in zip(row, ("joint_coordinate", "joint_speed"), labels, strict=True):
             values = joints[name].transpose("time", "joint").values
             names = names_of(joints, "joint")

@@ -40,7 +40,7 @@ def columns(
     for name in designs.varied:
         values = designs.parameters[name]
         unit, factor = shown_unit(units.get(name, ""), values)
-        log = name in logarithmic and _is_wide(values, _WIDE_RANGE)
+        log = name in logarithmic and is_wide(values, _WIDE_RANGE)
         out.append(
             DesignColumn(
                 name, text_symbol(name.replace("_", " ")), unit, factor * values[rows], parameter=True, log=log
@@ -52,7 +52,7 @@ def columns(
         if not np.isfinite(values).any():
             continue
         unit, factor = shown_unit(designs.units.get(name, ""), values)
-        out.append(DesignColumn(name, metric_name(name), unit, factor * values[rows], log=_is_wide(values, _WIDE)))
+        out.append(DesignColumn(name, metric_name(name), unit, factor * values[rows], log=is_wide(values)))
     return out
 
 
@@ -81,6 +81,7 @@ def reasons(designs: DesignTable) -> list[tuple[str, str, int]]:
     return [*found, *([("", "other reasons; the table has them", left)] if left else [])]
 
 
-def _is_wide(values: NDArray[np.float64], share: float) -> bool:
+def is_wide(values: NDArray[np.float64], share: float = _WIDE) -> bool:
+    """Whether positive values differ by more than a factor, by default that of logarithmic axes."""
     known = values[np.isfinite(values)]
     return bool(known.size and known.min() > 0.0 and known.max() > share * known.min())

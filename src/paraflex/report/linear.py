@@ -16,7 +16,7 @@ from paraflex.plots.selection import default_mode, names_of
 from paraflex.report.curves import DOTTED, look
 from paraflex.report.film import Animation, animation
 from paraflex.report.page import PLAIN_LOOK, Chart, Curve, Page, Panel
-from paraflex.report.provenance import asked, model_words
+from paraflex.report.provenance import asked, model_words, repeated
 from paraflex.report.text import NO_VALUE, number, table
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import END_EFFECTOR, HOLDINGS
@@ -124,7 +124,7 @@ def _command(run: dict[str, Any]) -> str:
         return ""
     words = ["paraflex", "linearise", *([run["results"]] if "results" in run else model_words(run))]
     for name, flag in (("modes", "--mode"), ("forces", "--force-at"), ("prescribed", "--prescribed")):
-        words += [word for one in run.get(name, []) for word in (flag, one)]
+        words += repeated(flag, run.get(name))
     for name in ("pose", "at", "along", "path", "assembly", "coordinates"):
         if name in run:
             # A place may begin with a minus.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import xarray as xr
@@ -92,13 +92,13 @@ def run_command_line(run: dict[str, Any]) -> str:
         return ""
     words = ["paraflex", "run", *model_words(run)]
     if "path" in run:
-        words += ["--path", run["path"], *_modes(run.get("modes", []))]
-    words += [word for name in run.get("controllers") or () for word in ("--controller", name)]
+        words += ["--path", run["path"], *repeated("--mode", run.get("modes"))]
+    words += repeated("--controller", run.get("controllers"))
     for name, flag in _GIVEN.items():
         if run.get(name) is not None:
             words += [flag, str(run[name])]
-    for name, value in (run.get("method_parameters") or {}).items():
-        words += ["--method-parameter", f"{name}={value}"]
+    parameters = run.get("method_parameters") or {}
+    words += repeated("--method-parameter", (f"{name}={value}" for name, value in parameters.items()))
     if run.get("constraints") == "baumgarte" and not run.get("automatic_gains"):
         words += [f"--{name}={run[name]}" for name in ("alpha", "beta") if name in run]
     if run.get("automatic_gains"):
@@ -106,17 +106,14 @@ def run_command_line(run: dict[str, Any]) -> str:
     words += [f"--{name}" for name in _RUN_FLAGS if run.get(name)]
     if run.get("geometry") and not any(run.get(name) for name in ("rigid", "ked", "segments")):
         words += ["--geometry", run["geometry"]]
-    for event in run.get("stop_at") or []:
-        words += ["--stop-at", event]
-    return shlex.join(words)
+    return shlex.join(words + repeated("--stop-at", run.get("stop_at")))
 
 
 def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence[str]) -> str:
     """The `paraflex verify` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
-    words = ["paraflex", "verify", *model_words(run), "--path", run["path"]]
-    words += _modes(run.get("modes", []))
+    words = ["paraflex", "verify", *model_words(run), "--path", run["path"], *repeated("--mode", run.get("modes"))]
     for name in (str(model) for model in data["model"].values):
         words += ["--engine" if name in engines else "--model", name]
     time = data["time"].values
@@ -129,11 +126,11 @@ def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence
 
 def model_words(run: dict[str, Any]) -> list[str]:
     """A model as an argument, with what was set of it."""
-    words = [mechanism_argument(run["mechanism"])]
-    for name, value in (run.get("set") or {}).items():
-        words += ["--set", f"{name}={value if isinstance(value, str) else json.dumps(value)}"]
-    return words
+    given = run.get("set") or {}
+    texts = (f"{name}={value if isinstance(value, str) else json.dumps(value)}" for name, value in given.items())
+    return [mechanism_argument(run["mechanism"]), *repeated("--set", texts)]
 
 
-def _modes(names: Sequence[str]) -> list[str]:
-    return [word for name in names for word in ("--mode", name)]
+def repeated(flag: str, values: Iterable[str] | None) -> list[str]:
+    """An option that is repeated for each of some values."""
+    return [word for value in values or () for word in (flag, value)]

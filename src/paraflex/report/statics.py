@@ -16,7 +16,7 @@ from paraflex.plots.labels import peak, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, model_words, verdict_word
+from paraflex.report.provenance import asked, model_words, repeated, verdict_word
 from paraflex.report.statics_charts import statics_panels
 from paraflex.report.text import NO_VALUE, number, table
 from paraflex.results.doubts import doubt_lines, verdict_of
@@ -109,10 +109,10 @@ def _command(run: dict[str, Any]) -> str:
         return ""
     words = ["paraflex", "statics", *model_words(run)]
     for name, flag in (("loads", "--load"), ("torques", "--torque"), ("moved", "--move")):
-        words += [word for each, value in run.get(name, {}).items() for word in (flag, f"{each}={value!r}")]
+        words += repeated(flag, (f"{one}={value!r}" for one, value in run.get(name, {}).items()))
     held = run.get("held")
     for name, flag in (("held", "--hold"), ("stiffness", "--stiffness")):
-        words += [word for each in run.get(name) or () for word in (flag, each)]
+        words += repeated(flag, run.get(name))
     words += ["--hold", "none"] if held == [] else []
     for name in ("steps", "buckling", "assembly"):
         words += [f"--{name}", str(run[name])] if name in run else []

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from paraflex.plots.designs import DesignTable, in_conflict
 from paraflex.report.curves import DOTTED, look
+from paraflex.report.designs import is_wide
 from paraflex.report.page import Chart, Curve, DesignColumn, Designs, Look, Panel, Picker
 from paraflex.report.text import count
 
@@ -96,9 +97,7 @@ def _history(steps: Sequence[Step], goal: str) -> Chart:
         Curve("a design", values, numbers, Look(dash=DOTTED)),
         Curve("least until then", np.where(np.isfinite(least), least, np.nan), numbers, Look(0)),
     ]
-    known = values[np.isfinite(values)]
-    wide = bool(known.size and known.min() > 0.0 and known.max() > 50.0 * known.min())
-    return Chart("history", "Convergence", goal, curves, x="design", over_time=False, log=wide)
+    return Chart("history", "Convergence", goal, curves, x="design", over_time=False, log=is_wide(values))
 
 
 def drawn_designs(

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.mechanism import AngleLaw, Load, Mechanism, PrescribedAngle, TabulatedLaw
 from paraflex.mechanism.laws import marks
-
-Array = NDArray[np.float64]
 
 # Times that a law is looked at, besides its knots and rows; of a study without a duration within the first second.
 _LOOKS, _FIRST = 1001, 1.0

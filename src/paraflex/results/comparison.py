@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.folders import RUN, kind_of_folder
 from paraflex.mechanism.quantities import known
@@ -218,7 +218,7 @@ def compare(
     )
 
 
-def on_times_of(first: xr.Dataset, second: xr.Dataset, name: str) -> tuple[NDArray[np.float64], ...]:
+def on_times_of(first: xr.Dataset, second: xr.Dataset, name: str) -> tuple[Array, ...]:
     """Times that two runs have in common, and the values of a variable of both then.
 
     Samples of the first; the second is interpolated by cubic splines where it has other samples.
@@ -237,7 +237,7 @@ def on_times_of(first: xr.Dataset, second: xr.Dataset, name: str) -> tuple[NDArr
     return time[inside], here[inside], there
 
 
-def _reached(values: NDArray[np.float64]) -> int:
+def _reached(values: Array) -> int:
     """Number of samples until the first that is not a number."""
     finite = np.isfinite(values.reshape(values.shape[0], -1)).all(axis=1)
     return int(finite.size if finite.all() else np.argmin(finite))
@@ -393,7 +393,7 @@ def _largest(values: xr.DataArray) -> float:
     return float(np.nanmax(sizes)) if np.isfinite(sizes).any() else float("nan")
 
 
-def _sizes(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sizes(values: Array) -> Array:
     """Magnitudes (samples,) of numbers or of vectors (samples, 2)."""
     return np.abs(values) if values.ndim == 1 else np.linalg.norm(values, axis=-1)
 

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array, side_by_side
+from paraflex.arrays import Array, Complex
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
 from paraflex.mechanism.gears import SumRelation
 from paraflex.mechanism.poses import local_points
+from paraflex.results.numbers import stacked
 from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
-from paraflex.results.stiff import Frames, rigid_frames
+from paraflex.results.stiff import rigid_frames
 
 # Joints of wheels and of racks: whether they slide, and what they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
@@ -77,11 +77,13 @@ def drawing(
     drawn = {one.body: one for one in outlines(mechanism)}
     samples = len(next(iter(shapes.values())))
 
-    def place(ref: PointRef) -> Array:
-        return _place(mechanism, drawn, shapes, ref, samples)
+    def place(ref: PointRef, of: Mapping[str, Array] = shapes) -> Array:
+        if ref.on_ground:
+            return np.broadcast_to(np.array(mechanism.ground[ref.point], dtype=float), (samples, 2))
+        return of[ref.body][:, drawn[ref.body].points[ref.point]]
 
     joined = _joined(mechanism)
-    joints = side_by_side([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples, 2)
+    joints = stacked([place(_drawn_ends(joint)[0]) for joint in mechanism.joints], samples, 2)
     directions = _directions(mechanism, samples, angle, frame)
     springs = [[place(spring.a), place(spring.b)] for spring in mechanism.linear_springs]
     posed = None
@@ -95,7 +97,9 @@ def drawing(
         }
         joint_bases, direction_bases = joints, directions
     else:
-        bases, joint_bases, direction_bases = _rigid_bases(mechanism, drawn, posed, samples)
+        bases = {name: turned(*posed[name], one.places) for name, one in drawn.items()}
+        joint_bases = stacked([place(_drawn_ends(joint)[0], bases) for joint in mechanism.joints], samples, 2)
+        direction_bases = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
     return Drawing(
         shape=np.concatenate([shapes[name] for name in drawn], axis=1),
         base=np.concatenate([bases[name] for name in drawn], axis=1),
@@ -164,7 +168,7 @@ def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
 
 
 def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
-    """Labels of these variables: names of points and joints, bodies of the stations, stations of the points, kinds.
+    """Labels of these variables: points, joints, bodies of the stations, stations of the points, kinds of the joints.
 
     Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
     -1, and so has the rail of a joint without one on a moving body.
@@ -178,32 +182,44 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     }
     joints, springs = mechanism.joints, mechanism.linear_springs
     driven = {one.joint for one in (*mechanism.motors, *mechanism.prescribed)}
-    out: dict[str, Any] = {
-        "station_body": ("station", [one.body for one in drawn for _ in one.places]),
-        "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
-        "point": list(map(str, stations)),
-        "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
-        "joint": [joint.name for joint in joints],
-        "joint_kind": ("joint", [joint.symbol for joint in joints]),
-        "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
-        "joint_driven": ("joint", np.array([joint.name in driven for joint in joints], dtype=bool)),
-        "joint_rail": ("joint", np.array([_rail_station(joint, stations) for joint in joints], dtype=np.int32)),
-    }
+    of_springs: dict[str, Any] = {}
     if springs:
         ends = [[stations.get(ref, -1) for ref in (spring.a, spring.b)] for spring in springs]
-        out["spring"] = [spring.name for spring in springs]
-        out["spring_station"] = (("spring", "end"), np.array(ends, dtype=np.int32))
+        of_springs = {
+            "spring": [spring.name for spring in springs],
+            "spring_station": (("spring", "end"), np.array(ends, dtype=np.int32)),
+        }
+    of_gears: dict[str, Any] = {}
     if related := mechanism.relations:
         number = {joint.name: k for k, joint in enumerate(joints)}
         pairs = [(one, names) for one in related for names in pairwise(one.joints)]
         held = [[number[name] for name in names] for _, names in pairs]
-        out["gear"] = [one.name if len(one.joints) == 2 else f"{one.name} {'-'.join(names)}" for one, names in pairs]
-        out["gear_joint"] = (("gear", "end"), np.array(held, dtype=np.int32))
-        out["gear_radius"] = (("gear", "end"), np.array([pitch_radii(mechanism, one) for one, _ in pairs]))
-    if loads := mechanism.loads:
-        out["load"] = [load.name for load in loads]
-        out["load_station"] = ("load", np.array([stations[load.point] for load in loads], dtype=np.int32))
-    return out
+        of_gears = {
+            "gear": [one.name if len(one.joints) == 2 else f"{one.name} {'-'.join(names)}" for one, names in pairs],
+            "gear_joint": (("gear", "end"), np.array(held, dtype=np.int32)),
+            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, one) for one, _ in pairs])),
+        }
+    of_loads: dict[str, Any] = {}
+    if mechanism.loads:
+        acted = [stations[load.point] for load in mechanism.loads]
+        of_loads = {
+            "load": [load.name for load in mechanism.loads],
+            "load_station": ("load", np.array(acted, dtype=np.int32)),
+        }
+    return {
+        "point": [str(ref) for ref in stations],
+        "joint": [joint.name for joint in joints],
+        "station_body": ("station", [one.body for one in drawn for _ in one.places]),
+        "station_place": (("station", "axis"), np.concatenate([one.places for one in drawn])),
+        "point_station": ("point", np.array(list(stations.values()), dtype=np.int32)),
+        "joint_kind": ("joint", [joint.symbol for joint in joints]),
+        "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
+        "joint_driven": ("joint", np.array([joint.name in driven for joint in joints], dtype=bool)),
+        "joint_rail": ("joint", np.array([_rail_station(joint, stations) for joint in joints], dtype=np.int32)),
+        **of_springs,
+        **of_gears,
+        **of_loads,
+    }
 
 
 def _drawn_ends(joint: Joint) -> tuple[PointRef, PointRef]:
@@ -264,25 +280,6 @@ def _joined(mechanism: Mechanism) -> dict[str, list[tuple[Joint, PointRef]]]:
             if not ref.on_ground:
                 joined[ref.body].append((joint, ref))
     return joined
-
-
-def _rigid_bases(
-    mechanism: Mechanism, drawn: Mapping[str, Outline], posed: Frames, samples: int
-) -> tuple[dict[str, Array], Array, Array]:
-    """Stations of all bodies, joints and directions of their axes of the rigid mechanism."""
-    bases = {name: turned(*posed[name], one.places) for name, one in drawn.items()}
-    ends = [_place(mechanism, drawn, bases, _drawn_ends(joint)[0], samples) for joint in mechanism.joints]
-    directions = _directions(mechanism, samples, lambda ref: posed[ref.body][1], posed.__getitem__)
-    return bases, side_by_side(ends, samples, 2), directions
-
-
-def _place(
-    mechanism: Mechanism, drawn: Mapping[str, Outline], shapes: Mapping[str, Array], ref: PointRef, samples: int
-) -> Array:
-    """Place (k, 2) of a point among the stations of its body, or on the ground."""
-    if ref.on_ground:
-        return np.broadcast_to(np.array(mechanism.ground[ref.point], dtype=float), (samples, 2))
-    return shapes[ref.body][:, drawn[ref.body].points[ref.point]]
 
 
 def _bends_between_holds(body: Body, one: Outline, joined: list[tuple[Joint, PointRef]]) -> bool:
@@ -355,12 +352,12 @@ def _directions(
     """Of the axes of joints that slide (k, joints), NaN of others [rad]."""
     out = np.full((samples, len(mechanism.joints)), np.nan)
     for i, joint in enumerate(mechanism.joints):
-        if joint.follows_beam:
+        if joint.slides and joint.follows_beam:
             out[:, i] = frame(joint.a.body)[1]
         elif joint.slides:
             out[:, i] = joint.direction + (0.0 if joint.a.on_ground else angle(joint.a))
     return out
 
 
-def _complex(places: Array) -> NDArray[np.complex128]:
+def _complex(places: Array) -> Complex:
     return places[..., 0] + 1j * places[..., 1]

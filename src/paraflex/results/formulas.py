@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Numbers
+
 # A sample so near to the end of the motion is at it: rounding of times, as a fraction of the motion.
 SAME_TIME = 1e-9
 # Degree of the drift in time: a free mechanism drifts at a speed that changes slowly.
@@ -19,35 +21,35 @@ SETTLED = 0.05
 _NEAR_END = 1e-6
 
 
-def during_motion(t: NDArray[Any], motion_end: float) -> NDArray[np.bool_]:
+def during_motion(t: Numbers, motion_end: float) -> NDArray[np.bool_]:
     """The samples at times t (k,) during the motion, its end included [s]; the others are after it."""
     end = np.real(motion_end)
     return np.real(t) <= end + SAME_TIME * abs(end)
 
 
-def length(vectors: NDArray[Any]) -> NDArray[Any]:
+def length(vectors: Numbers) -> Numbers:
     """Length of vectors (k, 2)."""
     return np.sqrt(vectors[:, 0] ** 2 + vectors[:, 1] ** 2)
 
 
-def largest_norm(vectors: NDArray[Any]) -> float:
+def largest_norm(vectors: Numbers) -> float:
     """Largest Euclidean norm of vectors (k, n); NaN for none."""
     return float(np.max(np.linalg.norm(vectors, axis=1))) if len(vectors) else np.nan
 
 
-def rms(values: NDArray[Any]) -> Any:
+def rms(values: Numbers) -> Any:
     """Root mean square over the first axis; NaN for no values."""
     if len(values) == 0:
         return np.full(values.shape[1:], np.nan)[()]
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def integral(t: NDArray[Any], values: NDArray[Any]) -> Any:
+def integral(t: Numbers, values: Numbers) -> Any:
     """Integral over time by the trapezoidal rule."""
     return np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t))
 
 
-def drift_speed(t: NDArray[Any], position: NDArray[Any]) -> Any:
+def drift_speed(t: Numbers, position: Numbers) -> Any:
     """Mean speed [m/s] of the drift of positions (k, 2) at times t (k,) about which `vibration` is measured.
 
     The slope of the straight line of least squares. NaN where there are too few samples.
@@ -59,7 +61,7 @@ def drift_speed(t: NDArray[Any], position: NDArray[Any]) -> Any:
     return np.sqrt(np.sum(coefficients[1] ** 2)) / half
 
 
-def vibration(t: NDArray[Any], position: NDArray[Any]) -> Any:
+def vibration(t: Numbers, position: Numbers) -> Any:
     """Root mean square distance of positions (k, 2) at times t (k,) from their drift [m].
 
     The drift is the quadratic in time of least squares, which a body has that moves freely, at a speed that changes
@@ -72,7 +74,7 @@ def vibration(t: NDArray[Any], position: NDArray[Any]) -> Any:
     return np.sqrt(np.mean(np.sum((position - basis @ coefficients) ** 2, axis=1)))
 
 
-def settling_time(t: NDArray[Any], distance: NDArray[Any], motion_end: float, band: float | None = None) -> float:
+def settling_time(t: Numbers, distance: Numbers, motion_end: float, band: float | None = None) -> float:
     """Time from the end of the motion until distances (k,) at times t (k,) stay within a band [s].
 
     Distances between samples are taken for straight lines. 0 where they are within it from the end on; NaN where the
@@ -103,7 +105,7 @@ def settling_time(t: NDArray[Any], distance: NDArray[Any], motion_end: float, ba
     return max(float(times[last] + part * (times[last + 1] - times[last])) - motion_end, 0.0)
 
 
-def overshoot(position: NDArray[Any], desired: NDArray[Any], moving: NDArray[np.bool_]) -> float:
+def overshoot(position: Numbers, desired: Numbers, moving: NDArray[np.bool_]) -> float:
     """How far positions (k, 2) go beyond the end of their desired path (k, 2), in the direction it comes from [m].
 
     Of the samples after the motion; 0 where they do not, NaN where there are none, or no direction.
@@ -120,7 +122,7 @@ def overshoot(position: NDArray[Any], desired: NDArray[Any], moving: NDArray[np.
     return max(float(np.max((position[~moving] - end) @ direction)), 0.0)
 
 
-def _drift(t: NDArray[Any], position: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], Any]:
+def _drift(t: Numbers, position: Numbers) -> tuple[Numbers, Numbers, Any]:
     """Legendre polynomials at the samples (k, 3), their coefficients (3, 2) by least squares, half of the time [s]."""
     half = 0.5 * (t[-1] - t[0])
     x = (t - t[0]) / half - 1.0

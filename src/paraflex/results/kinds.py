@@ -24,16 +24,13 @@ _MADE_BY = {
     "laws": "compare_laws",
 }
 
-# Kinds that datasets name themselves.
-_NAMED = ("motion", "linear", "statics", "reduction", "laws")
-
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
     """Kind: "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking"."""
     if "model" in data.dims:
         return "verification"
-    return data.attrs["kind"] if data.attrs.get("kind") in _NAMED else "tracking"
+    return data.attrs["kind"] if data.attrs.get("kind") in _MADE_BY else "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:

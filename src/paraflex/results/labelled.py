@@ -23,14 +23,12 @@ from paraflex.results.stress import (
     COMMENTS as STRESS_COMMENTS,
     MOMENT,
     UNITS as STRESS_UNITS,
+    Variables,
     largest_stresses,
     section_coordinates,
     section_variables,
 )
 from paraflex.results.validity import UNITS as VALIDITY_UNITS
-
-# Dimensions besides time, and values at the samples reached.
-Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
 
 UNITS = (
     {
@@ -289,13 +287,14 @@ def provenance(
     ours = options.to_dict() if method == options.method.title else {}
     effector = mechanism.end_effector
     return {
-        **origin(mechanism.name, parameters),
+        "mechanism": mechanism.name,
         **({} if effector is None else {"end_effector_point": str(effector.point)}),
         "tolerance": options.tolerance_for(system),
         "baumgarte_alpha": options.alpha,
         "baumgarte_beta": options.beta,
         "method": method,
         **ours,
+        **origin(parameters),
         "numba_version": version("numba"),
         "numpy_version": version("numpy"),
     }

@@ -9,17 +9,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array, Complex, Numbers
 from paraflex.errors import InputError
 from paraflex.linear.branches import pole_branches
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import Motions
 from paraflex.results.drawing import Drawing, drawing_coordinates, system_drawing
 from paraflex.results.storage import origin
-
-Array = NDArray[np.float64]
 
 # Motors turn freely, or those of the mode are held.
 HOLDINGS = ("free", "held")
@@ -100,9 +98,9 @@ def linear_dataset(
         ((model, ()) for model in models), ((model, motors_of(model)) for model in models)
     ))  # fmt: skip
     maps = [zero_maps(model) for model in models]
-    data = _matrices(models) | _motions(free, held) | _zeros(maps) | _drawings(models, free, held)
-    data["unbalanced"] = ("mode", np.array([model.unbalanced for model in models]))
     names = {key: _names(models, key) for key in ("states", "inputs", "outputs")}
+    data = _matrices(models, names) | _motions(free, held) | _zeros(maps) | _drawings(models, free, held)
+    data["unbalanced"] = ("mode", np.array([model.unbalanced for model in models]))
     frequency = _frequencies(free, held, [zero for each in maps for zero in each.values()])
     data |= _responses(models, frequency, names)
     coordinates: dict[str, Any] = {
@@ -129,7 +127,7 @@ def motors_of(model: LinearModel) -> list[str]:
     return [one.name for one in model.inputs if one.name in own]
 
 
-def zero_maps(model: LinearModel) -> dict[str, NDArray[np.complex128]]:
+def zero_maps(model: LinearModel) -> dict[str, Complex]:
     """Zeros of the motors of a mode to their own encoders, and to the end-effector; of all inputs without motors."""
     mechanism = model.minimal.system.mechanism
     motors, outputs = motors_of(model), [one.name for one in model.outputs]
@@ -163,9 +161,9 @@ def _names(models: Sequence[LinearModel], key: str) -> dict[str, str]:
     return {one.name: one.unit for model in models for one in getattr(model, key)}
 
 
-def _matrices(models: Sequence[LinearModel]) -> dict[str, Any]:
+def _matrices(models: Sequence[LinearModel], named: dict[str, dict[str, str]]) -> dict[str, Any]:
     """A, B, C and D among the names of all modes."""
-    names = {key: list(_names(models, key)) for key in ("states", "inputs", "outputs")}
+    names = {key: list(own) for key, own in named.items()}
     out = {}
     for matrix, (rows, columns) in {
         "A": ("states", "states"), "B": ("states", "inputs"), "C": ("outputs", "states"), "D": ("outputs", "inputs")
@@ -194,23 +192,23 @@ def _motions(free: Sequence[Motions], held: Sequence[Motions]) -> dict[str, Any]
     }
 
 
-def _zeros(maps: Sequence[dict[str, NDArray[np.complex128]]]) -> dict[str, Any]:
+def _zeros(maps: Sequence[dict[str, Complex]]) -> dict[str, Any]:
     names, none = dict.fromkeys(name for each in maps for name in each), np.zeros(0)
     values = padded([[each.get(name, none) for name in names] for each in maps])
     return {f"zero_{part}": (("mode", "map", "zero"), getattr(values, part)) for part in ("real", "imag")}
 
 
-def padded(rows: Sequence[Sequence[NDArray[Any]]]) -> NDArray[np.complex128]:
-    """Rows of arrays of different sizes as one array, NaN where there is nothing."""
-    sizes = [one.shape for row in rows for one in row] or [(0,)]
-    out = np.full((len(rows), len(rows[0]), *np.max(sizes, axis=0)), complex(np.nan, np.nan))
+def padded(rows: Sequence[Sequence[Numbers]]) -> Complex:
+    """Rows of rows of different lengths as an array, NaN where there is nothing."""
+    longest = max((one.size for row in rows for one in row), default=0)
+    out = np.full((len(rows), len(rows[0]), longest), complex(np.nan, np.nan))
     for i, row in enumerate(rows):
         for j, one in enumerate(row):
-            out[(i, j, *map(slice, one.shape))] = one
+            out[i, j, : one.size] = one
     return out
 
 
-def _frequencies(free: Sequence[Motions], held: Sequence[Motions], zeros: Sequence[NDArray[np.complex128]]) -> Array:
+def _frequencies(free: Sequence[Motions], held: Sequence[Motions], zeros: Sequence[Complex]) -> Array:
     """Frequencies of the response [Hz]: evenly on a logarithmic axis, and near poles and zeros."""
     natural = np.sort(np.concatenate([one.frequencies for one in (*free, *held)]))
     natural = natural[natural > 0.0] / (2.0 * np.pi)
@@ -237,7 +235,11 @@ def _responses(models: Sequence[LinearModel], frequency: Array, names: dict[str,
 def _along(along: Sequence[Sequence[LinearModel]]) -> dict[str, Any]:
     """Branches of poles along a motion, motors free and held."""
     found = [[pole_branches(each, held) for held in ((), motors_of(each[0]))] for each in along]
-    values = padded(found)
+    most = max(one.shape[1] for each in found for one in each)
+    values = np.full((len(found), len(HOLDINGS), len(along[0]), most), complex(np.nan, np.nan))
+    for i, each in enumerate(found):
+        for j, one in enumerate(each):
+            values[i, j, :, : one.shape[1]] = one
     dims = ("mode", "holding", "moment", "branch")
     return {f"branch_{part}": (dims, getattr(values, part)) for part in ("real", "imag")}
 
@@ -249,11 +251,15 @@ def _drawings(models: Sequence[LinearModel], free: Sequence[Motions], held: Sequ
         [_drawn(model, one.shapes[:, :_SHAPES]) for one in pair]
         for model, pair in zip(models, zip(free, held, strict=True), strict=True)
     ]
+    orders = max(len(one["shape"]) for each in modal for one in each)
     out: dict[str, Any] = {}
     for name, dims in DRAWN.items():
         if not poses[0][name].size:
             continue
-        values = padded([[one[name] for one in each] for each in modal]).real
+        values = np.full((len(models), len(HOLDINGS), orders, *poses[0][name].shape[1:]), np.nan)
+        for i, each in enumerate(modal):
+            for j, one in enumerate(each):
+                values[i, j, : len(one[name])] = one[name]
         out[f"pose_{name}"] = (("mode", *dims), np.concatenate([pose[name] for pose in poses]))
         out[f"modal_{name}"] = (("mode", "holding", "drawn", *dims), values)
     return out
@@ -280,11 +286,12 @@ def _provenance(model: LinearModel, parameters: dict[str, Any] | None) -> dict[s
     motors = {motor.name: motor.joint for motor in mechanism.motors}
     return {
         "kind": "linear",
-        **origin(mechanism.name, parameters),
+        "mechanism": mechanism.name,
         "about": model.about,
         "time": model.time,
         "motor_joints": json.dumps(motors),
         "end_effector_outputs": json.dumps(end_effector_outputs(model)),
         **({} if mechanism.end_effector is None else {"end_effector_point": str(mechanism.end_effector.point)}),
+        **origin(parameters),
         "numpy_version": version("numpy"),
     }

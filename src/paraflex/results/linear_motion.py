@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.results.linear_data import DRAWN, HOLDINGS
 from paraflex.results.linear_summary import common_poles
-
-Array = NDArray[np.float64]
 
 # Variables of a drawn run, and of its base, by their names in `Drawing`.
 _VARIABLES = {

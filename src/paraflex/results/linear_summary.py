@@ -8,15 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array, Complex
 from paraflex.dynamics.linearise import BALANCED
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import ENCODERS, END_EFFECTOR, HOLDINGS
-from paraflex.results.storage import origin_figures
-
-Complex = NDArray[np.complex128]
 
 # A value nearer to the imaginary axis than this part of its size is on it, as far as numbers tell.
 _ON_AXIS = 1e-4
@@ -121,7 +118,7 @@ def common_poles(data: xr.Dataset) -> Complex | None:
     return first if others and all(same) else None
 
 
-def gains_of(data: xr.Dataset, mode: str, channels: str) -> NDArray[np.float64]:
+def gains_of(data: xr.Dataset, mode: str, channels: str) -> Array:
     """Singular values (frequencies, k), descending, of a mode's motors to "encoders" or to the "end_effector"."""
     motors = motors_of_mode(data, mode)
     inputs, outputs = motors or inputs_of_mode(data, mode), _outputs(data, channels, motors)
@@ -206,7 +203,8 @@ def linear_summary(data: xr.Dataset) -> dict[str, Any]:
             for key in ("state", "input", "output")
         },
         "modes": {mode: _mode_summary(data, mode) for mode in data["mode"].values.tolist()},
-        **origin_figures(data),
+        "parameters": json.loads(attrs["parameters"]),
+        "version": attrs["paraflex_version"],
     }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paraflex.arrays import Array, side_by_side
+from paraflex.arrays import Array
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import (
     FrameLoad,
@@ -22,6 +22,7 @@ from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, t
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
 from paraflex.results.drawing import Drawing, system_drawing
+from paraflex.results.numbers import stacked
 from paraflex.results.stress import SectionResult, section_result
 
 
@@ -135,40 +136,48 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         point_acceleration=points.acceleration,
         joint_force=np.where(shared.force, np.nan, loads.force),
         joint_moment=np.where(shared.moment, np.nan, loads.moment),
-        multiplier=_by_name(multipliers, system.rows, system.described_rows),
-        motor_speed=side_by_side([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
+        multiplier=_multipliers(system, multipliers),
+        motor_speed=stacked([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
         kinetic_energy=solution.kinetic_energy[:samples],
         strain_energy=solution.strain_energy[:samples],
         work=solution.work[:samples],
         drawing=drawn,
-        joint_coordinate=side_by_side([each.value for each in coordinates.values()], samples),
-        joint_speed=side_by_side([each.rate for each in coordinates.values()], samples),
+        joint_coordinate=stacked([each.value for each in coordinates.values()], samples),
+        joint_speed=stacked([each.rate for each in coordinates.values()], samples),
         drive_torque=drive_torques(system, multipliers)[:, : len(mechanism.prescribed)],
-        drive_speed=side_by_side([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
+        drive_speed=stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
         load_errors=None if errors is None else load_errors(system, joints, errors),
         frame_load=frame_load(system, drawn.joints, loads, q, v),
         sections=section_result(system, q, v, a, multipliers),
-        sensors=_by_name(
-            sensor_readings(system, q, v, a, multipliers, torques[:samples]),
-            *([one.name for one in each.sensors] for each in (system.mechanism, mechanism)),
-        ),
+        sensors=_sensors(system, sensor_readings(system, q, v, a, multipliers, torques[:samples])),
     )
 
 
 def stacked_motions(points: Sequence[PointMotion], samples: int) -> PointMotion:
     """Motions of several points as three arrays (samples, points, 2)."""
-    if not points:
-        return PointMotion(*np.zeros((3, samples, 0, 2)))
-    return PointMotion(*(np.stack(parts, axis=1) for parts in zip(*points, strict=True)))
+    return PointMotion(*(stacked([each[k] for each in points], samples, 2) for k in range(3)))
 
 
-def _by_name(values: Array, names: Sequence[str], wanted: Sequence[str]) -> Array:
-    """Columns (k, names) in the order of the mechanism as described; NaN of those that the system does not have."""
-    place = {name: k for k, name in enumerate(names)}
-    out = np.full((len(values), len(wanted)), np.nan)
-    for k, name in enumerate(wanted):
-        if name in place:
-            out[:, k] = values[:, place[name]]
+def _multipliers(system: System, multipliers: Array) -> Array:
+    """Multipliers by the rows of the mechanism as described; NaN for those that the system does not have."""
+    if system.described_rows == system.rows:
+        return multipliers
+    place = {row: i for i, row in enumerate(system.rows)}
+    out = np.full((len(multipliers), len(system.described_rows)), np.nan)
+    for i, row in enumerate(system.described_rows):
+        if row in place:
+            out[:, i] = multipliers[:, place[row]]
+    return out
+
+
+def _sensors(system: System, readings: Array) -> Array:
+    """Readings by the sensors of the mechanism as described; NaN of those that the system does not have."""
+    place = {sensor.name: k for k, sensor in enumerate(system.mechanism.sensors)}
+    sensors = system.described.sensors
+    out = np.full((len(readings), len(sensors)), np.nan)
+    for k, sensor in enumerate(sensors):
+        if sensor.name in place:
+            out[:, k] = readings[:, place[sensor.name]]
     return out
 
 

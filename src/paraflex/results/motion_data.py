@@ -31,11 +31,10 @@ from paraflex.results.labelled import (
 )
 from paraflex.results.links import system_links
 from paraflex.results.loads import load_figures
-from paraflex.results.numbers import finite_by_name, finite_or_none
+from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.record import RUN_FIGURES
 from paraflex.results.reduced_runs import reduction_figures
 from paraflex.results.sensors import sensor_figures
-from paraflex.results.storage import origin_figures
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 
@@ -125,13 +124,14 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {
             "time": float(last["time"]) if reached.size else None,
-            "angle": finite_by_name(last["angle"], "body"),
+            "angle": by_label(last["angle"], "body"),
             "point_position": {
                 str(point): [finite_or_none(x) for x in last["point_position"].sel(point=point).values]
                 for point in data["point"].values
             },
         },
-        **origin_figures(data),
+        "parameters": json.loads(data.attrs["parameters"]),
+        "version": data.attrs["paraflex_version"],
     }
 
 

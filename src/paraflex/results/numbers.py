@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from numpy.typing import NDArray
+
+from paraflex.arrays import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def finite_or_none(value: float) -> float | None:
@@ -14,18 +19,17 @@ def finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def finite_by_name(values: xr.DataArray, dim: str) -> dict[str, float | None]:
-    """Numbers for JSON, by the labels of their only dimension."""
-    return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}
-
-
-def units_of_each(array: xr.DataArray, number: int) -> list[str]:
-    """Units of so many members of a variable: its own of all where it does not say them one by one."""
-    each = str(array.attrs.get("units_each", "")).split(", ")
-    return each if len(each) == number and each != [""] else [str(array.attrs.get("units", ""))] * number
-
-
-def largest(values: NDArray[np.float64]) -> float | None:
+def largest(values: Array) -> float | None:
     """Largest finite magnitude; None if there is none."""
     known = np.abs(values[np.isfinite(values)])
     return float(known.max()) if known.size else None
+
+
+def by_label(values: xr.DataArray, dim: str) -> dict[str, float | None]:
+    """Numbers of an array by the labels of its dimension, for JSON."""
+    return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}
+
+
+def stacked(parts: Sequence[Any], samples: int, *rest: int) -> Any:
+    """Arrays (samples, ...) side by side along a second axis, of which there may be none."""
+    return np.stack(parts, axis=1) if parts else np.zeros((samples, 0, *rest))

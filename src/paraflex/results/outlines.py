@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array, Complex, Numbers
 from paraflex.dynamics import BodyCoordinates, System, across_chord
 from paraflex.fem import slope_squares
 from paraflex.mechanism import (
@@ -20,9 +20,6 @@ from paraflex.mechanism import (
     ModalBody,
     RigidBody,
 )
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Pieces a beam is drawn in, and the fewest between two of its points.
 _BEAM_PIECES, _FEWEST_PIECES = 16, 4
@@ -220,7 +217,7 @@ def _spline(z: Complex, rest: Complex, place: Complex, axis: complex, short: flo
     bends[:, 1:-1] = np.linalg.solve(rows, 6.0 * np.diff(slopes, axis=1)[..., None])[..., 0]
     piece = np.clip(np.sum(x[None, :, None] >= knots[:, None, :], axis=2) - 1, 0, inner)
 
-    def of(values: NDArray[Any], shift: int = 0) -> NDArray[Any]:
+    def of(values: Numbers, shift: int = 0) -> Numbers:
         return np.take_along_axis(values, piece + shift, axis=1)
 
     width, u, w = of(h), x - of(knots), of(knots, 1) - x

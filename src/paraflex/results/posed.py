@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System, closure_of, standing_system, start_state
 from paraflex.dynamics.projection import joint_gaps, row_unit
 from paraflex.dynamics.rank import joint_of_row
@@ -19,8 +19,6 @@ from paraflex.kinematics import Path, follow_path
 from paraflex.mechanism import Mechanism, PointRef, Start
 from paraflex.results.acting import first_movements, first_movements_along
 from paraflex.results.drawing import drawing_data, system_drawing
-
-Array = NDArray[np.float64]
 
 # Poses along a path, for rails as long as the travel, and places of the path that is drawn.
 _POSES, _PLACES = 81, 801

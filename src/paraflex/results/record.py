@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from paraflex.arguments import given_as
+from paraflex.arrays import Array
 from paraflex.control.loop import ControllerRecord
 from paraflex.control.runs import ControlledTracking
 from paraflex.dynamics.points import PointMotion, point_motion
@@ -68,8 +66,8 @@ class Record(Links):
     task: TrackingTask
     method: str
     mode: str
-    torque: NDArray[np.float64]
-    condition: NDArray[np.float64]
+    torque: Array
+    condition: Array
     end_effector: PointMotion
     figures: Mapping[str, Any] = field(default_factory=dict)
     validity: Validity | None = None

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array, Complex
 from paraflex.errors import InputError
 from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
@@ -17,9 +18,6 @@ from paraflex.linear.reduction import reduce
 from paraflex.linear.states_needed import DAMPING
 from paraflex.results.linear_data import HOLDINGS, motors_of
 from paraflex.results.numbers import finite_or_none
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 OWN, ONE = "of each pose", "of one pose"
 # Static shapes of each pose beside vibrations of others, or both of others.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
@@ -18,11 +20,9 @@ from paraflex.linear.reduction import CARRIED, reduce
 from paraflex.linear.states_needed import DAMPING, states_needed
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS, motors_of
-from paraflex.results.numbers import finite_by_name, finite_or_none
+from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
-from paraflex.results.storage import origin, origin_figures
-
-Array = NDArray[np.float64]
+from paraflex.results.storage import origin
 
 FULL = "full"
 # Frequencies of responses, from this part of the highest on and somewhat beyond it.
@@ -112,9 +112,9 @@ def reduction_dataset(
     }  # fmt: skip
     units = dict.fromkeys(one.unit for model in models for one in model.inputs)
     attrs = {
-        "kind": "reduction", **origin(models[0].mechanism, parameters), "about": models[0].about,
+        "kind": "reduction", "mechanism": models[0].mechanism, "about": models[0].about,
         "kept_states": len(few[0][0].states), "full_states": len(models[0].states), "until": until, "accuracy": error,
-        "damping_ratio": DAMPING, "input_unit": ", ".join(units),
+        "damping_ratio": DAMPING, "input_unit": ", ".join(units), **origin(parameters),
     }  # fmt: skip
     if along:
         method = _carrying(names)
@@ -191,10 +191,10 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
         run = data.sel(mode=mode, reduction=name)
         frequencies = data["natural_frequency"].sel(mode=mode, variant=name)
         return {
-            "states_needed": finite_by_name(run["states"], "output"),
-            "largest_error": finite_by_name(run["largest_error"], "output"),
+            "states_needed": by_label(run["states"], "output"),
+            "largest_error": by_label(run["largest_error"], "output"),
             "bound": finite_or_none(float(run["bound"])),
-            "held_frequency_by_states": finite_by_name(run["held_frequency"], "kept"),
+            "held_frequency_by_states": by_label(run["held_frequency"], "kept"),
             **{f"frequencies_{holding}": _list(frequencies.sel(holding=holding)) for holding in HOLDINGS},
         }
 
@@ -216,7 +216,8 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
             }
             for mode in modes
         },
-        **origin_figures(data),
+        "parameters": json.loads(data.attrs["parameters"]),
+        "version": data.attrs["paraflex_version"],
     }  # fmt: skip
 
 

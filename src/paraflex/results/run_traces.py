@@ -10,7 +10,6 @@ from typing import Generic, TypeVar, overload
 import numpy as np
 
 from paraflex.actuation import Electrical
-from paraflex.arrays import side_by_side
 from paraflex.control.laws import internal_torques
 from paraflex.control.loop import ControllerRecord
 from paraflex.control.runs import ControlledMotion, ControlledTracking
@@ -22,6 +21,7 @@ from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
 from paraflex.motion import MotionRun
 from paraflex.results.formulas import length
+from paraflex.results.numbers import stacked
 from paraflex.results.outlines import deflections
 from paraflex.results.stress import SectionResult, section_result
 from paraflex.results.traces import Trace, Traces
@@ -83,13 +83,13 @@ class SolutionTraces(Generic[R]):
         """Magnitude of the force in every joint (k, joints) [N]; zero near poles, NaN where not determined."""
         system, solution = self.system, self.solution
         multipliers = np.where(np.isnan(solution.multipliers), 0.0, solution.multipliers)
-        names = [joint.name for joint in system.described.joints]
         forces = [
-            load_in(system, name, joint_parts(system, name), solution.q, multipliers, self.torque)[0] for name in names
+            load_in(system, joint.name, joint_parts(system, joint.name), solution.q, multipliers, self.torque)[0]
+            for joint in system.described.joints
         ]
+        names = [joint.name for joint in system.described.joints]
         shared = undetermined_loads(system, names, solution.q.real, solution.acting).force.any(axis=2)
-        known = side_by_side([length(each) for each in forces], len(solution.q))
-        return np.where(shared, np.nan, known)
+        return np.where(shared, np.nan, stacked([length(each) for each in forces], len(solution.q)))
 
     @cached_property
     def joint_speed(self) -> Trace:
@@ -105,7 +105,7 @@ class SolutionTraces(Generic[R]):
         """Rates of joints by name (k, joints)."""
         solution = self.solution
         rates = [joint_coordinate(self.system, name, solution.q, solution.v).rate for name in names]
-        return side_by_side(rates, len(solution.q))
+        return stacked(rates, len(solution.q))
 
 
 @dataclass(frozen=True)
@@ -246,7 +246,7 @@ class StaticsTraces(SolutionTraces[Statics]):
         return int(np.sum(~self.run.stable & ~self.run.limit))
 
     def _columns(self, quantity: Callable[[str], Trace], of: Sequence[Coordinate]) -> Trace:
-        return side_by_side([quantity(one.name) for one in of], len(self.run.equilibria))
+        return stacked([quantity(one.name) for one in of], len(self.run.equilibria))
 
 
 @overload

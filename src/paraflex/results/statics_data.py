@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -10,7 +11,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import side_by_side
 from paraflex.equilibria import Statics
 from paraflex.findings import Finding
 from paraflex.results.doubts import keep_findings, verdict_of
@@ -18,9 +18,8 @@ from paraflex.results.drawing import system_drawing
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
-from paraflex.results.numbers import finite_by_name, finite_or_none
-from paraflex.results.run_traces import StaticsTraces
-from paraflex.results.storage import origin, origin_figures
+from paraflex.results.numbers import by_label, finite_or_none, stacked
+from paraflex.results.storage import origin
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 
@@ -110,7 +109,7 @@ def statics_dataset(
             name_units(out[name], [unit for unit in NAMED_UNITS[name] if unit in each] or NAMED_UNITS[name], each)
         if name in _COMMENTS:
             out[name].attrs["comment"] = _COMMENTS[name]
-    out.attrs = {"kind": "statics", **origin(mechanism.name, parameters)}
+    out.attrs = {"kind": "statics", "mechanism": mechanism.name, **origin(parameters)}
     beyond = [] if found.validity is None or found.validity.holds else [found.validity.finding()]
     keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *found.doubts])
     return out
@@ -118,17 +117,20 @@ def statics_dataset(
 
 def _of_steps(found: Statics) -> dict[str, Any]:
     """Variables of the equilibria that no run has."""
-    traces, along = StaticsTraces(found), (("step", "named"),)
-    stiffness, compliance = np.full((2, *traces.travel.shape), np.nan)
-    asked = [found.coordinates.index(one) for one in found.directions]
-    stiffness[:, asked], compliance[:, asked] = traces.stiffness, traces.compliance
+    names = [one.name for one in found.coordinates]
+    stiffness = np.full((len(found.equilibria), len(names)), np.nan)
+    for one in found.directions:
+        stiffness[:, names.index(one.name)] = found.stiffness(one.name)
+    with np.errstate(divide="ignore"):
+        compliance = 1.0 / stiffness
+    along = (("step", "named"),)
     return {
         "fraction": ("step", found.fraction),
         "limit_point": ("step", found.limit),
         "stable": ("step", found.stable),
-        "place": (*along, side_by_side([found.place(one.name) for one in found.coordinates], len(found.equilibria))),
-        "travel": (*along, traces.travel),
-        "effort": (*along, traces.effort),
+        "place": (*along, _columns(found, found.place)),
+        "travel": (*along, _columns(found, found.travel)),
+        "effort": (*along, _columns(found, found.known_effort)),
         "stiffness": (*along, stiffness),
         "compliance": (*along, compliance),
         "natural_frequency": (("step", "frequency_number"), _hertz(found.frequencies, found)),
@@ -171,6 +173,10 @@ def _buckling_shapes(found: Statics) -> dict[str, Any]:
     out[known] /= np.linalg.norm(out[known], axis=2).max(axis=1)[:, None, None]
     values = out.reshape(steps, count, *drawn.shape[1:]).astype(np.float32)
     return {"buckling_shape": (("step", "buckling_number", "station", "axis"), values)}
+
+
+def _columns(found: Statics, quantity: Any) -> np.ndarray:
+    return stacked([quantity(one.name) for one in found.coordinates], len(found.equilibria))
 
 
 def _motors(found: Statics) -> dict[str, Any]:
@@ -271,8 +277,9 @@ def statics_summary(data: xr.Dataset) -> dict[str, Any]:
         },
         **{name: [finite_or_none(float(x)) for x in last[name].values] for name in
            ("natural_frequency", "free_frequency")},
-        **({"stress_max": finite_by_name(data["stress_max"], "body")} if "stress_max" in data else {}),
+        **({"stress_max": by_label(data["stress_max"], "body")} if "stress_max" in data else {}),
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
-        **origin_figures(data),
+        "parameters": json.loads(data.attrs["parameters"]),
+        "version": data.attrs["paraflex_version"],
     }  # fmt: skip

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.results.statics_data import NAMED_UNITS, step_kinds
 from paraflex.units import DisplayUnit
 
@@ -105,7 +105,7 @@ def given_coordinates(data: xr.Dataset) -> list[int]:
     return [k for k, role in enumerate(data["role"].values) if role in GIVEN]
 
 
-def is_wide(values: NDArray[np.float64]) -> bool:
+def is_wide(values: Array) -> bool:
     """Whether stiffnesses are so different that an axis should be logarithmic."""
     known = values[np.isfinite(values)]
     return bool(known.size and known.min() > 0.0 and known.max() > _SPREAD * known.min())

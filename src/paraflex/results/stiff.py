@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System, build_system
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
@@ -21,7 +22,6 @@ from paraflex.kernel.packed import CONSTRAINT, make_scratch
 from paraflex.mechanism import Mechanism
 from paraflex.results.outlines import Outline
 
-Array = NDArray[np.float64]
 # Positions (k, 2) and angles (k,) of body frames.
 Frames = dict[str, tuple[Array, Array]]
 
@@ -113,8 +113,12 @@ def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[
 def _rows(system: System, q: Array, chosen: NDArray[np.bool_], driven: Mapping[str, Array]) -> tuple[Array, Array]:
     """Gaps (k, m) of joints and of the driven coordinates, and their derivatives (k, m, n)."""
     phi, jacobian = np.zeros((len(q), system.m)), np.zeros((len(q), system.m, system.n))
-    signals, scratch = no_signals(system.packed), make_scratch(system.packed)
-    rate, still = np.zeros(system.m), q[0] * 0.0
+    signals, scratch, rate, still = (
+        no_signals(system.packed),
+        make_scratch(system.packed),
+        np.zeros(system.m),
+        q[0] * 0.0,
+    )
     for k, one in enumerate(np.ascontiguousarray(q)):
         constraint_values(system.packed, signals, 0.0, one, still, scratch, phi[k], rate)
         fill_jacobian(system.packed, one, jacobian[k])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -35,19 +36,10 @@ _NETCDF = (NETCDF, b"CDF\x01", b"CDF\x02", b"CDF\x05")
 _AGAIN = "copy it again, or delete it and run the same command again"
 
 
-def origin(mechanism: str, parameters: dict[str, Any] | None) -> dict[str, Any]:
-    """Attributes of every dataset: its mechanism, the model as read and what was asked for, versions."""
-    return {
-        "mechanism": mechanism,
-        "parameters": json.dumps(parameters or {}, sort_keys=True),
-        "paraflex_version": version("paraflex"),
-        "schema": SCHEMA,
-    }
-
-
-def origin_figures(data: xr.Dataset) -> dict[str, Any]:
-    """The last entries of every summary: `parameters`, and the `version` that wrote the dataset."""
-    return {"parameters": json.loads(data.attrs["parameters"]), "version": data.attrs["paraflex_version"]}
+def origin(parameters: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Attributes of a dataset that tell what was asked for and what wrote it."""
+    asked = json.dumps(parameters or {}, sort_keys=True)
+    return {"parameters": asked, "paraflex_version": version("paraflex"), "schema": SCHEMA}
 
 
 @checked_arguments()

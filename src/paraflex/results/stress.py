@@ -9,16 +9,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.sections import SectionLoads, Sections, sections_of
+from paraflex.results.loads import OF_BEAMS
 from paraflex.results.numbers import largest
 
-Array = NDArray[np.float64]
+# Dimensions besides time, and values at the samples reached.
 Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
 # The dimensions of stations along beams and of joints that slide along them, and the variable that every run with
 # section forces has.
 SECTION, CONTACT, MOMENT = "section", "contact", "section_moment"
-_BODIES = ("stress_max", "stress_place", "stress_time", "bending_stress_max", "axial_stress_max", "safety_factor")
 UNITS = {
     "section_moment": ("bending moment of a beam's section", "N m"),
     "section_force": ("axial force of a beam's section", "N"),
@@ -162,7 +163,7 @@ def largest_stresses(data: xr.Dataset) -> xr.Dataset:
     all_stresses = found.whole
     outer = [dim for dim in data["section_moment"].dims if dim not in ("time", SECTION)]
     shape = [data.sizes[dim] for dim in outer]
-    out = {name: np.full([*shape, data.sizes["body"]], np.nan) for name in _BODIES}
+    out = {name: np.full([*shape, data.sizes["body"]], np.nan) for name in OF_BEAMS}
     time = data["time"].values
     for b, body in enumerate(data["body"].values):
         own = np.flatnonzero(found.owners == body)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import xarray as xr
@@ -13,10 +14,9 @@ from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.metrics import METRICS
-from paraflex.results.numbers import finite_by_name, finite_or_none
+from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.reduced_runs import reduction_figures
 from paraflex.results.sensors import sensor_figures
-from paraflex.results.storage import origin_figures
 from paraflex.results.traces import data_traces
 from paraflex.results.validity import validity_summary
 
@@ -70,7 +70,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
             numbers["deflection_max"] = finite_or_none(METRICS["deflection_max"].value(traces))
         numbers |= {key: int(run[key].item()) for key in _COUNTS}
         for key in ("peak_torque", "rms_torque"):
-            numbers[key] = finite_by_name(run[key], "motor")
+            numbers[key] = by_label(run[key], "motor")
         numbers["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
         numbers["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
         numbers["validity"] = validity_summary(run)
@@ -87,5 +87,6 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         "verdict": verdict_of(data).to_dict(),
         "part": None if part is None else part.to_dict(),
         "modes": modes,
-        **origin_figures(data),
+        "parameters": json.loads(data.attrs["parameters"]),
+        "version": data.attrs["paraflex_version"],
     }

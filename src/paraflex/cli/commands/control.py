@@ -8,13 +8,13 @@ from typing import Annotated
 from typer import Option
 
 from paraflex.cli.commands.options import (
-    METRES,
     SECONDS,
     Json,
     MethodOption,
     ModelChoice,
     PlanChoice,
     ReplaceOption,
+    ToleranceOption,
 )
 
 
@@ -53,10 +53,7 @@ class CompareLawsRequest:
             help="A metric, as studies have them; repeatable. Default: errors, vibration, settling, torques, energy.",
         ),
     ] = field(default_factory=list)
-    tolerance: Annotated[
-        float | None,
-        Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 4e-5 of the size."),
-    ] = None
+    tolerance: ToleranceOption = None
     method: MethodOption = None
     step: Annotated[
         float | None,

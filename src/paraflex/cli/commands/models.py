@@ -10,11 +10,10 @@ from typer import Argument, Option
 from paraflex.cli.commands.options import (
     SECONDS,
     AssemblyOption,
+    FilesChoice,
     Json,
     ModelChoice,
     PathOption,
-    ReplaceOption,
-    ReportOption,
 )
 
 
@@ -127,13 +126,7 @@ class LineariseRequest(LinearRequest):
     along: Annotated[  # type: ignore[misc]
         int | None, Option(metavar="N", help="Poles at so many moments of the motion too, as branches over time.")
     ] = None
-    out: Annotated[
-        str | None,
-        Option("--out", "--output", metavar="DIR", help="Folder for linear.nc, linear.json, figures and report."),
-    ] = None
-    force: ReplaceOption = False
-    report: ReportOption = True
-    json: Json = False
+    files: FilesChoice = field(default_factory=FilesChoice)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,13 +154,7 @@ class ReduceRequest(LinearRequest):
         str | None,
         Option(metavar="NAME|start|X,Y", help="The pose whose basis is taken along. Default: the first of the path."),
     ] = None
-    out: Annotated[
-        str | None,
-        Option("--out", "--output", metavar="DIR", help="Folder for reduced.nc, reduced.json, figures and report."),
-    ] = None
-    force: ReplaceOption = False
-    report: ReportOption = True
-    json: Json = False
+    files: FilesChoice = field(default_factory=FilesChoice)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,13 +202,7 @@ class StaticsRequest:
         int | None, Option(metavar="N", help="Factors of buckling about every equilibrium. Default: 1.")
     ] = None
     assembly: AssemblyOption = None
-    out: Annotated[
-        str | None,
-        Option("--out", "--output", metavar="DIR", help="Folder for statics.nc, statics.json, figures and report."),
-    ] = None
-    force: ReplaceOption = False
-    report: ReportOption = True
-    json: Json = False
+    files: FilesChoice = field(default_factory=FilesChoice)
 
 
 @dataclass(frozen=True)

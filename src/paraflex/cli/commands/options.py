@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, BadParameter, Option
@@ -43,6 +42,10 @@ PathOption = Annotated[
     Option(
         "--path", metavar="NAME|FILE", help="A path of the model (square, line, circle, ...) or a TOML file with one."
     ),
+]
+ToleranceOption = Annotated[
+    float | None,
+    Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 4e-5 of the size."),
 ]
 MethodOption = Annotated[str | None, Option(metavar="NAME", help="Method of integration: paraflex methods lists them.")]
 AssemblyOption = Annotated[str | None, Option(metavar="NAME", help="Which way the mechanism is put together.")]
@@ -118,6 +121,19 @@ class FramesChoice:
 
 
 @dataclass(frozen=True)
+class FilesChoice:
+    """What is written and printed of one dataset; no files without a folder."""
+
+    out: Annotated[
+        str | None,
+        Option("--out", "--output", metavar="DIR", help="Folder for data, their summary as JSON, figures and report."),
+    ] = None
+    force: ReplaceOption = False
+    report: ReportOption = True
+    json: Json = False
+
+
+@dataclass(frozen=True)
 class WorkersChoice:
     """Who computes the runs of a study."""
 
@@ -139,8 +155,3 @@ class WorkersChoice:
 
         engine = "dask" if self.cluster is not None and self.engine == "threads" else self.engine
         return Workers(engine, self.workers, self.cluster)
-
-
-def study_folder(study: str, output: str | None) -> Path:
-    """Where results of a study file go: where it is said, else results/ and the file's name."""
-    return Path("results") / Path(study).stem if output is None else Path(output)

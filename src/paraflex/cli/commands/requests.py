@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, get_type_hints
 
 import typer
+
+from paraflex.errors import InputError
 
 
 def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable[..., None]:
@@ -32,6 +35,24 @@ def flags(request: object) -> dict[str, str]:
         for one in _parameters(type(request))
         if isinstance(one.annotation.__metadata__[0], typer.models.OptionInfo)
     }
+
+
+@contextmanager
+def flagged(request: object, *, first: bool = False) -> Iterator[None]:
+    """An error that names an option's field, in whatever table, names the option's flag instead.
+
+    The field is the last part of the name, or the first: of "loads.stage.T.x" the loads.
+    """
+    try:
+        yield
+    except InputError as error:
+        flag = flags(request).get(error.field.partition(".")[0] if first else error.field.rpartition(".")[2])
+        raise (error if flag is None else error.at(flag)) from None
+
+
+def conflict(problem: str, flag: str, value: object) -> InputError:
+    """The error of an option that does not go with another."""
+    return InputError(problem, field=flag, value=value, remedy="leave one of them out")
 
 
 def _parameters(request: Any) -> Iterator[inspect.Parameter]:

@@ -19,6 +19,7 @@ from paraflex.cli.commands.options import (
     PlanChoice,
     ReplaceOption,
     ReportOption,
+    ToleranceOption,
 )
 
 
@@ -53,10 +54,7 @@ class RunRequest:
             "study's.",
         ),
     ] = field(default_factory=list)
-    tolerance: Annotated[
-        float | None,
-        Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 4e-5 of the size."),
-    ] = None
+    tolerance: ToleranceOption = None
     tolerance_per: Annotated[
         str | None,
         Option(metavar="cycle|run", help="Time in which errors may add up to the tolerance. Default: cycle."),

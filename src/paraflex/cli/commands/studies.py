@@ -15,20 +15,20 @@ from paraflex.cli.commands.options import (
     ReportOption,
     StudyArgument,
     WorkersChoice,
-    study_folder,
 )
 
 
+@dataclass(frozen=True, kw_only=True)
 class StudyRequest:
     """What requests of study files have in common."""
 
-    study: str
-    output: str | None
+    study: StudyArgument
+    output: OutputOption = None
 
     @property
     def folder(self) -> Path:
-        """Where results go."""
-        return study_folder(self.study, self.output)
+        """Where results go: where it is said, else results/ and the name of the study's file."""
+        return Path("results") / Path(self.study).stem if self.output is None else Path(self.output)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,6 @@ class SensitivityRequest(StudyRequest):
     """What `paraflex sensitivity` is asked for."""
 
     study: Annotated[str, Argument(metavar="STUDY.toml", help="What is run, and by what it is differentiated.")]
-    output: OutputOption = None
     at: Annotated[
         list[str],
         Option(metavar="NAME=VALUE", help="Where derivatives are taken; repeatable. Default: the mechanism's."),
@@ -53,7 +52,6 @@ class SweepRequest(StudyRequest):
     """What `paraflex sweep` is asked for."""
 
     study: Annotated[str, Argument(metavar="STUDY.toml", help="What varies, what is run, what is kept.")]
-    output: OutputOption = None
     workers: WorkersChoice = field(default_factory=WorkersChoice)
     limit: Annotated[int | None, Option(metavar="N", help="Runs this time, rounded up to whole designs.")] = None
     report: ReportOption = True
@@ -64,8 +62,6 @@ class SweepRequest(StudyRequest):
 class SearchRequest(StudyRequest):
     """What a command that looks for a design is asked for."""
 
-    study: StudyArgument
-    output: OutputOption = None
     workers: WorkersChoice = field(default_factory=WorkersChoice)
     json: Json = False
 
@@ -74,7 +70,6 @@ class SearchRequest(StudyRequest):
 class IndicesRequest(StudyRequest):
     """What `paraflex indices` is asked for."""
 
-    study: StudyArgument
     metrics: Annotated[
         list[str], Option("--metric", metavar="NAME", help="A metric; repeatable. Default: the study's.")
     ] = field(default_factory=list)
@@ -82,6 +77,5 @@ class IndicesRequest(StudyRequest):
         int | None, Option(metavar="N", help="Base samples, a power of two; (parameters + 2) N designs are run.")
     ] = None
     seed: Annotated[int | None, Option(metavar="N", help="Of the samples. Default: the study's.")] = None
-    output: OutputOption = None
     workers: WorkersChoice = field(default_factory=WorkersChoice)
     json: Json = False
