@@ -179,7 +179,7 @@ def _take_as(hint: Any, _spelling: str) -> Take | None:
     if origin in _TABLES or hint is dict:
         return _as_table(hint, inner)
     if origin is abc.Callable:
-        return _as_callable(hint)
+        return _plain_of(callable, _noun(hint), f"give {_wanted(hint)}")
     return _as_instance(hint) if isinstance(hint, type) and origin is None else None
 
 
@@ -188,16 +188,15 @@ def _is_row(hint: Any) -> bool:
     return typing.get_origin(hint) is tuple and typing.get_args(hint)[-1:] != (Ellipsis,)
 
 
-def _as_number(value: Any, field: str) -> Any:
-    if isinstance(value, float | Number) or getattr(value, "ndim", None) == 0:
-        return value
-    raise refused(value, field, "a number", "give a number")
+def _plain_of(is_one: Callable[[Any], bool], noun: str, remedy: str) -> Take:
+    """A value as it is, where it is of a plain kind."""
 
+    def take(value: Any, field: str) -> Any:
+        if is_one(value):
+            return value
+        raise refused(value, field, noun, remedy)
 
-def _as_whole(value: Any, field: str) -> Any:
-    if isinstance(value, Integral) and not isinstance(value, bool):
-        return value
-    raise refused(value, field, "a whole number", "give a whole number")
+    return take
 
 
 def _as_text(value: Any, field: str) -> Any:
@@ -210,14 +209,14 @@ def _as_text(value: Any, field: str) -> Any:
     raise refused(value, field, "a text", "give a text in quotes")
 
 
-def _as_truth(value: Any, field: str) -> Any:
-    if isinstance(value, bool) or getattr(getattr(value, "dtype", None), "kind", "") == "b":
-        return value
-    raise refused(value, field, "True or False", "give one of the two")
-
-
 _PLAIN: dict[Any, Take | None] = {
-    float: _as_number, int: _as_whole, str: _as_text, bool: _as_truth, Any: None, object: None, NoneType: None,
+    float: _plain_of(lambda value: isinstance(value, float | Number) or getattr(value, "ndim", None) == 0,
+                     "a number", "give a number"),
+    int: _plain_of(lambda value: isinstance(value, Integral) and not isinstance(value, bool),
+                   "a whole number", "give a whole number"),
+    bool: _plain_of(lambda value: isinstance(value, bool) or getattr(getattr(value, "dtype", 0), "kind", "") == "b",
+                    "True or False", "give one of the two"),
+    str: _as_text, Any: None, object: None, NoneType: None,
 }  # fmt: skip
 
 
@@ -314,15 +313,6 @@ def _as_table(hint: Any, kinds: Sequence[Any]) -> Take:
             if _same(names, made_names) is names and _same(items, made) is items
             else dict(zip(made_names, made, strict=True))
         )
-
-    return take
-
-
-def _as_callable(hint: Any) -> Take:
-    def take(value: Any, field: str) -> Any:
-        if callable(value):
-            return value
-        raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
 
     return take
 

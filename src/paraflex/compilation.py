@@ -119,10 +119,6 @@ def _free_beam(geometry: Geometry) -> NativeRun:
     return prepare(make_problem(system, signals, still, np.array([0.0, 1.0])), IntegrationOptions())
 
 
-def _call_time_loop(geometry: Geometry) -> None:
-    _free_beam(geometry).march(0)
-
-
 def _call_start(geometry: Geometry) -> None:
     beam = _free_beam(geometry)
     beam.start()
@@ -150,7 +146,7 @@ def compile_parts(parts: list[str]) -> None:
 
 
 # The time loop takes as long as everything else together.
-_PARTS = {"time-loop": _call_time_loop, "start": _call_start, "plan": _call_plan}
+_PARTS = {"time-loop": lambda geometry: _free_beam(geometry).march(0), "start": _call_start, "plan": _call_plan}
 
 if __name__ == "__main__":
     compile_all_kernels()

@@ -5,7 +5,7 @@ The codes are listed in `CODES`; the page "Findings" of the documentation is mad
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -211,9 +211,6 @@ class Verdict(Sequence[Finding]):
 
     def __len__(self) -> int:
         return len(self.findings)
-
-    def __iter__(self) -> Iterator[Finding]:
-        return iter(self.findings)
 
     def __str__(self) -> str:
         return "\n".join([f"{one.level.value}: {one}" for one in self.findings] or [Level.SOUND.value])

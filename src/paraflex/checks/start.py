@@ -9,6 +9,7 @@ from paraflex.dynamics import start_state
 from paraflex.errors import InputError, NumericalError
 from paraflex.files import Model
 from paraflex.findings import Finding
+from paraflex.mechanism import Mechanism, Start
 from paraflex.validity.numbers import FAST, mechanism_size
 
 
@@ -19,18 +20,17 @@ def start_findings(model: Model, seen: Examination, assembly: str | None) -> Ite
     chosen = model.mechanism.assembly(assembly) if seen.starts else None
     try:
         start_state(seen.system, model.start, chosen)
-        yield from _fast(model)
+        yield from _fast(model.mechanism, model.start)
     except InputError as error:
         yield Finding("start-refused", error.field, error.problem, error.remedy)
     except NumericalError as error:
         yield Finding("start-refused", "start", str(error), "give a start that the joints allow")
 
 
-def _fast(model: Model) -> Iterator[Finding]:
+def _fast(mechanism: Mechanism, start: Start) -> Iterator[Finding]:
     """Rates that no body turns at."""
-    size = mechanism_size(model.mechanism)
-    given = {} if model.start is None else model.start.angular
-    for body, rate in given.items():
+    size = mechanism_size(mechanism)
+    for body, rate in start.angular.items():
         if abs(rate) * size > FAST:
             yield Finding(
                 "speed-large", f"start.velocity.angular.{body}",

@@ -98,8 +98,8 @@ def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
     table = data.get("parameters", {})
     parameters = dimensions_of_parameters(table if isinstance(table, dict) else {})
     with_units = any(dimension is not None for dimension in parameters.values())
-    for place, text in _texts(data, ()):
-        if not (with_units or quantities_in(text)):
+    for place, text in leaves(data):
+        if not isinstance(text, str) or not (with_units or quantities_in(text)):
             continue
         found = field_at(schema, data, place)
         if takes_number(found.annotation) and text not in _words_of(found.annotation):
@@ -151,13 +151,13 @@ def number_in(text: str, unit: str) -> float:
     return number
 
 
-def _texts(data: Any, place: Place) -> Iterator[tuple[Place, str]]:
-    """Every text of data, and its place."""
-    if isinstance(data, str):
-        yield place, data
-    elif isinstance(data, (dict, list)):
+def leaves(data: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
+    """Every value of data that is no table or list, and its place."""
+    if isinstance(data, (dict, list)):
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
-            yield from _texts(value, (*place, key))
+            yield from leaves(value, (*place, key))
+    else:
+        yield place, data
 
 
 def _words_of(annotation: Any) -> Iterator[Any]:

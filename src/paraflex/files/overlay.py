@@ -9,7 +9,7 @@ from typing import Any
 
 from paraflex.errors import InputError, suggestion
 from paraflex.files.expressions import ExpressionError, evaluate, evaluate_parameters
-from paraflex.files.fields import Place, field_at, has_tables, is_table, takes_number
+from paraflex.files.fields import Place, field_at, has_tables, is_table, leaves, takes_number
 from paraflex.files.schema import ModelTable
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
@@ -179,15 +179,7 @@ def _at(data: Any, place: Place) -> Any:
 
 def number_places(data: Mapping[str, Any]) -> Iterator[Place]:
     """Every number of a model's data, and every expression that has a value."""
-
-    def walk(inside: Any, place: Place) -> Iterator[Place]:
-        if isinstance(inside, (dict, list)):
-            for key, value in inside.items() if isinstance(inside, dict) else enumerate(inside):
-                yield from walk(value, (*place, key))
-        elif _is_number(inside, data):
-            yield place
-
-    yield from walk(data, ())
+    return (place for place, value in leaves(data) if _is_number(value, data))
 
 
 def number_at(data: Mapping[str, Any], place: Place) -> float:

@@ -182,31 +182,7 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
     }
     joints, springs = mechanism.joints, mechanism.linear_springs
     driven = {one.joint for one in (*mechanism.motors, *mechanism.prescribed)}
-    of_springs: dict[str, Any] = {}
-    if springs:
-        ends = [[stations.get(ref, -1) for ref in (spring.a, spring.b)] for spring in springs]
-        of_springs = {
-            "spring": [spring.name for spring in springs],
-            "spring_station": (("spring", "end"), np.array(ends, dtype=np.int32)),
-        }
-    of_gears: dict[str, Any] = {}
-    if related := mechanism.relations:
-        number = {joint.name: k for k, joint in enumerate(joints)}
-        pairs = [(one, names) for one in related for names in pairwise(one.joints)]
-        held = [[number[name] for name in names] for _, names in pairs]
-        of_gears = {
-            "gear": [one.name if len(one.joints) == 2 else f"{one.name} {'-'.join(names)}" for one, names in pairs],
-            "gear_joint": (("gear", "end"), np.array(held, dtype=np.int32)),
-            "gear_radius": (("gear", "end"), np.array([pitch_radii(mechanism, one) for one, _ in pairs])),
-        }
-    of_loads: dict[str, Any] = {}
-    if mechanism.loads:
-        acted = [stations[load.point] for load in mechanism.loads]
-        of_loads = {
-            "load": [load.name for load in mechanism.loads],
-            "load_station": ("load", np.array(acted, dtype=np.int32)),
-        }
-    return {
+    out: dict[str, Any] = {
         "point": [str(ref) for ref in stations],
         "joint": [joint.name for joint in joints],
         "station_body": ("station", [one.body for one in drawn for _ in one.places]),
@@ -216,10 +192,22 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
         "joint_grounded": ("joint", np.array([joint.a.on_ground or joint.b.on_ground for joint in joints], dtype=bool)),
         "joint_driven": ("joint", np.array([joint.name in driven for joint in joints], dtype=bool)),
         "joint_rail": ("joint", np.array([_rail_station(joint, stations) for joint in joints], dtype=np.int32)),
-        **of_springs,
-        **of_gears,
-        **of_loads,
     }
+    if springs:
+        ends = [[stations.get(ref, -1) for ref in (spring.a, spring.b)] for spring in springs]
+        out["spring"] = [spring.name for spring in springs]
+        out["spring_station"] = (("spring", "end"), np.array(ends, dtype=np.int32))
+    if related := mechanism.relations:
+        number = {joint.name: k for k, joint in enumerate(joints)}
+        pairs = [(one, names) for one in related for names in pairwise(one.joints)]
+        held = [[number[name] for name in names] for _, names in pairs]
+        out["gear"] = [one.name if len(one.joints) == 2 else f"{one.name} {'-'.join(names)}" for one, names in pairs]
+        out["gear_joint"] = (("gear", "end"), np.array(held, dtype=np.int32))
+        out["gear_radius"] = (("gear", "end"), np.array([pitch_radii(mechanism, one) for one, _ in pairs]))
+    if loads := mechanism.loads:
+        out["load"] = [load.name for load in loads]
+        out["load_station"] = ("load", np.array([stations[load.point] for load in loads], dtype=np.int32))
+    return out
 
 
 def _drawn_ends(joint: Joint) -> tuple[PointRef, PointRef]:

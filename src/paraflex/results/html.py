@@ -10,7 +10,7 @@ from paraflex.display import facts, page, sentence, table, view
 from paraflex.dynamics.points import point_motion
 from paraflex.integrators import Solution
 from paraflex.integrators.methods import title_of
-from paraflex.mechanism import AngleLaw
+from paraflex.mechanism import AngleLaw, PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import deflections
@@ -47,12 +47,9 @@ def tracking_run_html(run: TrackingRun) -> str:
 def motion_run_html(run: MotionRun) -> str:
     """Status of a run without a path, places of its points at the end, and counts of the solver."""
     solution, system = run.solution, run.system
-    k = solution.t.size
-    title = f"{system.mechanism.name}: {_ended(solution)}"
-    method = title_of(solution.method)
     energies: list[tuple[str, Any]] = []
     points: list[tuple] = []
-    if k:
+    if solution.t.size:
         energies = [
             ("largest deflection", _deflection(run)),
             ("kinetic energy, largest", f"{np.max(solution.kinetic_energy):.4g} J"),
@@ -64,10 +61,10 @@ def motion_run_html(run: MotionRun) -> str:
     }
     torques = [f"{name} {value}" for name, value in given.items()]
     return page(
-        title,
+        f"{system.mechanism.name}: {_ended(solution)}",
         sentence(solution.message),
         sentence(_verdict(run)),
-        facts([*energies, ("given torques", torques), *_solver(solution, method)]),
+        facts([*energies, ("given torques", torques), *_solver(solution, title_of(solution.method))]),
         table(("point", "x at the end [m]", "y [m]"), points),
     )
 
@@ -112,8 +109,6 @@ def _deflection(run: TrackingRun | MotionRun) -> str | None:
 
 
 def _last_places(run: MotionRun) -> list[tuple]:
-    from paraflex.mechanism import PointRef
-
     solution = run.solution
     q, v, a = (values[-1:] for values in (solution.q, solution.v, solution.a))
     names = [PointRef(body.name, point) for body in run.system.described.bodies for point in body.points]

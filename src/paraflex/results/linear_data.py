@@ -199,12 +199,12 @@ def _zeros(maps: Sequence[dict[str, Complex]]) -> dict[str, Any]:
 
 
 def padded(rows: Sequence[Sequence[Numbers]]) -> Complex:
-    """Rows of rows of different lengths as an array, NaN where there is nothing."""
-    longest = max((one.size for row in rows for one in row), default=0)
-    out = np.full((len(rows), len(rows[0]), longest), complex(np.nan, np.nan))
+    """Rows of arrays of different sizes as one array, NaN where there is nothing."""
+    sizes = [one.shape for row in rows for one in row] or [(0,)]
+    out = np.full((len(rows), len(rows[0]), *np.max(sizes, axis=0)), complex(np.nan, np.nan))
     for i, row in enumerate(rows):
         for j, one in enumerate(row):
-            out[i, j, : one.size] = one
+            out[(i, j, *map(slice, one.shape))] = one
     return out
 
 
@@ -235,11 +235,7 @@ def _responses(models: Sequence[LinearModel], frequency: Array, names: dict[str,
 def _along(along: Sequence[Sequence[LinearModel]]) -> dict[str, Any]:
     """Branches of poles along a motion, motors free and held."""
     found = [[pole_branches(each, held) for held in ((), motors_of(each[0]))] for each in along]
-    most = max(one.shape[1] for each in found for one in each)
-    values = np.full((len(found), len(HOLDINGS), len(along[0]), most), complex(np.nan, np.nan))
-    for i, each in enumerate(found):
-        for j, one in enumerate(each):
-            values[i, j, :, : one.shape[1]] = one
+    values = padded(found)
     dims = ("mode", "holding", "moment", "branch")
     return {f"branch_{part}": (dims, getattr(values, part)) for part in ("real", "imag")}
 
@@ -251,15 +247,11 @@ def _drawings(models: Sequence[LinearModel], free: Sequence[Motions], held: Sequ
         [_drawn(model, one.shapes[:, :_SHAPES]) for one in pair]
         for model, pair in zip(models, zip(free, held, strict=True), strict=True)
     ]
-    orders = max(len(one["shape"]) for each in modal for one in each)
     out: dict[str, Any] = {}
     for name, dims in DRAWN.items():
         if not poses[0][name].size:
             continue
-        values = np.full((len(models), len(HOLDINGS), orders, *poses[0][name].shape[1:]), np.nan)
-        for i, each in enumerate(modal):
-            for j, one in enumerate(each):
-                values[i, j, : len(one[name])] = one[name]
+        values = padded([[one[name] for one in each] for each in modal]).real
         out[f"pose_{name}"] = (("mode", *dims), np.concatenate([pose[name] for pose in poses]))
         out[f"modal_{name}"] = (("mode", "holding", "drawn", *dims), values)
     return out

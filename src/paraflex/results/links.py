@@ -136,7 +136,7 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         point_acceleration=points.acceleration,
         joint_force=np.where(shared.force, np.nan, loads.force),
         joint_moment=np.where(shared.moment, np.nan, loads.moment),
-        multiplier=_multipliers(system, multipliers),
+        multiplier=_by_name(multipliers, system.rows, system.described_rows),
         motor_speed=stacked([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
         kinetic_energy=solution.kinetic_energy[:samples],
         strain_energy=solution.strain_energy[:samples],
@@ -149,7 +149,10 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         load_errors=None if errors is None else load_errors(system, joints, errors),
         frame_load=frame_load(system, drawn.joints, loads, q, v),
         sections=section_result(system, q, v, a, multipliers),
-        sensors=_sensors(system, sensor_readings(system, q, v, a, multipliers, torques[:samples])),
+        sensors=_by_name(
+            sensor_readings(system, q, v, a, multipliers, torques[:samples]),
+            *([one.name for one in each.sensors] for each in (system.mechanism, mechanism)),
+        ),
     )
 
 
@@ -158,26 +161,13 @@ def stacked_motions(points: Sequence[PointMotion], samples: int) -> PointMotion:
     return PointMotion(*(stacked([each[k] for each in points], samples, 2) for k in range(3)))
 
 
-def _multipliers(system: System, multipliers: Array) -> Array:
-    """Multipliers by the rows of the mechanism as described; NaN for those that the system does not have."""
-    if system.described_rows == system.rows:
-        return multipliers
-    place = {row: i for i, row in enumerate(system.rows)}
-    out = np.full((len(multipliers), len(system.described_rows)), np.nan)
-    for i, row in enumerate(system.described_rows):
-        if row in place:
-            out[:, i] = multipliers[:, place[row]]
-    return out
-
-
-def _sensors(system: System, readings: Array) -> Array:
-    """Readings by the sensors of the mechanism as described; NaN of those that the system does not have."""
-    place = {sensor.name: k for k, sensor in enumerate(system.mechanism.sensors)}
-    sensors = system.described.sensors
-    out = np.full((len(readings), len(sensors)), np.nan)
-    for k, sensor in enumerate(sensors):
-        if sensor.name in place:
-            out[:, k] = readings[:, place[sensor.name]]
+def _by_name(values: Array, names: Sequence[str], wanted: Sequence[str]) -> Array:
+    """Columns (k, names) in the order of the mechanism as described; NaN of those that the system does not have."""
+    place = {name: k for k, name in enumerate(names)}
+    out = np.full((len(values), len(wanted)), np.nan)
+    for k, name in enumerate(wanted):
+        if name in place:
+            out[:, k] = values[:, place[name]]
     return out
 
 

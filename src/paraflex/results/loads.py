@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.findings import RESOLVED
-from paraflex.results.numbers import finite_or_none, largest
+from paraflex.results.numbers import finite_or_none, largest, units_of_each
 from paraflex.units import STRESS, speed_text
 
 Figures = dict[str, float | str | None]
@@ -60,16 +60,15 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
                 str(name): {
                     "torque_unit": unit,
                     "speed_unit": None if unit is None else _RATES[unit],
-                    **_most("torque", run[torque].sel({dim: name})),
-                    **_error_of(run, f"{torque}_error", {dim: name}, "torque_error"),
-                    **_most("speed", run[f"{dim}_speed"].sel({dim: name})),
-                    **_most("power", run[f"{dim}_power"].sel({dim: name})),
+                    **_most("torque", run, torque, {dim: name}),
+                    **_most("speed", run, f"{dim}_speed", {dim: name}),
+                    **_most("power", run, f"{dim}_power", {dim: name}),
                     "energy": finite_or_none(run[f"{dim}_energy"].sel({dim: name}).item()),
                 }
                 for name, unit in zip(run[dim].values, _units(run[torque], run.sizes[dim]), strict=True)
             }
     if "frame_force" in run:
-        out["frame"] = _most("force", run["frame_force"]) | _most("moment", run["frame_moment"])
+        out["frame"] = _most("force", run, "frame_force") | _most("moment", run, "frame_moment")
     return out
 
 
@@ -79,19 +78,17 @@ def sliding_joints(data: xr.Dataset) -> NDArray[np.bool_]:
     return np.asarray(known.reshape(-1, known.shape[-1]).any(axis=0))
 
 
-def _most(name: str, values: xr.DataArray) -> Figures:
-    """Largest magnitude of numbers or of vectors, and its time; of a constant there is none."""
+def _most(name: str, run: xr.Dataset, variable: str, place: Mapping[str, str] | None = None) -> Figures:
+    """Largest magnitude of numbers or of vectors, and its time, none of a constant; its error where that is known."""
+    values = run[variable].sel(place)
     sizes = values.reduce(np.linalg.norm, "axis") if "axis" in values.dims else abs(values)
     most = largest(sizes.values)
     when = None
     if most is not None and "time" in sizes.dims:
         when = float(sizes["time"].values[np.nanargmax(np.where(np.isfinite(sizes.values), sizes.values, np.nan))])
-    return {f"{name}_max": most, f"{name}_time": when}
-
-
-def _error_of(run: xr.Dataset, variable: str, place: Mapping[str, str], key: str) -> Figures:
-    """How far a load may be off by errors of integration; nothing where that is not known."""
-    return {key: finite_or_none(run[variable].sel(place).item())} if variable in run else {}
+    known = f"{variable}_error" in run
+    error = {f"{name}_error": finite_or_none(run[f"{variable}_error"].sel(place).item())} if known else {}
+    return {f"{name}_max": most, f"{name}_time": when, **error}
 
 
 def error_text(figures: Mapping[str, Any], load: str) -> str:
@@ -102,11 +99,7 @@ def error_text(figures: Mapping[str, Any], load: str) -> str:
 
 def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
     """Unit of each torque or force; None where it is not known which of the two it is."""
-    unit = str(efforts.attrs.get("units", ""))
-    if unit in _RATES:
-        return [unit] * number
-    each = str(efforts.attrs.get("units_each", "")).split(", ")
-    return list(each) if len(each) == number and set(each) <= set(_RATES) else [None] * number
+    return [unit if unit in _RATES else None for unit in units_of_each(efforts, number)]
 
 
 def _joint(one: xr.Dataset, *, slides: bool) -> Figures:
@@ -116,11 +109,9 @@ def _joint(one: xr.Dataset, *, slides: bool) -> Figures:
         "least": float(known.min()) if known.size else None,
         "most": float(known.max()) if known.size else None,
         "unit": "m" if slides else "rad",
-        **_most("speed", one["joint_speed"]),
-        **_most("force", one["joint_force"]),
-        **_most("moment", one["joint_moment"]),
-        **_error_of(one, "joint_force_error", {}, "force_error"),
-        **_error_of(one, "joint_moment_error", {}, "moment_error"),
+        **_most("speed", one, "joint_speed"),
+        **_most("force", one, "joint_force"),
+        **_most("moment", one, "joint_moment"),
     }
 
 

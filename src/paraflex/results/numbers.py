@@ -25,6 +25,12 @@ def largest(values: Array) -> float | None:
     return float(known.max()) if known.size else None
 
 
+def units_of_each(array: xr.DataArray, number: int) -> list[str]:
+    """Units of so many members of a variable: its own of all where it does not say them one by one."""
+    each = str(array.attrs.get("units_each", "")).split(", ")
+    return each if len(each) == number and each != [""] else [str(array.attrs.get("units", ""))] * number
+
+
 def by_label(values: xr.DataArray, dim: str) -> dict[str, float | None]:
     """Numbers of an array by the labels of its dimension, for JSON."""
     return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from paraflex.results.numbers import largest
+from paraflex.results.numbers import largest, units_of_each
 
 READING, SENSOR = "sensor_reading", "sensor"
 _QUANTITIES = {
@@ -41,11 +41,7 @@ class SensorGroup(NamedTuple):
 
 def sensor_units(data: xr.Dataset) -> list[str]:
     """SI unit of each sensor of results; none of results without sensors."""
-    if READING not in data:
-        return []
-    attributes = data[READING].attrs
-    each = str(attributes.get("units_each", "")).split(", ")
-    return each if len(each) == data.sizes[SENSOR] else [str(attributes.get("units", ""))] * data.sizes[SENSOR]
+    return units_of_each(data[READING], data.sizes[SENSOR]) if READING in data else []
 
 
 def sensor_groups(data: xr.Dataset) -> list[SensorGroup]:

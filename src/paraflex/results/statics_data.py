@@ -19,6 +19,7 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
 from paraflex.results.numbers import by_label, finite_or_none, stacked
+from paraflex.results.run_traces import StaticsTraces
 from paraflex.results.storage import origin
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
@@ -117,20 +118,17 @@ def statics_dataset(
 
 def _of_steps(found: Statics) -> dict[str, Any]:
     """Variables of the equilibria that no run has."""
-    names = [one.name for one in found.coordinates]
-    stiffness = np.full((len(found.equilibria), len(names)), np.nan)
-    for one in found.directions:
-        stiffness[:, names.index(one.name)] = found.stiffness(one.name)
-    with np.errstate(divide="ignore"):
-        compliance = 1.0 / stiffness
-    along = (("step", "named"),)
+    traces, along = StaticsTraces(found), (("step", "named"),)
+    stiffness, compliance = np.full((2, *traces.travel.shape), np.nan)
+    asked = [found.coordinates.index(one) for one in found.directions]
+    stiffness[:, asked], compliance[:, asked] = traces.stiffness, traces.compliance
     return {
         "fraction": ("step", found.fraction),
         "limit_point": ("step", found.limit),
         "stable": ("step", found.stable),
-        "place": (*along, _columns(found, found.place)),
-        "travel": (*along, _columns(found, found.travel)),
-        "effort": (*along, _columns(found, found.known_effort)),
+        "place": (*along, stacked([found.place(one.name) for one in found.coordinates], len(found.equilibria))),
+        "travel": (*along, traces.travel),
+        "effort": (*along, traces.effort),
         "stiffness": (*along, stiffness),
         "compliance": (*along, compliance),
         "natural_frequency": (("step", "frequency_number"), _hertz(found.frequencies, found)),
@@ -173,10 +171,6 @@ def _buckling_shapes(found: Statics) -> dict[str, Any]:
     out[known] /= np.linalg.norm(out[known], axis=2).max(axis=1)[:, None, None]
     values = out.reshape(steps, count, *drawn.shape[1:]).astype(np.float32)
     return {"buckling_shape": (("step", "buckling_number", "station", "axis"), values)}
-
-
-def _columns(found: Statics, quantity: Any) -> np.ndarray:
-    return stacked([quantity(one.name) for one in found.coordinates], len(found.equilibria))
 
 
 def _motors(found: Statics) -> dict[str, Any]:

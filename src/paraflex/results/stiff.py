@@ -113,12 +113,8 @@ def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[
 def _rows(system: System, q: Array, chosen: NDArray[np.bool_], driven: Mapping[str, Array]) -> tuple[Array, Array]:
     """Gaps (k, m) of joints and of the driven coordinates, and their derivatives (k, m, n)."""
     phi, jacobian = np.zeros((len(q), system.m)), np.zeros((len(q), system.m, system.n))
-    signals, scratch, rate, still = (
-        no_signals(system.packed),
-        make_scratch(system.packed),
-        np.zeros(system.m),
-        q[0] * 0.0,
-    )
+    signals, scratch = no_signals(system.packed), make_scratch(system.packed)
+    rate, still = np.zeros(system.m), q[0] * 0.0
     for k, one in enumerate(np.ascontiguousarray(q)):
         constraint_values(system.packed, signals, 0.0, one, still, scratch, phi[k], rate)
         fill_jacobian(system.packed, one, jacobian[k])
