@@ -43,6 +43,12 @@ def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> Num
     return values + 1j * COMPLEX_STEP * derivative
 
 
+def another_layout(field: str = "vary") -> InputError:
+    """The error for a parameter with which descriptions change in more than numbers."""
+    problem = "the number of pieces or elements changes with it: no derivative"
+    return InputError(problem, field=field, remedy="choose a slightly different value with --at")
+
+
 def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> Stepped[T]:
     """A description with a complex step.
 
@@ -75,11 +81,7 @@ class _Walk:
         if isinstance(here, int | float | np.integer | np.floating):
             return self.number(here, near)
         if any(type(each) is not type(here) for each in near):
-            raise InputError(
-                "the number of pieces or elements changes with it: no derivative",
-                field="vary",
-                remedy="choose a slightly different value with --at",
-            )
+            raise another_layout()
         if isinstance(here, np.ndarray):
             return self.array(here, near)
         if isinstance(here, Mapping):
@@ -106,11 +108,7 @@ class _Walk:
 
     def sequence(self, here: Any, near: list[Any]) -> Any:
         if any(len(each) != len(here) for each in near):
-            raise InputError(
-                "the number of pieces or elements changes with it: no derivative",
-                field="vary",
-                remedy="choose a slightly different value with --at",
-            )
+            raise another_layout()
         new = [self.step(value, list(others)) for value, *others in zip(here, *near, strict=True)]
         if all(a is b for a, b in zip(new, here, strict=True)):
             return here
