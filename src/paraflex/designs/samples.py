@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.limits import DESIGNS, at_most
 from paraflex.mechanism.quantities import known
@@ -47,7 +47,7 @@ class Varied:
     log: bool = False
     whole: bool = False
 
-    def spread(self, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+    def spread(self, fraction: Array) -> Array:
         """Values at fractions of the range, from 0 to 1."""
         assert self.low is not None
         assert self.high is not None
@@ -57,7 +57,7 @@ class Varied:
             return np.clip(np.exp(_between(math.log(self.low), math.log(self.high), fraction)), self.low, self.high)
         return _between(self.low, self.high, fraction)
 
-    def levels(self) -> NDArray[np.float64]:
+    def levels(self) -> Array:
         """Values of a grid or list, (k,)."""
         if self.values is not None:
             return np.array(self.values, dtype=float)
@@ -111,7 +111,7 @@ def check_varied(parameter: Varied, kind: str) -> None:
         )
 
 
-def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> NDArray[np.float64]:
+def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> Array:
     """All designs, (designs, parameters).
 
     Parameters
@@ -146,7 +146,7 @@ def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: i
     return np.stack([p.spread(column) for p, column in zip(parameters, fractions.T, strict=True)], axis=1)
 
 
-def _grid(levels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _grid(levels: Sequence[Array]) -> Array:
     """Every combination of levels, the last fastest."""
     total, columns, before = math.prod(level.size for level in levels), [], 1
     for level in levels:
@@ -156,7 +156,7 @@ def _grid(levels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.stack(columns, axis=1)
 
 
-def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np.float64]:
+def _fractions(kind: str, number: int, dimensions: int, seed: int) -> Array:
     generator = np.random.default_rng(seed)
     if kind == RANDOM:
         return generator.random((number, dimensions))
@@ -167,7 +167,7 @@ def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np
     return sequence.random_base2(max(number - 1, 0).bit_length())[:number]
 
 
-def _between(low: float, high: float, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+def _between(low: float, high: float, fraction: Array) -> Array:
     return (1.0 - fraction) * low + fraction * high
 
 

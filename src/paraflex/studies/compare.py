@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, checked_arguments
+from paraflex.arrays import Array
 from paraflex.campaign import OnProgress, Progress, Study, Workers, hold_for, no_workers
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.folders import COMPARISON
@@ -216,7 +216,7 @@ def _measurements(
     case: Case,
     method: Method,
     plan: Sequence[_Setting],
-    places: NDArray[np.float64],
+    places: Array,
     options: ComparisonOptions,
     tell: Callable[[str], None],
 ) -> Iterator[Measurement]:
@@ -251,9 +251,7 @@ def _warm_up(case: Case, options: IntegrationOptions) -> None:
             return
 
 
-def _measure(
-    case: Case, method: str, setting: _Setting, places: NDArray[np.float64], options: ComparisonOptions
-) -> Measurement:
+def _measure(case: Case, method: str, setting: _Setting, places: Array, options: ComparisonOptions) -> Measurement:
     """A run, repeated if it is quick."""
     chosen, solutions = setting.options(method), list[Solution]()
     with warnings.catch_warnings(record=True) as caught:
@@ -303,7 +301,7 @@ def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
     return solution
 
 
-def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArray[np.float64]]:
+def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, Array]:
     """Two tight runs, by the two methods of highest order that succeed; errors are distances from the first."""
     ours = sorted((x for x in METHODS.values() if x.family is Family.ESDIRK), key=lambda x: -x.order)
     tolerance = options.tightest / _FINER
@@ -336,7 +334,7 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
     return Reference(method.name, own, other.name, loose, uncertainty, solution.wall_time), places
 
 
-def _distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def _distance(one: Array, other: Array) -> float:
     """Largest distance over points and samples [m]."""
     return float(np.max(np.linalg.norm(one - other, axis=-1)))
 

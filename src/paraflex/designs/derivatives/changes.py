@@ -7,13 +7,12 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, required_effort
 from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
 from paraflex.arguments import with_fields
-from paraflex.arrays import Numbers
+from paraflex.arrays import Array, Numbers
 from paraflex.control.shaped import ShapedPath
 from paraflex.designs.derivatives.plans import Given
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
@@ -42,8 +41,6 @@ from paraflex.kinematics.closure import PathClosure, with_marker
 from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
 from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody, with_actuators
 from paraflex.tracking import TrackingTask, path_knots
-
-Array = NDArray[np.float64]
 
 
 class Described(NamedTuple):

@@ -12,10 +12,9 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import with_fields
-from paraflex.arrays import Numbers
+from paraflex.arrays import Array, Numbers
 from paraflex.designs.derivatives.stencil import Stencil
 from paraflex.errors import InputError
 
@@ -33,12 +32,12 @@ class Stepped(Generic[T]):
     error: float
 
 
-def part(values: Any) -> NDArray[np.float64]:
+def part(values: Any) -> Array:
     """The derivative in numbers with a complex step; zero for real ones."""
     return np.imag(values) / COMPLEX_STEP
 
 
-def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> Numbers:
+def stepped(values: Array, derivative: Array) -> Numbers:
     """Numbers with a complex step along a derivative."""
     return values + 1j * COMPLEX_STEP * derivative
 

@@ -9,15 +9,14 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign import Engine, Journal, LostWorker, Row, outcomes
 from paraflex.campaign.study import Result
 from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, lost, run_id, run_task
 from paraflex.designs.setting import Setting
 from paraflex.studies.optimisation.study import DesignStudy
 
-Array = NDArray[np.float64]
 Design = tuple[float, ...]
 RunTask = Callable[..., Outcome]
 

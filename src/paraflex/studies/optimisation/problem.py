@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign.study import Result
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
@@ -15,7 +15,6 @@ from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
 
-Array = NDArray[np.float64]
 # Relative violation of a limit that still counts as none.
 _LIMIT_EXCESS = 1e-6
 # Cost of a design that violates a limit, and of one that does not run, in objectives of the start.

@@ -9,8 +9,8 @@ from pathlib import Path as FilePath
 from typing import Any, ClassVar, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign.study import R_co, Study
 from paraflex.designs.measure import check_metric, metric_of
 from paraflex.designs.samples import RANDOM, Varied
@@ -29,8 +29,6 @@ from paraflex.studies.optimisation.schema import (
     SearchTable,
     StudyTable,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, hold_for, no_workers
 from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
 from paraflex.designs.derivatives.plans import check_has_path, nominal_values
@@ -33,7 +33,6 @@ from paraflex.writing import whole_file
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 _COLUMNS = ("path", "mode", "metric", "unit", "parameter", "nominal", "value", "derivative", "relative", "error")
 TABLE, LINES, FIGURES = "sensitivity.csv", "sensitivity.parquet", "figures"
 
