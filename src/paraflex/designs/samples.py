@@ -47,25 +47,29 @@ class Varied:
     log: bool = False
     whole: bool = False
 
-    def spread(self, fraction: Array) -> Array:
-        """Values at fractions of the range, from 0 to 1."""
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Low and high, of a parameter that has a range."""
         assert self.low is not None
         assert self.high is not None
+        return self.low, self.high
+
+    def spread(self, fraction: Array) -> Array:
+        """Values at fractions of the range, from 0 to 1."""
+        low, high = self.ends
         if self.whole:
-            return np.minimum(np.floor(self.low + fraction * (self.high - self.low + 1.0)), self.high)
+            return np.minimum(np.floor(low + fraction * (high - low + 1.0)), high)
         if self.log:
-            return np.clip(np.exp(_between(math.log(self.low), math.log(self.high), fraction)), self.low, self.high)
-        return _between(self.low, self.high, fraction)
+            return np.clip(np.exp(_between(math.log(low), math.log(high), fraction)), low, high)
+        return _between(low, high, fraction)
 
     def levels(self) -> Array:
         """Values of a grid or list, (k,)."""
         if self.values is not None:
             return np.array(self.values, dtype=float)
-        assert self.low is not None
-        assert self.high is not None
         assert self.number is not None
         if self.whole:
-            return np.unique(np.round(np.linspace(self.low, self.high, self.number)))
+            return np.unique(np.round(np.linspace(*self.ends, self.number)))
         return self.spread(np.linspace(0.0, 1.0, self.number))
 
 
@@ -172,18 +176,13 @@ def _between(low: float, high: float, fraction: Array) -> Array:
 
 
 def _check_range(parameter: Varied, where: str) -> None:
-    assert parameter.low is not None
-    assert parameter.high is not None
-    if parameter.high < parameter.low:
-        raise InputError(
-            f"below low, {parameter.low:g}", field=f"{where}.high", value=parameter.high, remedy="exchange the two"
-        )
-    if parameter.log and not parameter.low > 0.0:
-        raise InputError(
-            "a logarithmic range must be positive", field=f"{where}.low", value=parameter.low,
-            remedy='choose scale = "linear"',
-        )  # fmt: skip
-    if parameter.whole and (parameter.log or parameter.low % 1.0 or parameter.high % 1.0):
+    low, high = parameter.ends
+    if high < low:
+        raise InputError(f"below low, {low:g}", field=f"{where}.high", value=high, remedy="exchange the two")
+    if parameter.log and not low > 0.0:
+        remedy = 'choose scale = "linear"'
+        raise InputError("a logarithmic range must be positive", field=f"{where}.low", value=low, remedy=remedy)
+    if parameter.whole and (parameter.log or low % 1.0 or high % 1.0):
         raise InputError(
             "whole numbers have a linear range between two of them", field=f"{where}.whole", value=True,
             remedy="give whole low and high",
