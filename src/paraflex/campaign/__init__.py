@@ -14,8 +14,8 @@ from paraflex.campaign.study import (
     Progress as Progress,
     Result as Result,
     Study as Study,
+    WholeStudy as WholeStudy,
     Workers as Workers,
-    hold_for as hold_for,
     kept_in as kept_in,
     no_workers as no_workers,
 )

@@ -7,16 +7,14 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.arrays import Array
-from paraflex.campaign import OnProgress, Progress, Study, Workers, hold_for, no_workers
+from paraflex.campaign import OnProgress, Progress, WholeStudy, Workers, no_workers
 from paraflex.errors import InputError, IntegrationError, NumericalError
-from paraflex.folders import COMPARISON
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.methods import Family, Method, find_method
 from paraflex.studies.cases import Case
@@ -81,8 +79,10 @@ class _TooSlowError(Exception):
 
 
 @dataclass(frozen=True)
-class ComparisonStudy(Study[MethodComparison], CheckedFields):
+class ComparisonStudy(WholeStudy[MethodComparison], CheckedFields):
     """One motion by every method at every tolerance: time, work and error of each.
+
+    Runs come one after the other, so that their wall times can be compared: workers have no part in it.
 
     Attributes
     ----------
@@ -95,37 +95,24 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
         The defaults where None.
     parameters : dict or None
         Kept as provenance.
+
+    Raises
+    ------
+    InputError
+        From `run`: an unknown method, or one with parameters of its own, before anything runs.
+    IntegrationError
+        From `run`: no converged run to compare with.
     """
 
+    gives = MethodComparison
     case: Case
     methods: Sequence[Method | str] | None = None
     options: ComparisonOptions | None = None
     parameters: dict[str, Any] | None = None
 
-    def run(
-        self,
-        folder: str | Path | None = None,
-        *,
-        workers: Workers | None = None,
-        on_progress: OnProgress | None = None,
-    ) -> MethodComparison:
-        """Run all methods; see `Study.run`.
-
-        Runs come one after the other, so that their wall times can be compared: workers have no part in it.
-
-        Raises
-        ------
-        InputError
-            An unknown method, or one with parameters of its own, before anything runs.
-        IntegrationError
-            No converged run to compare with.
-        """
+    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], MethodComparison]:
         no_workers(workers, "runs come one after the other")
-        with hold_for(folder, COMPARISON) as held:
-            result = self._run(on_progress)
-            if held is not None and result.measurements:
-                result.save_in(held)
-        return result
+        return self._run
 
     def _run(self, on_progress: OnProgress | None) -> MethodComparison:
         case, options = self.case, self.options or ComparisonOptions()
