@@ -27,7 +27,7 @@ def _axis(*words: str, angle: bool = True) -> Callable[[Any, str], None]:
             return
         if not (angle and hasattr(value, "__float__")) or getattr(value, "ndim", 0):
             raise InputError("not an axis", field=field, value=value, remedy=remedy)
-        of_size(value, field)
+        of_size(value, field)  # pyright: ignore[reportArgumentType]
 
     return check
 
