@@ -23,9 +23,11 @@ from paraflex.fem import (
 )
 from paraflex.mechanism.damping import Damping
 from paraflex.mechanism.modal import ModalBody
+from paraflex.mechanism.quantities import finite, in_unit, not_negative, positive
 from paraflex.mechanism.sections import Section
 
 T = TypeVar("T")
+_ROD = ' (a rod without mass between two pins is a joint of type = "distance")'
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,9 @@ class Material(CheckedFields):
 
     _table = "material"
 
-    youngs_modulus: float
-    density: float
-    strength: float | None = None
+    youngs_modulus: float = field(metadata=in_unit(positive, "Pa"))
+    density: float = field(metadata=in_unit(positive, "kg/m^3"))
+    strength: float | None = field(default=None, metadata=in_unit(positive, "Pa"))
 
 
 class Curvature(Enum):
@@ -87,8 +89,8 @@ class LumpedMass(CheckedFields):
     _table = "lump"
 
     point: str
-    mass: float
-    inertia: float = 0.0
+    mass: float = field(metadata=in_unit(not_negative, "kg"))
+    inertia: float = field(default=0.0, metadata=in_unit(not_negative, "kg m^2"))
 
 
 @dataclass(frozen=True)
@@ -111,9 +113,9 @@ class RigidBody(CheckedFields):
     _table = "body"
 
     name: str
-    mass: float
-    inertia: float
-    centre_of_mass: tuple[float, float] = (0.0, 0.0)
+    mass: float = field(metadata=in_unit(positive, f"kg{_ROD}"))
+    inertia: float = field(metadata=in_unit(positive, f"kg m^2{_ROD}"))
+    centre_of_mass: tuple[float, float] = field(default=(0.0, 0.0), metadata={"check": finite})
     points: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 

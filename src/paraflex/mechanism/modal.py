@@ -12,6 +12,7 @@ from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
 from paraflex.fem import ShapeIntegrals
 from paraflex.mechanism.damping import Damping
+from paraflex.mechanism.quantities import in_unit, positive
 
 Row = Sequence[float]
 Matrix = Sequence[Sequence[float]]
@@ -92,9 +93,9 @@ class ModalBody(CheckedFields):
 
     _own = ("first_moment", "mass_matrix", "stiffness", "S2", "I1", "G1", "G2", "I2")
     name: str
-    mass: float
+    mass: float = field(metadata=in_unit(positive, "kg"))
     first_moment: Row
-    inertia: float
+    inertia: float = field(metadata=in_unit(positive, "kg m^2"))
     mass_matrix: Matrix
     stiffness: Matrix
     S2: Matrix

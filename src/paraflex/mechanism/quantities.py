@@ -62,6 +62,11 @@ def said(
     return {"description": description, "check": checked, "joint": joint}
 
 
+def in_unit(check: Callable[..., None], unit: str) -> dict[str, Any]:
+    """Metadata of a number that a check asks for in a unit."""
+    return {"check": partial(check, unit=unit)}
+
+
 AT_JOINT = said("the name of a joint", joint="moves")
 
 

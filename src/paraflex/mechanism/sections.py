@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import positive
+from paraflex.mechanism.quantities import in_unit, positive
 
 
 @given_as("a shape", "Rectangle(...), Round(...) or Tube(...)")
@@ -173,10 +173,10 @@ class Section(CheckedFields):
 
     _table = "section"
 
-    area: float
-    second_moment: float
+    area: float = field(metadata=in_unit(positive, "m^2"))
+    second_moment: float = field(metadata=in_unit(positive, "m^4"))
     shape: Shape | None = None
-    outer_fibre: float | None = None
+    outer_fibre: float | None = field(default=None, metadata=in_unit(positive, "m"))
 
     @classmethod
     def of(cls, shape: Shape) -> Section:
