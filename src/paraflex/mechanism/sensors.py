@@ -11,7 +11,7 @@ from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError
 from paraflex.limits import of_size
 from paraflex.mechanism.joints import GROUND, PointRef
-from paraflex.mechanism.quantities import AT_JOINT, finite, said
+from paraflex.mechanism.quantities import AT_JOINT, finite, optional, said
 
 # Kinds of sensors by their names in files.
 SENSOR_KINDS: dict[str, type[Sensor]] = {}
@@ -99,7 +99,7 @@ class PointSensor(Sensor):
     axis: Literal["x", "y"] | float = field(
         metadata=said('"x", "y" or the angle of its axis against the x axis in rad', _axis("x", "y"))
     )
-    body: str = field(default=GROUND, metadata=said("the body in whose frame the axis is fixed, by default the ground"))
+    body: str = optional(GROUND, "the body in whose frame the axis is fixed, by default the ground")
 
     @property
     def direction(self) -> tuple[float, float]:
@@ -143,13 +143,11 @@ class StrainGauge(Sensor, kind="strain", units=("1",)):
 
     body: str = field(metadata=said("the name of a beam"))
     at: float | str = field(metadata=said("a named point of the beam, or the distance from its first end in m"))
-    distance: float | None = field(
-        default=None,
-        metadata=said(
-            "the distance from the neutral axis in m, positive on the side of the y axis, by default that of the "
-            "outermost fibre",
-            finite,
-        ),
+    distance: float | None = optional(
+        None,
+        "the distance from the neutral axis in m, positive on the side of the y axis, by default that of the "
+        "outermost fibre",
+        finite,
     )
 
     def place(self, points: Mapping[str, float]) -> float:
