@@ -116,23 +116,17 @@ class Round(Shape):
 
     @property
     def outer_fibre(self) -> float:
-        """The radius [m]."""
+        """The outer radius [m]."""
         return self.diameter / 2.0
 
 
 @dataclass(frozen=True)
-class Tube(Shape):
+class Tube(Round):
     """A circular tube of an outer diameter and a wall [m]."""
 
     kind: ClassVar[str] = "tube"
 
-    diameter: float
     wall: float
-
-    @property
-    def smallest(self) -> float:
-        """The diameter [m]."""
-        return self.diameter
 
     @property
     def area(self) -> float:
@@ -143,11 +137,6 @@ class Tube(Shape):
     def second_moment(self) -> float:
         """Of area, about a diameter: the area times the sum of both squared diameters over 16 [m^4]."""
         return self.area * (self.diameter**2 + (self.diameter - 2.0 * self.wall) ** 2) / 16.0
-
-    @property
-    def outer_fibre(self) -> float:
-        """The outer radius [m]."""
-        return self.diameter / 2.0
 
 
 # Kinds of shapes by their names in files.
