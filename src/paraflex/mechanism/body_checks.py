@@ -10,7 +10,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, BodyReduction, FlexibleBeam, RigidBody
-from paraflex.mechanism.damping import Damping, stiffness_proportional
+from paraflex.mechanism.damping import Damping, stiffness_damping
 from paraflex.mechanism.modal import ModalBody
 from paraflex.mechanism.quantities import check_numbers, finite, positive
 
@@ -61,7 +61,6 @@ def check_body(body: Body) -> None:
 
 
 def _check_frames(beam: FlexibleBeam, field: str) -> None:
-    """Check that a beam may have so many frames."""
     if not 1 <= beam.frames <= ELEMENTS:
         raise InputError(
             "no such number of frames", field=f"{field}.frames", value=beam.frames, remedy=f"from 1 to {ELEMENTS}"
@@ -73,11 +72,7 @@ def _check_frames(beam: FlexibleBeam, field: str) -> None:
             "modes of the whole beam have no meaning in several frames", field=f"{field}.modes", value=beam.modes,
             remedy="leave modes out, or frames",
         )  # fmt: skip
-    if beam.damping is not None and stiffness_proportional(beam.damping) is None:
-        raise InputError(
-            "a beam in several frames can be damped in proportion to stiffness only", field=f"{field}.damping",
-            value=beam.damping, remedy="give damping = { stiffness = ... }, a loss factor, or none",
-        )  # fmt: skip
+    stiffness_damping(beam.damping, "a beam in several frames", f"{field}.damping")
 
 
 def check_damping(damping: Damping | None, field: str) -> None:
@@ -91,7 +86,6 @@ def check_damping(damping: Damping | None, field: str) -> None:
 
 
 def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
-    """Check length, sections, materials, points and lumps of a bar."""
     positive(body.length, f"{field}.length", "m")
     for where, section in _each(body.section, f"{field}.section"):
         check_numbers(section, where)

@@ -108,3 +108,13 @@ def stiffness_proportional(damping: Damping) -> float | None:
     if isinstance(damping, RayleighDamping) and damping.mass == 0.0:
         return damping.stiffness
     return None
+
+
+def stiffness_damping(damping: Damping | None, what: str, field: str) -> float:
+    """The coefficient beta of D = beta K [s]; an `InputError` for damping of another kind."""
+    beta = 0.0 if damping is None else stiffness_proportional(damping)
+    if beta is None:
+        problem = f"{what} can be damped in proportion to stiffness only"
+        remedy = "give damping = { stiffness = ... }, a loss factor, or none"
+        raise InputError(problem, field=field, value=damping, remedy=remedy)
+    return beta
