@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from paraflex.campaign import tables_of
+from paraflex.campaign import LostWorker, Workers, outcomes, tables_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.reopen import StudyFolder, open_study, run_again
-from paraflex.designs.run import Abandoned
 from paraflex.designs.schema import DEFAULT_NAME
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError, ParaflexError
@@ -92,15 +88,7 @@ def _again(
         return {}, {}, []
     compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism)
 
-    stop = threading.Event()
-
-    def watch(_: float) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
-
-    def again(row: int) -> tuple[xr.Dataset, bool] | str:
-        if stop.is_set():
-            raise Abandoned
+    def again(row: int, watch: Callable[[float], None]) -> tuple[xr.Dataset, bool] | str:
         values, path, mode = designs.values(row), str(designs.path[row]), str(designs.mode[row])
         try:
             data, metrics = run_again(study.setting, values, path, mode, watch)
@@ -109,17 +97,17 @@ def _again(
         rows = {name: designs.metrics[name][row] for name in metrics if name in designs.metrics}
         return data, all(np.isclose(metrics[name], rows[name], rtol=_ROW_DIFFERENCE, equal_nan=True) for name in rows)
 
-    rows = [one.row for one in picked]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        try:
-            outcomes = dict(zip(rows, pool.map(again, rows), strict=True))
-        except KeyboardInterrupt:
-            # Ctrl-C reaches the main thread only; the others stop at their next progress report.
-            stop.set()
-            raise
-    runs = {row: outcome[0] for row, outcome in outcomes.items() if not isinstance(outcome, str)}
-    failed = {row: outcome for row, outcome in outcomes.items() if isinstance(outcome, str)}
-    differ = [row for row, outcome in outcomes.items() if not isinstance(outcome, str) and not outcome[1]]
+    with Workers().open() as engine:
+        found = dict(outcomes(engine, again, [one.row for one in picked]))
+    runs, failed, differ = {}, {}, []
+    for row in (one.row for one in picked):
+        outcome = found[row]
+        assert not isinstance(outcome, LostWorker)  # threads are not lost
+        if isinstance(outcome, str):
+            failed[row] = outcome
+            continue
+        runs[row], same = outcome
+        differ += [] if same else [row]
     return runs, failed, differ
 
 
