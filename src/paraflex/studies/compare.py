@@ -6,7 +6,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -182,10 +182,10 @@ class _Setting:
     def options(self, method: str) -> IntegrationOptions:
         return IntegrationOptions(method=method, tolerance=self.tolerance, step=self.step)
 
-    def row(self, method: str, status: str, reason: str, warned: tuple[str, ...] = ()) -> Measurement:
-        """A row of a run without results."""
+    def row(self, method: str, status: str = "complete", reason: str = "", warned: Sequence[str] = ()) -> Measurement:
+        """A row of a run, without results."""
         tolerance = self.tolerance if self.step is None else None
-        return Measurement(method, tolerance, self.step, status, reason, warnings=warned)
+        return Measurement(method, tolerance, self.step, status, reason, warnings=tuple(warned))
 
     def __str__(self) -> str:
         return f"tolerance {self.tolerance:g} m" if self.step is None else f"step {self.step:g} s"
@@ -253,15 +253,9 @@ def _measure(case: Case, method: str, setting: _Setting, places: Array, options:
         except NumericalError as error:
             return setting.row(method, "failed", str(error), _texts(caught))
     best = min(solutions, key=lambda solution: solution.wall_time)
-    return Measurement(
-        method=method,
-        tolerance=setting.tolerance if setting.step is None else None,
-        step=setting.step,
-        error=_distance(case.places(best), places),
-        repetitions=len(solutions),
-        warnings=_texts(caught),
-        **{name: getattr(best, name) for name in _RUN_COUNTS},
-    )
+    counts = {name: getattr(best, name) for name in _RUN_COUNTS}
+    error = _distance(case.places(best), places)
+    return replace(setting.row(method, warned=_texts(caught)), error=error, repetitions=len(solutions), **counts)
 
 
 def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
