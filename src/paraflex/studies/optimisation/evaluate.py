@@ -54,7 +54,7 @@ class Evaluated:
             if row["status"] != STATUS_COMPLETE:
                 return f"{whose}{row['reason']}"
             for column in self.counting:
-                if not _is_finite(row.get(column)):
+                if row.get(column) is None or not math.isfinite(row[column]):
                     return f"{whose}{column} is no number"
         return ""
 
@@ -167,12 +167,9 @@ class Evaluate:
             rows[design] |= {(row["path"], row["mode"]): row for row in outcome.rows}
             if len(rows[design]) == self.study.runs:
                 ordered = [rows[design][path, mode] for path in setting.paths for mode in setting.modes]
-                yield design, self._numbered(design, ordered)
-
-    def _numbered(self, design: Design, rows: list[Row]) -> tuple[Row, ...]:
-        number = self._numbers[design]
-        first = number * self.study.runs
-        return tuple(row | {"run": first + k, "design": number} for k, row in enumerate(rows))
+                number = self._numbers[design]
+                first = number * self.study.runs
+                yield design, tuple(row | {"run": first + k, "design": number} for k, row in enumerate(ordered))
 
     def _jobs(self, designs: list[Design]) -> Iterator[Job]:
         """One job per design and path, or per mode if workers would be idle. Rows do not depend on it."""
@@ -193,7 +190,3 @@ class Job(NamedTuple):
 
 def _do(run: RunTask, job: Job, *watch: Any) -> Outcome:
     return run(job.setting, job.task, *watch)
-
-
-def _is_finite(value: Any) -> bool:
-    return value is not None and math.isfinite(value)
