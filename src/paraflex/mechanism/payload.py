@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from paraflex.arguments import CheckedFields, with_fields
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body, LumpedMass, RigidBody
 from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import finite, not_negative
+from paraflex.mechanism.quantities import check_numbers, finite, in_unit, not_negative
 
 
 @dataclass(frozen=True)
@@ -31,15 +31,13 @@ class Payload(CheckedFields):
 
     _table = "payload"
 
-    mass: float
-    inertia: float = 0.0
-    offset: tuple[float, float] = (0.0, 0.0)
+    mass: float = field(metadata=in_unit(not_negative, "kg"))
+    inertia: float = field(default=0.0, metadata=in_unit(not_negative, "kg m^2"))
+    offset: tuple[float, float] = field(default=(0.0, 0.0), metadata={"check": finite})
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        not_negative(self.mass, "payload.mass", "kg")
-        not_negative(self.inertia, "payload.inertia", "kg m^2")
-        finite(self.offset, "payload.offset")
+        check_numbers(self, "payload")
 
 
 def together(one: Payload | None, other: Payload) -> Payload:
