@@ -74,7 +74,11 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
         runs=runs,
         failed=failed,
         found=found,
-        history=[Step(n, np.nan if value is None else value, bool(holds)) for n, value, holds in _history(found)],
+        history=[
+            Step(step[0], np.nan if step[1] is None else step[1], bool(step[2]))
+            for step in found.get("history") or []
+            if len(step) == 3
+        ],
         notes=_notes(study, designs, differ),
     )
     return sweep_page(designs, picked, account)
@@ -163,12 +167,6 @@ def _found(file: Path) -> Mapping[str, Any]:
     found = read_json(file)
     check_listed(file, "run the same command again")
     return found
-
-
-def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool]]:
-    """Number, objective and whether limits hold, if the result has all three."""
-    steps = found.get("history") or []
-    return [tuple(step) for step in steps if len(step) == 3]
 
 
 def _searched(designs: DesignTable, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:
