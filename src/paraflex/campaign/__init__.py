@@ -14,15 +14,12 @@ from paraflex.campaign.study import (
     Progress as Progress,
     Result as Result,
     Study as Study,
+    WholeStudy as WholeStudy,
     Workers as Workers,
-    hold_for as hold_for,
     kept_in as kept_in,
     no_workers as no_workers,
 )
 from paraflex.campaign.tables import (
-    CSV as CSV,
-    RESULTS as RESULTS,
-    UNFINISHED as UNFINISHED,
     read_data as read_data,
     read_table as read_table,
     read_tables as read_tables,
@@ -30,10 +27,7 @@ from paraflex.campaign.tables import (
     tables_of as tables_of,
 )
 from paraflex.campaign.workers import (
-    DASK as DASK,
-    PROCESSES as PROCESSES,
     THREADS as THREADS,
-    WORKER_ENGINES as WORKER_ENGINES,
     Engine as Engine,
     LostCluster as LostCluster,
     LostWorker as LostWorker,

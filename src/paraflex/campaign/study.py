@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
@@ -108,6 +108,11 @@ class Result(Shown, ABC):
     @abstractmethod
     def complete(self) -> bool:
         """Whether all that the study asks for is there."""
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is anything that could be written."""
+        return True
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
@@ -219,9 +224,30 @@ class Study(ABC, Generic[R_co]):
         """
 
 
-def hold_for(folder: str | Path | None, kind: str) -> AbstractContextManager[ResultsFolder | None]:
-    """A folder held for results of a kind, as `hold_folder` does; None where none is given."""
-    return nullcontext() if folder is None else hold_folder(Path(folder), kind)
+class WholeStudy(Study[R_co]):
+    """A study whose result is written as one, as far as it came."""
+
+    # The class of its result.
+    gives: ClassVar[type[Result]]
+
+    def run(
+        self,
+        folder: str | Path | None = None,
+        *,
+        workers: Workers | None = None,
+        on_progress: OnProgress | None = None,
+    ) -> R_co:
+        """Do the study, and write what came of it into the folder, if one is given; see `Study.run`."""
+        do = self._ready(workers)
+        with nullcontext() if folder is None else hold_folder(Path(folder), self.gives.kept_as) as held:
+            result = do(on_progress)
+            if held is not None and result.begun:
+                result.save_in(held)
+        return result
+
+    @abstractmethod
+    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], R_co]:
+        """Function that does the study, after all checks that need no run."""
 
 
 def no_workers(workers: Workers | None, why: str) -> None:

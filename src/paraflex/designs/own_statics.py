@@ -21,6 +21,7 @@ class OwnStatics:
     ----------
     model : Model
     assembly : str, optional
+        By default its own start, else the assembly of its study.
     """
 
     model: Model
@@ -28,12 +29,8 @@ class OwnStatics:
 
     def found(self) -> Statics:
         """The equilibria; see `equilibria.statics` for the errors."""
-        return statics(self.model, assembly=self.assembly, warning=False)
-
-
-def own_statics(model: Model, assembly: str | None) -> OwnStatics:
-    """The statics of a model, of an assembly, its study's or its own start by default."""
-    return OwnStatics(model, assembly or (None if model.start is not None else model.study.assembly))
+        own = None if self.model.start is not None else self.model.study.assembly
+        return statics(self.model, assembly=self.assembly or own, warning=False)
 
 
 def check_of_statics(given: Collection[str]) -> None:

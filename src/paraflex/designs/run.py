@@ -14,7 +14,7 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.designs.measure import Runs, coarseness, measure
 from paraflex.designs.own_motion import OwnMotion, own_motion
-from paraflex.designs.own_statics import OwnStatics, own_statics
+from paraflex.designs.own_statics import OwnStatics
 from paraflex.designs.setting import Setting, digest, versions
 from paraflex.equilibria.result import Statics
 from paraflex.errors import InputError, NumericalError
@@ -130,7 +130,7 @@ def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
         return under_control(_planned(setting, model, task), model.acting()), options
     _compile(model.mechanism)
     if setting.statics:
-        return own_statics(model, setting.assembly), options
+        return OwnStatics(model, setting.assembly), options
     motion = own_motion(model, setting.duration, setting.samples, setting.assembly, balanced=setting.balanced)
     return motion, options
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.limits import DESIGNS, at_most
 from paraflex.mechanism.quantities import known
@@ -47,25 +47,29 @@ class Varied:
     log: bool = False
     whole: bool = False
 
-    def spread(self, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at fractions of the range, from 0 to 1."""
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Low and high, of a parameter that has a range."""
         assert self.low is not None
         assert self.high is not None
-        if self.whole:
-            return np.minimum(np.floor(self.low + fraction * (self.high - self.low + 1.0)), self.high)
-        if self.log:
-            return np.clip(np.exp(_between(math.log(self.low), math.log(self.high), fraction)), self.low, self.high)
-        return _between(self.low, self.high, fraction)
+        return self.low, self.high
 
-    def levels(self) -> NDArray[np.float64]:
+    def spread(self, fraction: Array) -> Array:
+        """Values at fractions of the range, from 0 to 1."""
+        low, high = self.ends
+        if self.whole:
+            return np.minimum(np.floor(low + fraction * (high - low + 1.0)), high)
+        if self.log:
+            return np.clip(np.exp(_between(math.log(low), math.log(high), fraction)), low, high)
+        return _between(low, high, fraction)
+
+    def levels(self) -> Array:
         """Values of a grid or list, (k,)."""
         if self.values is not None:
             return np.array(self.values, dtype=float)
-        assert self.low is not None
-        assert self.high is not None
         assert self.number is not None
         if self.whole:
-            return np.unique(np.round(np.linspace(self.low, self.high, self.number)))
+            return np.unique(np.round(np.linspace(*self.ends, self.number)))
         return self.spread(np.linspace(0.0, 1.0, self.number))
 
 
@@ -111,7 +115,7 @@ def check_varied(parameter: Varied, kind: str) -> None:
         )
 
 
-def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> NDArray[np.float64]:
+def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> Array:
     """All designs, (designs, parameters).
 
     Parameters
@@ -146,7 +150,7 @@ def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: i
     return np.stack([p.spread(column) for p, column in zip(parameters, fractions.T, strict=True)], axis=1)
 
 
-def _grid(levels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _grid(levels: Sequence[Array]) -> Array:
     """Every combination of levels, the last fastest."""
     total, columns, before = math.prod(level.size for level in levels), [], 1
     for level in levels:
@@ -156,7 +160,7 @@ def _grid(levels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.stack(columns, axis=1)
 
 
-def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np.float64]:
+def _fractions(kind: str, number: int, dimensions: int, seed: int) -> Array:
     generator = np.random.default_rng(seed)
     if kind == RANDOM:
         return generator.random((number, dimensions))
@@ -167,23 +171,18 @@ def _fractions(kind: str, number: int, dimensions: int, seed: int) -> NDArray[np
     return sequence.random_base2(max(number - 1, 0).bit_length())[:number]
 
 
-def _between(low: float, high: float, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+def _between(low: float, high: float, fraction: Array) -> Array:
     return (1.0 - fraction) * low + fraction * high
 
 
 def _check_range(parameter: Varied, where: str) -> None:
-    assert parameter.low is not None
-    assert parameter.high is not None
-    if parameter.high < parameter.low:
-        raise InputError(
-            f"below low, {parameter.low:g}", field=f"{where}.high", value=parameter.high, remedy="exchange the two"
-        )
-    if parameter.log and not parameter.low > 0.0:
-        raise InputError(
-            "a logarithmic range must be positive", field=f"{where}.low", value=parameter.low,
-            remedy='choose scale = "linear"',
-        )  # fmt: skip
-    if parameter.whole and (parameter.log or parameter.low % 1.0 or parameter.high % 1.0):
+    low, high = parameter.ends
+    if high < low:
+        raise InputError(f"below low, {low:g}", field=f"{where}.high", value=high, remedy="exchange the two")
+    if parameter.log and not low > 0.0:
+        remedy = 'choose scale = "linear"'
+        raise InputError("a logarithmic range must be positive", field=f"{where}.low", value=low, remedy=remedy)
+    if parameter.whole and (parameter.log or low % 1.0 or high % 1.0):
         raise InputError(
             "whole numbers have a linear range between two of them", field=f"{where}.whole", value=True,
             remedy="give whole low and high",

@@ -330,7 +330,6 @@ def _integration(table: SweepTable) -> dict[str, Any]:
 
 
 def _check(setting: Setting, model: Model) -> None:
-    """Check the common settings of all runs."""
     if setting.has_path:
         model.check_start()
     try:

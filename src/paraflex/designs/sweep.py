@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.campaign import (
     TRAJECTORIES,
     Campaign,
@@ -143,7 +144,7 @@ class SweepStudy(Study["SweepResult"]):
     setting: Setting
     parameters: tuple[Varied, ...]
     kind: str
-    designs: NDArray[np.float64]
+    designs: Array
     members: Members
 
     @property

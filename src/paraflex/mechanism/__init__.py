@@ -18,7 +18,6 @@ from paraflex.mechanism.bodies import (
     RigidBody as RigidBody,
     given_shapes as given_shapes,
 )
-from paraflex.mechanism.checks import check_mechanism as check_mechanism
 from paraflex.mechanism.damping import (
     Damping as Damping,
     LossFactor as LossFactor,

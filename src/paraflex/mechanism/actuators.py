@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from math import inf, pi, sqrt
 
 from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import not_negative, positive, said
+from paraflex.mechanism.quantities import not_negative, optional, positive
 
 
 class Amplifier(Enum):
@@ -69,40 +69,25 @@ class Actuator(CheckedFields):
     _table = "actuator"
 
     name: str
-    motors: tuple[str, ...] = field(default=(), metadata=said("names of motors that it is of, by default all"))
-    gear: float = field(
-        default=1.0,
-        metadata=said(
-            "the rotor's angle by the joint's, or in rad/m where the joint slides", positive,
-            "turns of the rotor by those of the joint",
-        ),
+    motors: tuple[str, ...] = optional((), "names of motors that it is of, by default all")
+    gear: float = optional(
+        1.0, "the rotor's angle by the joint's, or in rad/m where the joint slides", positive,
+        "turns of the rotor by those of the joint",
     )  # fmt: skip
-    rotor_inertia: float = field(
-        default=0.0, metadata=said("the rotor's moment of inertia in kg m^2", not_negative, "kg m^2")
+    rotor_inertia: float = optional(0.0, "the rotor's moment of inertia in kg m^2", not_negative, "kg m^2")
+    torque_constant: float | None = optional(None, "the torque constant in N m/A", positive, "N m/A")
+    back_emf: float | None = optional(
+        None, "the back-EMF constant in V s/rad, by default the torque constant", positive, "V s/rad"
     )
-    torque_constant: float | None = field(
-        default=None, metadata=said("the torque constant in N m/A", positive, "N m/A")
+    resistance: float | None = optional(None, "the resistance of the winding in ohm", positive, "ohm")
+    inductance: float = optional(0.0, "the inductance of the winding in H", not_negative, "H")
+    voltage_limit: float | None = optional(None, "the largest voltage of the amplifier in V", positive, "V")
+    current_limit: float | None = optional(None, "the largest current of the amplifier in A", positive, "A")
+    amplifier: Amplifier = optional(  # noqa: RUF009 - a field
+        Amplifier.CURRENT, 'what the amplifier imposes: "current" or "voltage"'
     )
-    back_emf: float | None = field(
-        default=None,
-        metadata=said("the back-EMF constant in V s/rad, by default the torque constant", positive, "V s/rad"),
-    )
-    resistance: float | None = field(
-        default=None, metadata=said("the resistance of the winding in ohm", positive, "ohm")
-    )
-    inductance: float = field(default=0.0, metadata=said("the inductance of the winding in H", not_negative, "H"))
-    voltage_limit: float | None = field(
-        default=None, metadata=said("the largest voltage of the amplifier in V", positive, "V")
-    )
-    current_limit: float | None = field(
-        default=None, metadata=said("the largest current of the amplifier in A", positive, "A")
-    )
-    amplifier: Amplifier = field(
-        default=Amplifier.CURRENT, metadata=said('what the amplifier imposes: "current" or "voltage"')
-    )
-    bandwidth: float | None = field(
-        default=None,
-        metadata=said("the bandwidth of the current loop in Hz, by default without lag", positive, "Hz"),
+    bandwidth: float | None = optional(
+        None, "the bandwidth of the current loop in Hz, by default without lag", positive, "Hz"
     )
 
     def __post_init__(self) -> None:

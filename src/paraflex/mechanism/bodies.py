@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import TypeVar
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.errors import InputError, as_enum
+from paraflex.errors import InputError
 from paraflex.fem import (
     AssumedShapes,
     BeamMesh,
@@ -22,10 +22,12 @@ from paraflex.fem import (
     mesh_beam,
 )
 from paraflex.mechanism.damping import Damping
-from paraflex.mechanism.modal import ModalBody
+from paraflex.mechanism.modal import DeformableBody, ModalBody
+from paraflex.mechanism.quantities import finite, in_unit, not_negative, positive
 from paraflex.mechanism.sections import Section
 
 T = TypeVar("T")
+_ROD = ' (a rod without mass between two pins is a joint of type = "distance")'
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,9 @@ class Material(CheckedFields):
 
     _table = "material"
 
-    youngs_modulus: float
-    density: float
-    strength: float | None = None
+    youngs_modulus: float = field(metadata=in_unit(positive, "Pa"))
+    density: float = field(metadata=in_unit(positive, "kg/m^3"))
+    strength: float | None = field(default=None, metadata=in_unit(positive, "Pa"))
 
 
 class Curvature(Enum):
@@ -87,8 +89,8 @@ class LumpedMass(CheckedFields):
     _table = "lump"
 
     point: str
-    mass: float
-    inertia: float = 0.0
+    mass: float = field(metadata=in_unit(not_negative, "kg"))
+    inertia: float = field(default=0.0, metadata=in_unit(not_negative, "kg m^2"))
 
 
 @dataclass(frozen=True)
@@ -111,14 +113,14 @@ class RigidBody(CheckedFields):
     _table = "body"
 
     name: str
-    mass: float
-    inertia: float
-    centre_of_mass: tuple[float, float] = (0.0, 0.0)
+    mass: float = field(metadata=in_unit(positive, f"kg{_ROD}"))
+    inertia: float = field(metadata=in_unit(positive, f"kg m^2{_ROD}"))
+    centre_of_mass: tuple[float, float] = field(default=(0.0, 0.0), metadata={"check": finite})
     points: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class FlexibleBeam(CheckedFields):
+class FlexibleBeam(DeformableBody):
     """A straight flexible beam along the x axis of its body frame, which starts at its first end.
 
     Attributes
@@ -156,8 +158,6 @@ class FlexibleBeam(CheckedFields):
         converge to the exact beam. Results see one beam.
     """
 
-    _table = "body"
-
     name: str
     length: float
     section: Section | tuple[Section, ...]
@@ -172,12 +172,6 @@ class FlexibleBeam(CheckedFields):
     flexible: bool = True
     frames: int = 1
     reduction: BodyReduction = BodyReduction.MODAL
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        kinds = {"reference": ReferenceCondition, "curvature": Curvature, "reduction": BodyReduction}
-        for name, kind in kinds.items():
-            object.__setattr__(self, name, as_enum(kind, getattr(self, name), f"body.{self.name}.{name}"))
 
     @cached_property
     def mesh(self) -> BeamMesh:
@@ -218,10 +212,6 @@ class FlexibleBeam(CheckedFields):
         materials = _per_span(self.material, mesh.n_spans, "material")
         return tuple(map(span_properties, sections, materials))
 
-    def as_rigid(self) -> FlexibleBeam:
-        """The same beam without flexibility."""
-        return replace(self, flexible=False)
-
 
 def span_properties(section: Section, material: Material) -> SpanProperties:
     """Mass and stiffness of a bar of one section and material."""
@@ -246,7 +236,7 @@ def _per_span(value: T | tuple[T, ...], count: int, field: str) -> tuple[T, ...]
 
 
 @dataclass(frozen=True)
-class AssumedModesBeam(CheckedFields):
+class AssumedModesBeam(DeformableBody):
     """A straight bar along the x axis of its body frame with shape functions of the user's choice.
 
     The functions fix the frame: they must contain no rigid motion of the bar. Its geometry is linear, whatever that of
@@ -273,8 +263,6 @@ class AssumedModesBeam(CheckedFields):
     flexible : bool
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
-
-    _table = "body"
 
     name: str
     length: float
@@ -309,10 +297,6 @@ class AssumedModesBeam(CheckedFields):
     def n_flexible(self) -> int:
         """Number of flexible coordinates before any reduction."""
         return self.shapes.count
-
-    def as_rigid(self) -> AssumedModesBeam:
-        """The same bar without flexibility."""
-        return replace(self, flexible=False)
 
 
 Body = RigidBody | FlexibleBeam | AssumedModesBeam | ModalBody

@@ -10,9 +10,9 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, BodyReduction, FlexibleBeam, RigidBody
-from paraflex.mechanism.damping import Damping, LossFactor, ModalDamping, RayleighDamping, stiffness_proportional
+from paraflex.mechanism.damping import Damping, stiffness_damping
 from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import finite, not_negative, positive
+from paraflex.mechanism.quantities import check_numbers, finite, positive
 
 T = TypeVar("T")
 
@@ -27,10 +27,7 @@ def check_body(body: Body) -> None:
     """
     field = f"body.{body.name}"
     if isinstance(body, RigidBody):
-        rod = ' (a rod without mass between two pins is a joint of type = "distance")'
-        positive(body.mass, f"{field}.mass", f"kg{rod}")
-        positive(body.inertia, f"{field}.inertia", f"kg m^2{rod}")
-        finite(body.centre_of_mass, f"{field}.centre_of_mass")
+        check_numbers(body, field)
         for name, position in body.points.items():
             finite(position, f"{field}.points.{name}")
         return
@@ -64,7 +61,6 @@ def check_body(body: Body) -> None:
 
 
 def _check_frames(beam: FlexibleBeam, field: str) -> None:
-    """Check that a beam may have so many frames."""
     if not 1 <= beam.frames <= ELEMENTS:
         raise InputError(
             "no such number of frames", field=f"{field}.frames", value=beam.frames, remedy=f"from 1 to {ELEMENTS}"
@@ -76,11 +72,7 @@ def _check_frames(beam: FlexibleBeam, field: str) -> None:
             "modes of the whole beam have no meaning in several frames", field=f"{field}.modes", value=beam.modes,
             remedy="leave modes out, or frames",
         )  # fmt: skip
-    if beam.damping is not None and stiffness_proportional(beam.damping) is None:
-        raise InputError(
-            "a beam in several frames can be damped in proportion to stiffness only", field=f"{field}.damping",
-            value=beam.damping, remedy="give damping = { stiffness = ... }, a loss factor, or none",
-        )  # fmt: skip
+    stiffness_damping(beam.damping, "a beam in several frames", f"{field}.damping")
 
 
 def check_damping(damping: Damping | None, field: str) -> None:
@@ -89,32 +81,16 @@ def check_damping(damping: Damping | None, field: str) -> None:
         raise InputError(
             "not a damping", field=field, value=damping, remedy="give RayleighDamping or ModalDamping, or leave it out"
         )
-    if isinstance(damping, RayleighDamping):
-        not_negative(damping.mass, f"{field}.mass", "1/s")
-        not_negative(damping.stiffness, f"{field}.stiffness", "s")
-    if isinstance(damping, LossFactor):
-        not_negative(damping.loss_factor, f"{field}.loss_factor", "a number, twice the damping ratio, say 0.01")
-        positive(damping.frequency, f"{field}.frequency", "Hz")
-    if isinstance(damping, ModalDamping):
-        if not damping.ratios:
-            raise InputError("no damping ratio", field=f"{field}.ratios", value=[], remedy="give one, say [0.01]")
-        for ratio in damping.ratios:
-            not_negative(ratio, f"{field}.ratios", "parts of critical damping, say 0.01")
+    if damping is not None:
+        check_numbers(damping, field)
 
 
 def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
-    """Check length, sections, materials, points and lumps of a bar."""
     positive(body.length, f"{field}.length", "m")
     for where, section in _each(body.section, f"{field}.section"):
-        positive(section.area, f"{where}.area", "m^2")
-        positive(section.second_moment, f"{where}.second_moment", "m^4")
-        if section.outer_fibre is not None:
-            positive(section.outer_fibre, f"{where}.outer_fibre", "m")
+        check_numbers(section, where)
     for where, material in _each(body.material, f"{field}.material"):
-        positive(material.youngs_modulus, f"{where}.youngs_modulus", "Pa")
-        positive(material.density, f"{where}.density", "kg/m^3")
-        if material.strength is not None:
-            positive(material.strength, f"{where}.strength", "Pa")
+        check_numbers(material, where)
     finite(body.points.values(), f"{field}.points")
     with _within(field):
         mesh_beam(body.length, body.points, body.counts if isinstance(body, FlexibleBeam) else 1)
@@ -126,8 +102,7 @@ def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
                 value=lump.point,
                 remedy=suggestion(lump.point, body.points),
             )
-        not_negative(lump.mass, f"{field}.lumps.{lump.point}.mass", "kg")
-        not_negative(lump.inertia, f"{field}.lumps.{lump.point}.inertia", "kg m^2")
+        check_numbers(lump, f"{field}.lumps.{lump.point}")
 
 
 def _each(value: T | tuple[T, ...], field: str) -> Iterator[tuple[str, T]]:
@@ -150,8 +125,7 @@ def _check_shapes(body: AssumedModesBeam, field: str) -> None:
 
 
 def _check_modal(body: ModalBody, field: str) -> None:
-    positive(body.mass, f"{field}.mass", "kg")
-    positive(body.inertia, f"{field}.inertia", "kg m^2")
+    check_numbers(body, field)
     with _within(field):
         _ = body.integrals
         for name in body.points:

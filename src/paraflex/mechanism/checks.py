@@ -167,7 +167,6 @@ def check_loads(mechanism: Members) -> None:
 
 
 def _check_points_of(mechanism: Members, group: Group, member: Any) -> None:
-    """Check the points and the numbers of a member."""
     field, points = f"{group.table}.{member.name}", points_named(member)
     if "a" in points:
         remedy = "one end must be on another body or on the ground"

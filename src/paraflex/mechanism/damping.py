@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.arrays import Array
+from paraflex.errors import InputError
+from paraflex.mechanism.quantities import in_unit, not_negative, positive
 
 
 @dataclass(frozen=True)
@@ -27,12 +29,19 @@ class RayleighDamping(CheckedFields):
 
     _table = "damping"
 
-    mass: float = 0.0
-    stiffness: float = 0.0
+    mass: float = field(default=0.0, metadata=in_unit(not_negative, "1/s"))
+    stiffness: float = field(default=0.0, metadata=in_unit(not_negative, "s"))
 
     def coefficients(self, omega: Array) -> Array:
         """Damping coefficients of the body's mass-normalised modes, as held by its joints, by frequency [1/s]."""
         return self.mass + self.stiffness * omega**2
+
+
+def _check_ratios(ratios: tuple[float, ...], field: str) -> None:
+    if not ratios:
+        raise InputError("no damping ratio", field=field, value=[], remedy="give one, say [0.01]")
+    for ratio in ratios:
+        not_negative(ratio, field, "parts of critical damping, say 0.01")
 
 
 @dataclass(frozen=True)
@@ -50,7 +59,7 @@ class ModalDamping(CheckedFields):
 
     _table = "damping"
 
-    ratios: tuple[float, ...]
+    ratios: tuple[float, ...] = field(metadata={"check": _check_ratios})
 
     def coefficients(self, omega: Array) -> Array:
         """2 ratio omega of each mode [1/s]."""
@@ -75,8 +84,8 @@ class LossFactor(CheckedFields):
 
     _table = "damping"
 
-    loss_factor: float
-    frequency: float
+    loss_factor: float = field(metadata=in_unit(not_negative, "a number, twice the damping ratio, say 0.01"))
+    frequency: float = field(metadata=in_unit(positive, "Hz"))
 
     @property
     def stiffness(self) -> float:
@@ -99,3 +108,13 @@ def stiffness_proportional(damping: Damping) -> float | None:
     if isinstance(damping, RayleighDamping) and damping.mass == 0.0:
         return damping.stiffness
     return None
+
+
+def stiffness_damping(damping: Damping | None, what: str, field: str) -> float:
+    """The coefficient beta of D = beta K [s]; an `InputError` for damping of another kind."""
+    beta = 0.0 if damping is None else stiffness_proportional(damping)
+    if beta is None:
+        problem = f"{what} can be damped in proportion to stiffness only"
+        remedy = "give damping = { stiffness = ... }, a loss factor, or none"
+        raise InputError(problem, field=field, value=damping, remedy=remedy)
+    return beta

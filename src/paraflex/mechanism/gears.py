@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from paraflex.arguments import CheckedFields
-from paraflex.mechanism.quantities import finite, not_zero, said
+from paraflex.mechanism.quantities import finite, not_zero, optional, said
 
 PHASE = said(
     "the coordinate of the second joint where that of the first is zero in rad, or m; by default as the first assembly "
@@ -95,7 +95,6 @@ class Gear(Relation):
 
 
 def _weigh(weights: Mapping[str, float], field: str) -> None:
-    """Check that no weight is zero."""
     for name, weight in weights.items():
         not_zero(weight, f"{field}.{name}", "as a weight of the joint's angle or travel, or leave the joint out")
 
@@ -118,7 +117,7 @@ class SumRelation(Relation):
 
     name: str
     weights: Mapping[str, float] = field(metadata=said("weights of joints' angles and travels", _weigh, joint="moves"))
-    phase: float | None = field(default=None, metadata=said("the sum, by default that of the first assembly", finite))
+    phase: float | None = optional(None, "the sum, by default that of the first assembly", finite)
 
     @property
     def shares(self) -> dict[str, float]:

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError
 from paraflex.mechanism.laws import AngleLaw, check_motion
-from paraflex.mechanism.quantities import AT_JOINT, JointThat, finite, positive, said
+from paraflex.mechanism.quantities import AT_JOINT, JointThat, finite, optional, positive, said
 
 GROUND = "ground"
 
@@ -226,9 +226,8 @@ class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", fol
         What a run does where point b comes to an end of the beam; a value is taken for the member.
     """
 
-    at_end: AtEnd = field(
-        default=AtEnd.ERROR,
-        metadata=said('where a sliding point comes to the end of its beam: "error", "stop", "warn" or "ignore"'),
+    at_end: AtEnd = optional(  # noqa: RUF009 - a field
+        AtEnd.ERROR, 'where a sliding point comes to the end of its beam: "error", "stop", "warn" or "ignore"'
     )
 
 

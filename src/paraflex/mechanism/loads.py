@@ -12,7 +12,7 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.joints import PointRef
 from paraflex.mechanism.laws import AngleLaw, marks
-from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, positive, said
+from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, optional, positive, said
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class TorsionalSpring(CheckedFields):
     name: str
     joint: str = field(metadata=AT_JOINT)
     stiffness: float = field(metadata=said("the stiffness in N m/rad", positive, "N m/rad, or N/m"))
-    rest: float = field(default=0.0, metadata=said("the joint's angle at which the spring is free in rad", finite))
+    rest: float = optional(0.0, "the joint's angle at which the spring is free in rad", finite)
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,8 @@ class LinearSpring(CheckedFields):
     a: PointRef
     b: PointRef
     stiffness: float = field(metadata=said("the stiffness in N/m", not_negative, "N/m"))
-    length: float = field(default=0.0, metadata=said("the free length in m", not_negative, "m"))
-    damping: float = field(default=0.0, metadata=said("the damping in N s/m", not_negative, "N s/m"))
+    length: float = optional(0.0, "the free length in m", not_negative, "m")
+    damping: float = optional(0.0, "the damping in N s/m", not_negative, "N s/m")
 
 
 InTime = float | AngleLaw

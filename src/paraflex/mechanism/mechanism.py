@@ -79,7 +79,6 @@ class Mechanism(Members, Shown):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "geometry", as_enum(Geometry, self.geometry, "geometry"))
         check_mechanism(self)
         object.__setattr__(self, "bodies", with_meshes(self))
         # The checks have looked bodies up by name.

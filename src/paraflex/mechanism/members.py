@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import Self, TypeVar
+from typing import Self
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError
@@ -28,8 +28,6 @@ from paraflex.mechanism.loads import (
 from paraflex.mechanism.payload import Payload
 from paraflex.mechanism.quantities import joints_named, known
 from paraflex.mechanism.sensors import SENSOR_KINDS, Sensor
-
-T = TypeVar("T")
 
 TASK_COORDINATES = ("x", "y", "angle")
 
@@ -165,15 +163,13 @@ class Members(CheckedFields):
 
     def body(self, name: str) -> Body:
         """The body of that name; an `InputError` if there is none."""
-        return self._by_name("body", name, self._bodies_by_name)
+        known(name, self._bodies_by_name, "body", "body")
+        return self._bodies_by_name[name]
 
     def joint(self, name: str) -> Joint:
         """The joint of that name; an `InputError` if there is none."""
-        return self._by_name("joint", name, self._joints_by_name)
-
-    def _by_name(self, kind: str, name: str, members: Mapping[str, T]) -> T:
-        known(name, members, kind, kind)
-        return members[name]
+        known(name, self._joints_by_name, "joint", "joint")
+        return self._joints_by_name[name]
 
     @cached_property
     def _bodies_by_name(self) -> dict[str, Body]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
 from paraflex.fem import ShapeIntegrals
 from paraflex.mechanism.damping import Damping
+from paraflex.mechanism.quantities import in_unit, positive
 
 Row = Sequence[float]
 Matrix = Sequence[Sequence[float]]
@@ -48,8 +49,18 @@ class ModalPoint(CheckedFields):
         _freeze(self, self._own)
 
 
+class DeformableBody(CheckedFields):
+    """A body with flexible coordinates, which may be held at zero: its field `flexible` says so."""
+
+    _table = "body"
+
+    def as_rigid(self) -> Self:
+        """The same body without flexibility."""
+        return replace(self, flexible=False)  # type: ignore[type-var]
+
+
 @dataclass(frozen=True)
-class ModalBody(CheckedFields):
+class ModalBody(DeformableBody):
     """A flexible body given by its constants, with a displacement linear in nf flexible coordinates u of any kind.
 
     The symbols are those of the theory, with s0 the place of a mass element dm in the undeformed body and N its
@@ -88,13 +99,11 @@ class ModalBody(CheckedFields):
         False holds all flexible coordinates at zero: the same inertia, rigid.
     """
 
-    _table = "body"
-
     _own = ("first_moment", "mass_matrix", "stiffness", "S2", "I1", "G1", "G2", "I2")
     name: str
-    mass: float
+    mass: float = field(metadata=in_unit(positive, "kg"))
     first_moment: Row
-    inertia: float
+    inertia: float = field(metadata=in_unit(positive, "kg m^2"))
     mass_matrix: Matrix
     stiffness: Matrix
     S2: Matrix
@@ -148,10 +157,6 @@ class ModalBody(CheckedFields):
         )
         _check_definite(integrals)
         return integrals
-
-    def as_rigid(self) -> ModalBody:
-        """The same body without flexibility."""
-        return replace(self, flexible=False)
 
     def point(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position (2,), shape (2, nf) and slope (nf,) of a named point.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from paraflex.arguments import CheckedFields, with_fields
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body, LumpedMass, RigidBody
 from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import finite, not_negative
+from paraflex.mechanism.quantities import check_numbers, finite, in_unit, not_negative
 
 
 @dataclass(frozen=True)
@@ -29,26 +31,20 @@ class Payload(CheckedFields):
 
     _table = "payload"
 
-    mass: float
-    inertia: float = 0.0
-    offset: tuple[float, float] = (0.0, 0.0)
+    mass: float = field(metadata=in_unit(not_negative, "kg"))
+    inertia: float = field(default=0.0, metadata=in_unit(not_negative, "kg m^2"))
+    offset: tuple[float, float] = field(default=(0.0, 0.0), metadata={"check": finite})
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        not_negative(self.mass, "payload.mass", "kg")
-        not_negative(self.inertia, "payload.inertia", "kg m^2")
-        finite(self.offset, "payload.offset")
+        check_numbers(self, "payload")
 
 
 def together(one: Payload | None, other: Payload) -> Payload:
     """Two payloads as one, about their common centre of mass."""
     if one is None or not one.mass + other.mass:
         return other
-    masses = np.array([one.mass, other.mass])
-    places = np.array([one.offset, other.offset])
-    centre = masses @ places / masses.sum()
-    inertia = one.inertia + other.inertia + masses @ np.sum((places - centre) ** 2, axis=1)
-    return Payload(float(masses.sum()), float(inertia), (float(centre[0]), float(centre[1])))
+    return Payload(*_as_one((one.mass, other.mass), (one.inertia, other.inertia), (one.offset, other.offset)))
 
 
 def loaded(body: Body, point: str, payload: Payload) -> Body:
@@ -82,7 +78,9 @@ def with_lump(
         From the point to that centre in the body frame, of a rigid body [m].
     """
     if isinstance(body, RigidBody):
-        return _merged(body, np.add(body.points[point], offset), mass, inertia)
+        places = (body.centre_of_mass, np.add(body.points[point], offset))
+        mass, inertia, centre = _as_one((body.mass, mass), (body.inertia, inertia), places)
+        return with_fields(body, mass=mass, inertia=inertia, centre_of_mass=centre)
     if isinstance(body, ModalBody):
         return _with_point_mass(body, point, mass, inertia)
     there = [lump for lump in body.lumps if lump.point == point]
@@ -91,15 +89,12 @@ def with_lump(
     return with_fields(body, lumps=(*others, with_fields(LumpedMass(point, 0.0), mass=mass, inertia=inertia)))
 
 
-def _merged(body: RigidBody, place: np.ndarray, mass: float, inertia: float) -> RigidBody:
-    """Both as one, about their common centre of mass: Steiner's theorem."""
-    masses = np.array([body.mass, mass])
-    places = np.array([body.centre_of_mass, place])
-    centre = masses @ places / masses.sum()
-    whole = body.inertia + inertia + masses @ np.sum((places - centre) ** 2, axis=1)
-    return with_fields(
-        body, mass=masses.sum().item(), inertia=np.array(whole).item(), centre_of_mass=tuple(centre.tolist())
-    )
+def _as_one(masses: Sequence[float], inertias: Sequence[float], places: Sequence[Any]) -> tuple[Any, Any, Any]:
+    """Mass, moment of inertia and centre of mass of two bodies as one: Steiner's theorem."""
+    m, at = np.array(masses), np.array(places)
+    centre = m @ at / m.sum()
+    inertia = np.array(sum(inertias) + m @ np.sum((at - centre) ** 2, axis=1))
+    return m.sum().item(), inertia.item(), tuple(centre.tolist())
 
 
 def _with_point_mass(body: ModalBody, point: str, mass: float, inertia: float) -> ModalBody:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import field, fields
 from functools import partial
 from typing import Any, Literal, cast
 
@@ -66,6 +66,16 @@ def said(
     """
     checked = partial(check, unit=unit) if check is not None and unit else check
     return {"description": description, "check": checked, "joint": joint}
+
+
+def optional(default: Any, description: str, check: Callable[..., None] | None = None, unit: str = "") -> Any:
+    """The field of a member that need not be given; see `said`."""
+    return field(default=default, metadata=said(description, check, unit))
+
+
+def in_unit(check: Callable[..., None], unit: str) -> dict[str, Any]:
+    """Metadata of a number that a check asks for in a unit."""
+    return {"check": partial(check, unit=unit)}
 
 
 AT_JOINT = said("the name of a joint", joint="moves")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import positive
+from paraflex.mechanism.quantities import in_unit, positive
 
 
 @given_as("a shape", "Rectangle(...), Round(...) or Tube(...)")
@@ -116,23 +116,17 @@ class Round(Shape):
 
     @property
     def outer_fibre(self) -> float:
-        """The radius [m]."""
+        """The outer radius [m]."""
         return self.diameter / 2.0
 
 
 @dataclass(frozen=True)
-class Tube(Shape):
+class Tube(Round):
     """A circular tube of an outer diameter and a wall [m]."""
 
     kind: ClassVar[str] = "tube"
 
-    diameter: float
     wall: float
-
-    @property
-    def smallest(self) -> float:
-        """The diameter [m]."""
-        return self.diameter
 
     @property
     def area(self) -> float:
@@ -143,11 +137,6 @@ class Tube(Shape):
     def second_moment(self) -> float:
         """Of area, about a diameter: the area times the sum of both squared diameters over 16 [m^4]."""
         return self.area * (self.diameter**2 + (self.diameter - 2.0 * self.wall) ** 2) / 16.0
-
-    @property
-    def outer_fibre(self) -> float:
-        """The outer radius [m]."""
-        return self.diameter / 2.0
 
 
 # Kinds of shapes by their names in files.
@@ -173,10 +162,10 @@ class Section(CheckedFields):
 
     _table = "section"
 
-    area: float
-    second_moment: float
+    area: float = field(metadata=in_unit(positive, "m^2"))
+    second_moment: float = field(metadata=in_unit(positive, "m^4"))
     shape: Shape | None = None
-    outer_fibre: float | None = None
+    outer_fibre: float | None = field(default=None, metadata=in_unit(positive, "m"))
 
     @classmethod
     def of(cls, shape: Shape) -> Section:

@@ -13,7 +13,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.fem import SpanProperties
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.cut import Cut
-from paraflex.mechanism.damping import stiffness_proportional
+from paraflex.mechanism.damping import stiffness_damping
 from paraflex.mechanism.groups import groups_of
 from paraflex.mechanism.joints import Joint, PointRef, RevoluteJoint, points_named
 from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
@@ -97,7 +97,8 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
             carriers[body.name] = (body.name, 0.0)
             continue
         assert isinstance(body, FlexibleBeam)
-        n, lag = counts[body.name], _stiffness_damping(body)
+        # The only damping of hinges.
+        n, lag = counts[body.name], stiffness_damping(body.damping, "finite segments", f"body.{body.name}.damping")
         length = body.length / n
         names = [f"{body.name}_{i + 1}" for i in range(n)]
         owners = {point: min(int(x / length + 1e-9), n - 1) for point, x in body.points.items()}
@@ -202,21 +203,6 @@ def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, in
                 remedy="give one for every beam",
             )
     return counts
-
-
-def _stiffness_damping(beam: FlexibleBeam) -> float:
-    """Coefficient of stiffness-proportional damping [s], the only damping of hinges."""
-    if beam.damping is None:
-        return 0.0
-    coefficient = stiffness_proportional(beam.damping)
-    if coefficient is not None:
-        return coefficient
-    raise InputError(
-        "finite segments can be damped in proportion to stiffness only",
-        field=f"body.{beam.name}.damping",
-        value=beam.damping,
-        remedy="give damping = { stiffness = ... }, a loss factor, or none",
-    )
 
 
 def _pieces(beam: FlexibleBeam, start: float, end: float) -> list[tuple[float, float, SpanProperties]]:

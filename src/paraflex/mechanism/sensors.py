@@ -11,33 +11,23 @@ from paraflex.arguments import CheckedFields, given_as
 from paraflex.errors import InputError
 from paraflex.limits import of_size
 from paraflex.mechanism.joints import GROUND, PointRef
-from paraflex.mechanism.quantities import AT_JOINT, finite, said
+from paraflex.mechanism.quantities import AT_JOINT, finite, optional, said
 
 # Kinds of sensors by their names in files.
 SENSOR_KINDS: dict[str, type[Sensor]] = {}
 
 
-def _direction(*words: str) -> Callable[[Any, str], None]:
-    """Check of an axis: one of some words, or an angle [rad]."""
+def _axis(*words: str, angle: bool = True) -> Callable[[Any, str], None]:
+    """Check of an axis: one of some words, or an angle [rad] if it may be one."""
+    quoted = ", ".join(f'"{word}"' for word in words)
+    remedy = f"give {quoted} or an angle in rad" if angle else f"give one of {quoted}"
 
     def check(value: Any, field: str) -> None:
-        if isinstance(value, str) or getattr(value, "ndim", 0) or not hasattr(value, "__float__"):
-            if not (isinstance(value, str) and value in words):
-                quoted = ", ".join(f'"{word}"' for word in words)
-                raise InputError("not an axis", field=field, value=value, remedy=f"give {quoted} or an angle in rad")
+        if isinstance(value, str) and value in words:
             return
-        of_size(value, field)
-
-    return check
-
-
-def _words(*words: str) -> Callable[[Any, str], None]:
-    """Check of a field that is one of some words."""
-
-    def check(value: Any, field: str) -> None:
-        if value not in words:
-            quoted = ", ".join(f'"{word}"' for word in words)
-            raise InputError("not an axis", field=field, value=value, remedy=f"give one of {quoted}")
+        if not (angle and hasattr(value, "__float__")) or getattr(value, "ndim", 0):
+            raise InputError("not an axis", field=field, value=value, remedy=remedy)
+        of_size(value, field)  # pyright: ignore[reportArgumentType]
 
     return check
 
@@ -47,51 +37,47 @@ def _words(*words: str) -> Callable[[Any, str], None]:
 class Sensor(CheckedFields):
     """A quantity of a mechanism in motion, measured without error or delay: the base of all kinds.
 
-    A subclass is a kind, `class Encoder(Sensor, kind="encoder")`; files, results and linear models know it by that.
+    A subclass is a kind, `class Encoder(Sensor, kind="encoder", units=("rad", "m"))`; files, results and linear models
+    know it by that.
 
     Attributes
     ----------
     name : str
     kind : str
         The name in files.
+    units : tuple of str
+        SI unit of its readings; of a sensor at a joint that of an angle, then that of a travel.
     """
 
     _table = "sensor"
 
     name: str
     kind: ClassVar[str]
+    units: ClassVar[tuple[str, ...]]
 
-    def __init_subclass__(cls, *, kind: str = "") -> None:
+    def __init_subclass__(cls, *, kind: str = "", units: tuple[str, ...] = ()) -> None:
         super().__init_subclass__()
         if kind:
-            cls.kind = kind
+            cls.kind, cls.units = kind, units
             SENSOR_KINDS[kind] = cls
 
     def unit(self, slides: bool) -> str:
         """The SI unit of its readings; `slides` says whether its joint has a travel."""
-        raise NotImplementedError
+        return self.units[-1 if slides else 0]
 
 
 @dataclass(frozen=True)
-class Encoder(Sensor, kind="encoder"):
+class Encoder(Sensor, kind="encoder", units=("rad", "m")):
     """Angle [rad] or travel [m] of a joint: of its second body against its first, slopes of beams included."""
 
     joint: str = field(metadata=AT_JOINT)
 
-    def unit(self, slides: bool) -> str:
-        """See `Sensor.unit`."""
-        return "m" if slides else "rad"
-
 
 @dataclass(frozen=True)
-class Tachometer(Sensor, kind="tachometer"):
+class Tachometer(Sensor, kind="tachometer", units=("rad/s", "m/s")):
     """Rate of a joint's angle [rad/s] or travel [m/s], slopes of beams included."""
 
     joint: str = field(metadata=AT_JOINT)
-
-    def unit(self, slides: bool) -> str:
-        """See `Sensor.unit`."""
-        return "m/s" if slides else "rad/s"
 
 
 @dataclass(frozen=True)
@@ -111,9 +97,9 @@ class PointSensor(Sensor):
 
     point: PointRef = field(metadata=said('"body.point"'))
     axis: Literal["x", "y"] | float = field(
-        metadata=said('"x", "y" or the angle of its axis against the x axis in rad', _direction("x", "y"))
+        metadata=said('"x", "y" or the angle of its axis against the x axis in rad', _axis("x", "y"))
     )
-    body: str = field(default=GROUND, metadata=said("the body in whose frame the axis is fixed, by default the ground"))
+    body: str = optional(GROUND, "the body in whose frame the axis is fixed, by default the ground")
 
     @property
     def direction(self) -> tuple[float, float]:
@@ -122,38 +108,26 @@ class PointSensor(Sensor):
 
 
 @dataclass(frozen=True)
-class PositionSensor(PointSensor, kind="position"):
+class PositionSensor(PointSensor, kind="position", units=("m",)):
     """Place of a point along an axis, from the origin of the frame that the axis is fixed in [m]."""
 
-    def unit(self, slides: bool) -> str:
-        """See `Sensor.unit`."""
-        return "m"
-
 
 @dataclass(frozen=True)
-class VelocitySensor(PointSensor, kind="velocity"):
+class VelocitySensor(PointSensor, kind="velocity", units=("m/s",)):
     """Component of a point's absolute velocity along an axis [m/s]."""
 
-    def unit(self, slides: bool) -> str:
-        """See `Sensor.unit`."""
-        return "m/s"
-
 
 @dataclass(frozen=True)
-class AccelerationSensor(PointSensor, kind="acceleration"):
+class AccelerationSensor(PointSensor, kind="acceleration", units=("m/s^2",)):
     """Component of a point's absolute acceleration along an axis [m/s^2].
 
     An accelerometer fixed to a link has that link as its `body`. It also senses weight, which is not in this reading:
     it shows the acceleration less that of free fall.
     """
 
-    def unit(self, slides: bool) -> str:
-        """See `Sensor.unit`."""
-        return "m/s^2"
-
 
 @dataclass(frozen=True)
-class StrainGauge(Sensor, kind="strain"):
+class StrainGauge(Sensor, kind="strain", units=("1",)):
     """Axial strain of a beam, positive in tension: N / E A - distance M / E I, with M = E I w''.
 
     Attributes
@@ -169,22 +143,16 @@ class StrainGauge(Sensor, kind="strain"):
 
     body: str = field(metadata=said("the name of a beam"))
     at: float | str = field(metadata=said("a named point of the beam, or the distance from its first end in m"))
-    distance: float | None = field(
-        default=None,
-        metadata=said(
-            "the distance from the neutral axis in m, positive on the side of the y axis, by default that of the "
-            "outermost fibre",
-            finite,
-        ),
+    distance: float | None = optional(
+        None,
+        "the distance from the neutral axis in m, positive on the side of the y axis, by default that of the "
+        "outermost fibre",
+        finite,
     )
 
     def place(self, points: Mapping[str, float]) -> float:
         """Distance from the first end [m] of a beam with these points."""
         return points[self.at] if isinstance(self.at, str) else self.at
-
-    def unit(self, slides: bool) -> str:
-        """See `Sensor.unit`."""
-        return "1"
 
 
 @dataclass(frozen=True)
@@ -206,7 +174,7 @@ class JointForceSensor(Sensor, kind="joint_force"):
     axis: Literal["x", "y", "along", "moment"] | float = field(
         metadata=said(
             '"x", "y", "along", "moment" or the angle of its axis in the ground frame in rad',
-            _direction("x", "y", "along", "moment"),
+            _axis("x", "y", "along", "moment"),
         )
     )
 
@@ -227,7 +195,9 @@ class DeflectionSensor(Sensor, kind="deflection"):
     """
 
     point: PointRef = field(metadata=said('"body.point"'))
-    axis: Literal["x", "y", "angle"] = field(metadata=said('"x", "y" or "angle"', _words("x", "y", "angle")))
+    axis: Literal["x", "y", "angle"] = field(
+        metadata=said('"x", "y" or "angle"', _axis("x", "y", "angle", angle=False))
+    )
 
     def unit(self, slides: bool) -> str:
         """See `Sensor.unit`."""

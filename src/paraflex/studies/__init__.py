@@ -8,7 +8,6 @@ from paraflex.designs.sweep import (
     sweep as sweep,
 )
 from paraflex.studies.agreement import (
-    ModelRuns as ModelRuns,
     Refinement as Refinement,
     Verification as Verification,
     reference_model as reference_model,
@@ -26,11 +25,9 @@ from paraflex.studies.comparison import (
 )
 from paraflex.studies.law_comparison import LawComparison as LawComparison
 from paraflex.studies.laws import LawStudy as LawStudy, compare_laws as compare_laws
-from paraflex.studies.optimisation.confidence import Confidence as Confidence
 from paraflex.studies.optimisation.identify import (
     IdentificationResult as IdentificationResult,
     IdentificationStudy as IdentificationStudy,
-    Reached as Reached,
     identify as identify,
     load_identification as load_identification,
 )
@@ -47,8 +44,7 @@ from paraflex.studies.optimisation.optimise import (
     load_optimisation as load_optimisation,
     optimise as optimise,
 )
-from paraflex.studies.optimisation.result import SearchResult as SearchResult
-from paraflex.studies.optimisation.study import DesignStudy as DesignStudy, Search as Search
+from paraflex.studies.optimisation.study import DesignStudy as DesignStudy
 from paraflex.studies.sensitivities.study import (
     Sensitivities as Sensitivities,
     SensitivityStudy as SensitivityStudy,

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.campaign import Result
 from paraflex.errors import as_enum
 from paraflex.findings import Finding, Verdict
@@ -220,5 +220,5 @@ def _distance(a: Record, b: Record) -> float:
     return float(_gaps(a.end_effector.position, b.end_effector.position).max())
 
 
-def _gaps(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _gaps(a: Array, b: Array) -> Array:
     return np.linalg.norm(a - b, axis=1)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, given_as
+from paraflex.arrays import Array
 from paraflex.dynamics import State, System, build_system
 from paraflex.dynamics.points import point_motion
 from paraflex.errors import IntegrationError
@@ -48,7 +48,7 @@ class Case:
     points: tuple[PointRef, ...]
     solve: Callable[[IntegrationOptions, Progress | None], Solution]
 
-    def places(self, solution: Solution) -> NDArray[np.float64]:
+    def places(self, solution: Solution) -> Array:
         """Positions (k, points, 2) at the samples [m]."""
         q, v, a = solution.q, solution.v, solution.a
         if not self.points:

@@ -6,17 +6,15 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, checked_arguments
-from paraflex.campaign import OnProgress, Progress, Study, Workers, hold_for, no_workers
+from paraflex.arrays import Array
+from paraflex.campaign import OnProgress, Progress, WholeStudy, Workers, no_workers
 from paraflex.errors import InputError, IntegrationError, NumericalError
-from paraflex.folders import COMPARISON
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.methods import Family, Method, find_method
 from paraflex.studies.cases import Case
@@ -81,8 +79,10 @@ class _TooSlowError(Exception):
 
 
 @dataclass(frozen=True)
-class ComparisonStudy(Study[MethodComparison], CheckedFields):
+class ComparisonStudy(WholeStudy[MethodComparison], CheckedFields):
     """One motion by every method at every tolerance: time, work and error of each.
+
+    Runs come one after the other, so that their wall times can be compared: workers have no part in it.
 
     Attributes
     ----------
@@ -95,37 +95,24 @@ class ComparisonStudy(Study[MethodComparison], CheckedFields):
         The defaults where None.
     parameters : dict or None
         Kept as provenance.
+
+    Raises
+    ------
+    InputError
+        From `run`: an unknown method, or one with parameters of its own, before anything runs.
+    IntegrationError
+        From `run`: no converged run to compare with.
     """
 
+    gives = MethodComparison
     case: Case
     methods: Sequence[Method | str] | None = None
     options: ComparisonOptions | None = None
     parameters: dict[str, Any] | None = None
 
-    def run(
-        self,
-        folder: str | Path | None = None,
-        *,
-        workers: Workers | None = None,
-        on_progress: OnProgress | None = None,
-    ) -> MethodComparison:
-        """Run all methods; see `Study.run`.
-
-        Runs come one after the other, so that their wall times can be compared: workers have no part in it.
-
-        Raises
-        ------
-        InputError
-            An unknown method, or one with parameters of its own, before anything runs.
-        IntegrationError
-            No converged run to compare with.
-        """
+    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], MethodComparison]:
         no_workers(workers, "runs come one after the other")
-        with hold_for(folder, COMPARISON) as held:
-            result = self._run(on_progress)
-            if held is not None and result.measurements:
-                result.save_in(held)
-        return result
+        return self._run
 
     def _run(self, on_progress: OnProgress | None) -> MethodComparison:
         case, options = self.case, self.options or ComparisonOptions()
@@ -195,10 +182,10 @@ class _Setting:
     def options(self, method: str) -> IntegrationOptions:
         return IntegrationOptions(method=method, tolerance=self.tolerance, step=self.step)
 
-    def row(self, method: str, status: str, reason: str, warned: tuple[str, ...] = ()) -> Measurement:
-        """A row of a run without results."""
+    def row(self, method: str, status: str = "complete", reason: str = "", warned: Sequence[str] = ()) -> Measurement:
+        """A row of a run, without results."""
         tolerance = self.tolerance if self.step is None else None
-        return Measurement(method, tolerance, self.step, status, reason, warnings=warned)
+        return Measurement(method, tolerance, self.step, status, reason, warnings=tuple(warned))
 
     def __str__(self) -> str:
         return f"tolerance {self.tolerance:g} m" if self.step is None else f"step {self.step:g} s"
@@ -216,7 +203,7 @@ def _measurements(
     case: Case,
     method: Method,
     plan: Sequence[_Setting],
-    places: NDArray[np.float64],
+    places: Array,
     options: ComparisonOptions,
     tell: Callable[[str], None],
 ) -> Iterator[Measurement]:
@@ -251,9 +238,7 @@ def _warm_up(case: Case, options: IntegrationOptions) -> None:
             return
 
 
-def _measure(
-    case: Case, method: str, setting: _Setting, places: NDArray[np.float64], options: ComparisonOptions
-) -> Measurement:
+def _measure(case: Case, method: str, setting: _Setting, places: Array, options: ComparisonOptions) -> Measurement:
     """A run, repeated if it is quick."""
     chosen, solutions = setting.options(method), list[Solution]()
     with warnings.catch_warnings(record=True) as caught:
@@ -268,15 +253,9 @@ def _measure(
         except NumericalError as error:
             return setting.row(method, "failed", str(error), _texts(caught))
     best = min(solutions, key=lambda solution: solution.wall_time)
-    return Measurement(
-        method=method,
-        tolerance=setting.tolerance if setting.step is None else None,
-        step=setting.step,
-        error=_distance(case.places(best), places),
-        repetitions=len(solutions),
-        warnings=_texts(caught),
-        **{name: getattr(best, name) for name in _RUN_COUNTS},
-    )
+    counts = {name: getattr(best, name) for name in _RUN_COUNTS}
+    error = _distance(case.places(best), places)
+    return replace(setting.row(method, warned=_texts(caught)), error=error, repetitions=len(solutions), **counts)
 
 
 def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
@@ -303,7 +282,7 @@ def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
     return solution
 
 
-def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArray[np.float64]]:
+def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, Array]:
     """Two tight runs, by the two methods of highest order that succeed; errors are distances from the first."""
     ours = sorted((x for x in METHODS.values() if x.family is Family.ESDIRK), key=lambda x: -x.order)
     tolerance = options.tightest / _FINER
@@ -336,7 +315,7 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, NDArr
     return Reference(method.name, own, other.name, loose, uncertainty, solution.wall_time), places
 
 
-def _distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def _distance(one: Array, other: Array) -> float:
     """Largest distance over points and samples [m]."""
     return float(np.max(np.linalg.norm(one - other, axis=-1)))
 

@@ -134,6 +134,11 @@ class MethodComparison(Result):
         return not self.interrupted
 
     @property
+    def begun(self) -> bool:
+        """Whether any run was measured."""
+        return bool(self.measurements)
+
+    @property
     def data(self) -> xr.Dataset:
         """Every run, (run,): method, tolerance or step, status, error, time and work; NaN for missing values."""
         columns = {

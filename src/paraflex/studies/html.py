@@ -52,7 +52,8 @@ def study_html(result: StudyResult) -> str:
     peaks = [f"peak {motor} [{unit}]" for motor in motors]
     heads = ("mode", "status", f"RMS tracking error {SPAN_WORDS[span]} [mm]", "after the motion [mm]", "drift [mm/s]",
              "residual vibration [mm]", *peaks, "steps", "Newton iterations", "wall time [s]")  # fmt: skip
-    title = f"{found['mechanism']}, {_modes_of(len(rows))}" + (", interrupted" if result.interrupted else "")
+    title = f"{found['mechanism']}, {len(rows)} mode{'' if len(rows) == 1 else 's'}"
+    title += ", interrupted" if result.interrupted else ""
     holds = validity_line({name: mode.get("validity") for name, mode in found["modes"].items()})
     why += [sentence(holds)] if holds else []
     return page(title, *map(sentence, doubt_lines(verdict_of(result.data))), table(heads, rows), *why)
@@ -212,10 +213,6 @@ def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:
 
 def _state(finished: bool, interrupted: bool) -> str:
     return "interrupted" if interrupted else "finished" if finished else "not finished"
-
-
-def _modes_of(number: int) -> str:
-    return f"{number} mode{'' if number == 1 else 's'}"
 
 
 def _given(deviation: float | None, reason: str) -> float | str:

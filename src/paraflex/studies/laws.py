@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
-from paraflex.campaign import THREADS, LostWorker, OnProgress, Progress, Row, Study, Workers, hold_for, outcomes
+from paraflex.campaign import THREADS, LostWorker, OnProgress, Progress, Row, WholeStudy, Workers, outcomes
 from paraflex.control.chain import SampledController
 from paraflex.control.described import NONE, ControllerDescription
 from paraflex.designs.measure import members_of, metrics_of
 from paraflex.designs.run import measured_mode, under_control
 from paraflex.errors import InputError
 from paraflex.files import Model, load
-from paraflex.folders import LAW_COMPARISON
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.reduction import reduced_mechanism
@@ -40,8 +40,10 @@ Cell = tuple[str, str]
 
 
 @dataclass(frozen=True)
-class LawStudy(Study[LawComparison], CheckedFields):
+class LawStudy(WholeStudy[LawComparison], CheckedFields):
     """Control laws along one path or several, each in several actuation modes.
+
+    A law that cannot run in a mode is marked there with its reason. Progress is that of runs. Workers are threads.
 
     Attributes
     ----------
@@ -58,9 +60,15 @@ class LawStudy(Study[LawComparison], CheckedFields):
         Whether errors are those of the "motion" or of the "whole" run, where no metrics are named.
     parameters : dict or None
         Kept as provenance.
+
+    Raises
+    ------
+    InputError
+        From `run`: a mode that is none of the mechanism's, or workers that are no threads, before anything runs.
     """
 
     _own = ("laws",)
+    gives = LawComparison
     tasks: Mapping[str, TrackingTask]
     laws: Mapping[str, Sequence[Any]]
     modes: Sequence[str | ActuationMode]
@@ -90,31 +98,12 @@ class LawStudy(Study[LawComparison], CheckedFields):
             law if len(self.tasks) == 1 else f"{law}, {path}": (law, path) for law in self.laws for path in self.tasks
         }
 
-    def run(
-        self,
-        folder: str | Path | None = None,
-        *,
-        workers: Workers | None = None,
-        on_progress: OnProgress | None = None,
-    ) -> LawComparison:
-        """Run every law in every mode; one that cannot run there is marked with its reason. See `Study.run`.
-
-        Progress is that of runs. Workers are threads.
-
-        Raises
-        ------
-        InputError
-            A mode that is none of the mechanism's, or workers that are no threads, before anything runs.
-        """
+    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], LawComparison]:
         workers = workers or Workers()
         if workers.engine != THREADS:
             raise InputError("laws run in threads", field="workers", value=workers.engine, remedy="leave it out")
         modes = list(dict.fromkeys(self._task.mode(mode).name for mode in self.modes))
-        with hold_for(folder, LAW_COMPARISON) as held:
-            result = self._run(modes, workers, on_progress)
-            if held is not None and result.begun:
-                result.save_in(held)
-        return result
+        return partial(self._run, modes, workers)
 
     def _run(self, modes: Sequence[str], workers: Workers, on_progress: OnProgress | None) -> LawComparison:
         cells = [(row, mode) for row in self.rows for mode in modes]

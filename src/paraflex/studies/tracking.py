@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 from typing import Any, Protocol
 
 import xarray as xr
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
-from paraflex.campaign import THREADS, OnProgress, Progress, Result, Study, Workers, hold_for
+from paraflex.campaign import THREADS, OnProgress, Progress, Result, WholeStudy, Workers
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.errors import ControllerError, InputError, IntegrationError, NumericalError
 from paraflex.findings import Finding
@@ -65,6 +65,11 @@ class StudyResult(Result):
         return self.dataset
 
     @property
+    def begun(self) -> bool:
+        """Whether any mode ran."""
+        return self.data is not None
+
+    @property
     def complete(self) -> bool:
         """Whether every mode ran to its end, or to an event."""
         return (
@@ -77,8 +82,11 @@ class StudyResult(Result):
 
 
 @dataclass(frozen=True)
-class TrackingStudy(Study[StudyResult], CheckedFields):
+class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     """One path in several actuation modes.
+
+    A mode that fails is reported and the others go on. Progress is that of each mode in seconds of its motion. Workers
+    are threads.
 
     Attributes
     ----------
@@ -102,9 +110,15 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
         how far off the reduced run is stands in the results.
     controllers : sequence of ControllerDescription
         They act in every mode beside its planned torques.
+
+    Raises
+    ------
+    InputError
+        From `run`: a mode that is none of the mechanism's, or workers that are no threads, before anything runs.
     """
 
     _own = ("method",)
+    gives = StudyResult
     task: TrackingTask
     modes: Sequence[str | ActuationMode]
     options: IntegrationOptions | None = None
@@ -116,22 +130,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
     full: TrackingTask | None = None
     controllers: Sequence[ControllerDescription] = ()
 
-    def run(
-        self,
-        folder: str | Path | None = None,
-        *,
-        workers: Workers | None = None,
-        on_progress: OnProgress | None = None,
-    ) -> StudyResult:
-        """Simulate every mode; one that fails is reported and the others go on. See `Study.run`.
-
-        Progress is that of each mode in seconds of its motion. Workers are threads.
-
-        Raises
-        ------
-        InputError
-            A mode that is none of the mechanism's, or workers that are no threads, before anything runs.
-        """
+    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
         if self.method is not None and not callable(self.method):
             remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in a way of its own"
             raise refused(self.method, "method", "a function", remedy)
@@ -142,11 +141,7 @@ class TrackingStudy(Study[StudyResult], CheckedFields):
         if workers.engine != THREADS:
             raise InputError("modes run in threads", field="workers", value=workers.engine, remedy="leave it out")
         chosen = list(dict.fromkeys(self.task.mode(mode) for mode in self.modes))
-        with hold_for(folder, RUN) as held:
-            result = self._run(chosen, workers, on_progress)
-            if held is not None and result.data is not None:
-                result.save_in(held)
-        return result
+        return partial(self._run, chosen, workers)
 
     def _run(self, chosen: Sequence[ActuationMode], workers: Workers, on_progress: OnProgress | None) -> StudyResult:
         stop = threading.Event()

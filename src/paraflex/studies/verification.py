@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments
-from paraflex.campaign import OnProgress, Progress, Study, Workers, hold_for, no_workers
+from paraflex.campaign import OnProgress, Progress, WholeStudy, Workers, no_workers
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
 from paraflex.errors import InputError, IntegrationError, NumericalError, as_enum, suggestion
-from paraflex.folders import VERIFICATION
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import MethodField
 from paraflex.mechanism import (
@@ -60,8 +58,11 @@ class VerificationOptions(CheckedFields):
 
 
 @dataclass(frozen=True)
-class VerificationStudy(Study[Verification], CheckedFields):
+class VerificationStudy(WholeStudy[Verification], CheckedFields):
     """Every model in every mode, each with a finer step and a finer mesh.
+
+    A model that fails does not stop the others. Runs come one after the other, so that their wall times can be
+    compared: workers have no part in it.
 
     Attributes
     ----------
@@ -76,8 +77,15 @@ class VerificationStudy(Study[Verification], CheckedFields):
         Kept as provenance.
     error : ErrorSpan or str
         What tracking errors are of: the "motion", or the "whole" run, dwell included.
+
+    Raises
+    ------
+    InputError
+        From `run`: an unknown model or mode, an engine that is not installed, or one that cannot express the
+        mechanism, before anything runs.
     """
 
+    gives = Verification
     task: TrackingTask
     modes: Sequence[str | ActuationMode]
     models: Sequence[str] = FIDELITIES
@@ -85,23 +93,7 @@ class VerificationStudy(Study[Verification], CheckedFields):
     parameters: dict[str, Any] | None = None
     error: ErrorSpan | str = ErrorSpan.MOTION
 
-    def run(
-        self,
-        folder: str | Path | None = None,
-        *,
-        workers: Workers | None = None,
-        on_progress: OnProgress | None = None,
-    ) -> Verification:
-        """Run all models; one that fails does not stop the others. See `Study.run`.
-
-        Runs come one after the other, so that their wall times can be compared: workers have no part in it.
-
-        Raises
-        ------
-        InputError
-            An unknown model or mode, an engine that is not installed, or one that cannot express the mechanism: before
-            anything runs.
-        """
+    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], Verification]:
         no_workers(workers, "runs come one after the other")
         models = tuple(dict.fromkeys(self.models))
         for name in models:
@@ -109,24 +101,13 @@ class VerificationStudy(Study[Verification], CheckedFields):
             if name in ENGINES:
                 check_dwell(name, self.task)
         chosen = list(dict.fromkeys(self.task.mode(mode) for mode in self.modes))
-        runs: dict[str, dict[str, ModelRuns]] = {mode.name: {} for mode in chosen}
-        error = as_enum(ErrorSpan, self.error, "error")
-        with hold_for(folder, VERIFICATION) as held:
-            interrupted = self._do(chosen, models, runs, on_progress)
-            result = Verification(self.task, models, runs, interrupted, self.parameters, error)
-            if held is not None:
-                result.save_in(held)
-        return result
+        return partial(self._run, chosen, models, as_enum(ErrorSpan, self.error, "error"))
 
-    def _do(
-        self,
-        modes: Sequence[ActuationMode],
-        models: Sequence[str],
-        runs: dict[str, dict[str, ModelRuns]],
-        on_progress: OnProgress | None,
-    ) -> bool:
-        """Fill in the runs; whether the user stopped it."""
+    def _run(
+        self, modes: Sequence[ActuationMode], models: tuple[str, ...], error: ErrorSpan, on_progress: OnProgress | None
+    ) -> Verification:
         task, options = self.task, self.options or VerificationOptions()
+        runs: dict[str, dict[str, ModelRuns]] = {mode.name: {} for mode in modes}
         plan = [
             (mode, name, level)
             for mode in modes
@@ -134,21 +115,22 @@ class VerificationStudy(Study[Verification], CheckedFields):
             for level in Refinement
             if _has_meaning(name, level, task.mechanism)
         ]
-        for number, (mode, name, level) in enumerate(plan):
-            so_far = runs[mode.name].get(name, ModelRuns({}))
-            if so_far.failure:
-                continue
-            try:
+        interrupted = False
+        try:
+            for number, (mode, name, level) in enumerate(plan):
+                so_far = runs[mode.name].get(name, ModelRuns({}))
+                if so_far.failure:
+                    continue
                 if on_progress is not None:
                     on_progress(Progress(number, len(plan), number, doing=f"{mode.name}: {name}, {level.value}"))
                 extended = _extended(so_far, level, partial(run_model, task, mode, name, level, options))
-            except KeyboardInterrupt:
-                return True
-            # A stopped run returns its samples, but cannot be compared.
-            if any(run.figures["status"] == "interrupted" for run in extended.records.values()):
-                return True
-            runs[mode.name][name] = extended
-        return False
+                # A stopped run returns its samples, but cannot be compared.
+                if any(run.figures["status"] == "interrupted" for run in extended.records.values()):
+                    raise KeyboardInterrupt
+                runs[mode.name][name] = extended
+        except KeyboardInterrupt:
+            interrupted = True
+        return Verification(task, models, runs, interrupted, self.parameters, error)
 
 
 @checked_arguments()

@@ -7,17 +7,16 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.actuation import Effort, FeedForward, required_effort
 from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
 from paraflex.arguments import with_fields
-from paraflex.arrays import Numbers
+from paraflex.arrays import Array, Numbers
 from paraflex.control.shaped import ShapedPath
 from paraflex.designs.derivatives.plans import Given
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
-from paraflex.designs.derivatives.steps import Stepped, complex_step, part, stepped
+from paraflex.designs.derivatives.steps import Stepped, another_layout, complex_step, part, stepped
 from paraflex.designs.run import Task
 from paraflex.designs.setting import Setting
 from paraflex.dynamics import (
@@ -42,8 +41,6 @@ from paraflex.kinematics.closure import PathClosure, with_marker
 from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
 from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody, with_actuators
 from paraflex.tracking import TrackingTask, path_knots
-
-Array = NDArray[np.float64]
 
 
 class Described(NamedTuple):
@@ -170,11 +167,7 @@ class Change:
 
     def _check_layout(self) -> None:
         if not all(same_layout(each.packed, self.planned.system.packed) for each in self.beside):
-            raise InputError(
-                "the number of pieces or elements changes with it: no derivative",
-                field="vary",
-                remedy="choose a slightly different value with --at",
-            )
+            raise another_layout()
 
     @cached_property
     def packed(self) -> Array:
@@ -209,11 +202,7 @@ class Change:
             )
         knots = path_knots(self.there.path, self.there.end)
         if knots.size != self.planned.plan.knots.size:
-            raise InputError(
-                "the number of pieces or elements changes with it: no derivative",
-                field=f"vary.{self.name}",
-                remedy="choose a slightly different value with --at",
-            )  # fmt: skip
+            raise another_layout(f"vary.{self.name}")
         return knots
 
     def plan(self, motion: RigidMotion, effort: Effort, d_times: Array) -> _Planned:
@@ -331,11 +320,7 @@ class Change:
             inner = np.sort(np.concatenate([torques.knots.real + place * d_knots, knots]))
             at = make_problem(problem.system, signals, problem.initial, times, inner).stops
             if at.size != problem.stops.size or not same_layout(signals, problem.signals):
-                raise InputError(
-                    "the number of pieces or elements changes with it: no derivative",
-                    field=f"vary.{self.name}",
-                    remedy="choose a slightly different value with --at",
-                )  # fmt: skip
+                raise another_layout(f"vary.{self.name}")
             found.append(numbers_of(signals))
             stops.append(at)
         return self.stencil.derivative(found), self.stencil.derivative(stops).value

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.designs.derivatives.changes import Change, ModeChange
 from paraflex.designs.derivatives.plans import Given, check_has_path, check_open_and_whole, given, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
@@ -28,8 +28,6 @@ from paraflex.integrators.sensitivity import (
 from paraflex.integrators.solution import Solution
 from paraflex.results.run_traces import RunTraces, run_traces
 from paraflex.tracking import TrackingRun, simulate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

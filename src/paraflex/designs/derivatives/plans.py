@@ -6,9 +6,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
+from paraflex.arrays import Array
 from paraflex.designs.measure import check_smooth, metric_of
 from paraflex.designs.run import Task
 from paraflex.designs.setting import INTEGRATION, Setting
@@ -20,8 +20,6 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import Problem, make_problem
 from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.tracking import TrackingTask, path_stops
-
-Array = NDArray[np.float64]
 
 # Numbers of an integration that a run's steps depend on, which stay as they are.
 _STEP_OPTIONS = ("tolerance", "step")

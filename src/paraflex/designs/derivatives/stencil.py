@@ -7,9 +7,8 @@ from math import factorial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from paraflex.arrays import Array
 
 # Between places, as parts of a parameter's size. What is differentiated is smooth over many times as far: powers of a
 # number, sines and cosines.

@@ -12,10 +12,9 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import with_fields
-from paraflex.arrays import Numbers
+from paraflex.arrays import Array, Numbers
 from paraflex.designs.derivatives.stencil import Stencil
 from paraflex.errors import InputError
 
@@ -33,14 +32,20 @@ class Stepped(Generic[T]):
     error: float
 
 
-def part(values: Any) -> NDArray[np.float64]:
+def part(values: Any) -> Array:
     """The derivative in numbers with a complex step; zero for real ones."""
     return np.imag(values) / COMPLEX_STEP
 
 
-def stepped(values: NDArray[np.float64], derivative: NDArray[np.float64]) -> Numbers:
+def stepped(values: Array, derivative: Array) -> Numbers:
     """Numbers with a complex step along a derivative."""
     return values + 1j * COMPLEX_STEP * derivative
+
+
+def another_layout(field: str = "vary") -> InputError:
+    """The error for a parameter with which descriptions change in more than numbers."""
+    problem = "the number of pieces or elements changes with it: no derivative"
+    return InputError(problem, field=field, remedy="choose a slightly different value with --at")
 
 
 def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> Stepped[T]:
@@ -75,11 +80,7 @@ class _Walk:
         if isinstance(here, int | float | np.integer | np.floating):
             return self.number(here, near)
         if any(type(each) is not type(here) for each in near):
-            raise InputError(
-                "the number of pieces or elements changes with it: no derivative",
-                field="vary",
-                remedy="choose a slightly different value with --at",
-            )
+            raise another_layout()
         if isinstance(here, np.ndarray):
             return self.array(here, near)
         if isinstance(here, Mapping):
@@ -106,11 +107,7 @@ class _Walk:
 
     def sequence(self, here: Any, near: list[Any]) -> Any:
         if any(len(each) != len(here) for each in near):
-            raise InputError(
-                "the number of pieces or elements changes with it: no derivative",
-                field="vary",
-                remedy="choose a slightly different value with --at",
-            )
+            raise another_layout()
         new = [self.step(value, list(others)) for value, *others in zip(here, *near, strict=True)]
         if all(a is b for a, b in zip(new, here, strict=True)):
             return here

@@ -8,15 +8,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign.study import Result
 from paraflex.studies.optimisation.evaluate import Evaluated
 from paraflex.studies.optimisation.fit import residuals
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.study import DesignStudy
 
-Array = NDArray[np.float64]
 # Beyond this condition of the Jacobian, parameters as shares of their ranges, its weakest direction is not known.
 ILL_CONDITIONED = 1e3
 # Largest relative difference of a change of residuals from the Jacobian's prediction.

@@ -9,15 +9,14 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign import Engine, Journal, LostWorker, Row, outcomes
 from paraflex.campaign.study import Result
 from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, lost, run_id, run_task
 from paraflex.designs.setting import Setting
 from paraflex.studies.optimisation.study import DesignStudy
 
-Array = NDArray[np.float64]
 Design = tuple[float, ...]
 RunTask = Callable[..., Outcome]
 
@@ -55,7 +54,7 @@ class Evaluated:
             if row["status"] != STATUS_COMPLETE:
                 return f"{whose}{row['reason']}"
             for column in self.counting:
-                if not _is_finite(row.get(column)):
+                if row.get(column) is None or not math.isfinite(row[column]):
                     return f"{whose}{column} is no number"
         return ""
 
@@ -168,12 +167,9 @@ class Evaluate:
             rows[design] |= {(row["path"], row["mode"]): row for row in outcome.rows}
             if len(rows[design]) == self.study.runs:
                 ordered = [rows[design][path, mode] for path in setting.paths for mode in setting.modes]
-                yield design, self._numbered(design, ordered)
-
-    def _numbered(self, design: Design, rows: list[Row]) -> tuple[Row, ...]:
-        number = self._numbers[design]
-        first = number * self.study.runs
-        return tuple(row | {"run": first + k, "design": number} for k, row in enumerate(rows))
+                number = self._numbers[design]
+                first = number * self.study.runs
+                yield design, tuple(row | {"run": first + k, "design": number} for k, row in enumerate(ordered))
 
     def _jobs(self, designs: list[Design]) -> Iterator[Job]:
         """One job per design and path, or per mode if workers would be idle. Rows do not depend on it."""
@@ -194,7 +190,3 @@ class Job(NamedTuple):
 
 def _do(run: RunTask, job: Job, *watch: Any) -> Outcome:
     return run(job.setting, job.task, *watch)
-
-
-def _is_finite(value: Any) -> bool:
-    return value is not None and math.isfinite(value)

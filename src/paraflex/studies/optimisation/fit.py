@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign.study import Result
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
 
-Array = NDArray[np.float64]
 # Relative change at which it ends, of residuals and parameters.
 _FIT_TOLERANCE = 1e-6
 

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.campaign import OnProgress, Study, Workers
 from paraflex.designs.run import STATUS_COMPLETE, run_task
 from paraflex.designs.samples import RANDOM
@@ -25,7 +26,6 @@ from paraflex.results.parquet import read_parquet, write_parquet
 from paraflex.studies.optimisation.schema import StudyTable
 from paraflex.writing import GO_ON, write_json
 
-Array = NDArray[np.float64]
 TABLE = "indices.parquet"
 # SALib's names of the shares, and columns of a row.
 _SHARES = {"first": "S1", "first_confidence": "S1_conf", "total": "ST", "total_confidence": "ST_conf"}

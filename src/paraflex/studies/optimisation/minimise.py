@@ -7,12 +7,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.problem import DesignProblem
 
-Array = NDArray[np.float64]
 SLSQP, TRUST, LBFGSB, SIMPLEX = "slsqp", "trust-constr", "l-bfgs-b", "nelder-mead"
 EVOLUTION, OPTUNA = "differential-evolution", "optuna"
 WITH_SLOPES = (SLSQP, TRUST, LBFGSB)

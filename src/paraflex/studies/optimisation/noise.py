@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from paraflex.arrays import Array
+
 # Values close together that noise is measured from.
 NOISE_POINTS = 8
 # Estimates of three orders that lie within this factor agree.

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.mechanism.quantities import known
 
-Array = NDArray[np.float64]
 WORST, MEAN = "worst", "mean"
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign.study import Result
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
@@ -15,7 +15,6 @@ from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
 
-Array = NDArray[np.float64]
 # Relative violation of a limit that still counts as none.
 _LIMIT_EXCESS = 1e-6
 # Cost of a design that violates a limit, and of one that does not run, in objectives of the start.
@@ -45,7 +44,13 @@ class DesignProblem:
         self.evaluate = evaluate
         self.slopes = slopes
         self.objective = objective
-        self.scales: Mapping[str, float] = start_scales(study, objective, evaluate)
+        self.scales: Mapping[str, float] = objective.scales(running_start(study, evaluate))
+        for column, scale in self.scales.items():
+            if scale == 0.0:
+                raise InputError(
+                    "the metric is zero at the start, and nothing can be relative to it",
+                    field=f"objective.minimise.{column}", remedy="say relative = false",
+                )  # fmt: skip
         self.start: Array = study.unit(study.start)
         # Slopes of designs that fail lead back to the last one that did not.
         self._safe = self.start
@@ -99,25 +104,6 @@ class DesignProblem:
         if violation > _LIMIT_EXCESS:
             return _OUTSIDE * self.cost * (1.0 + violation)
         return self.objective.value(design, self.scales)
-
-
-def start_scales(study: DesignStudy[Result], objective: Objective, evaluate: Evaluate) -> Mapping[str, float]:
-    """Divisors of metrics, from the start.
-
-    Raises
-    ------
-    InputError
-        The start cannot be run, or a metric of it is zero.
-    """
-    scales = objective.scales(running_start(study, evaluate))
-    for column, scale in scales.items():
-        if scale == 0.0:
-            raise InputError(
-                "the metric is zero at the start, and nothing can be relative to it",
-                field=f"objective.minimise.{column}",
-                remedy="say relative = false",
-            )  # fmt: skip
-    return scales
 
 
 def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> Evaluated:

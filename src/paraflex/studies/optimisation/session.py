@@ -169,5 +169,5 @@ def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | No
         raise InputError(
             f"no exact derivatives ({reason})", field="search.gradients", value=EXACT, remedy='say "differences"'
         )
-    sizes = tuple(float(p.high) - float(p.low) for p in study.parameters)  # pyright: ignore[reportArgumentType]
+    sizes = tuple(high - low for low, high in (p.ends for p in study.parameters))
     return None if reason else partial(run_slopes, study.columns, sizes)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign import Row
 from paraflex.campaign.study import Result
 from paraflex.designs.run import Outcome, Task, trouble
@@ -18,7 +18,6 @@ from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
 from paraflex.studies.optimisation.noise import NOISE_POINTS, noise_of
 from paraflex.studies.optimisation.study import DesignStudy
 
-Array = NDArray[np.float64]
 EXACT, DIFFERENCES = "exact", "differences"
 # Column with the reason why a run has no exact derivatives.
 NO_SLOPES = "slope.reason"

@@ -9,8 +9,8 @@ from pathlib import Path as FilePath
 from typing import Any, ClassVar, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign.study import R_co, Study
 from paraflex.designs.measure import check_metric, metric_of
 from paraflex.designs.samples import RANDOM, Varied
@@ -29,8 +29,6 @@ from paraflex.studies.optimisation.schema import (
     SearchTable,
     StudyTable,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -129,11 +127,9 @@ class DesignStudy(Study[R_co]):
 
     def per_unit(self, design: Sequence[float]) -> Array:
         """Derivatives of the numbers by their place in the unit cube, (parameters,)."""
-        out = [
-            value * np.log(p.high / p.low) if p.log else p.high - p.low  # pyright: ignore[reportOperatorIssue, reportOptionalOperand]
-            for p, value in zip(self.parameters, design, strict=True)
-        ]
-        return np.array(out)
+        ranges = [(p.log, *p.ends) for p in self.parameters]
+        sizes = zip(ranges, design, strict=True)
+        return np.array([value * np.log(high / low) if log else high - low for (log, low, high), value in sizes])
 
     def content(self) -> dict[str, Any]:
         """Everything that the results depend on, in plain values, without the limit of evaluations."""
@@ -220,29 +216,24 @@ def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given
             remedy="give a start",
         )
     (start,) = found
-    assert parameter.low is not None
-    assert parameter.high is not None
-    if not parameter.low <= start <= parameter.high:
+    low, high = parameter.ends
+    if not low <= start <= high:
         raise InputError(
-            f"outside the bounds, {parameter.low:g} to {parameter.high:g}", field=field, value=start,
+            f"outside the bounds, {low:g} to {high:g}", field=field, value=start,
             remedy="give a start within, or other bounds",
         )  # fmt: skip
     return _rounded(parameter, start)
 
 
 def _share(parameter: Varied, value: float) -> float:
-    assert parameter.low is not None
-    assert parameter.high is not None
-    if parameter.log:
-        return float(np.log(value / parameter.low) / np.log(parameter.high / parameter.low))
-    return (value - parameter.low) / (parameter.high - parameter.low)
+    low, high = parameter.ends
+    return float(np.log(value / low) / np.log(high / low)) if parameter.log else (value - low) / (high - low)
 
 
 def _rounded(parameter: Varied, value: float) -> float:
     """A value to twelve digits, within the bounds, so that equal designs do not differ by rounding."""
-    assert parameter.low is not None
-    assert parameter.high is not None
-    return min(max(float(f"{value:.12g}"), parameter.low), parameter.high)
+    low, high = parameter.ends
+    return min(max(float(f"{value:.12g}"), low), high)
 
 
 def read_search(table: SearchTable) -> Search:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.campaign import OnProgress, Progress, Result, Study, Workers, hold_for, no_workers
+from paraflex.arrays import Array
+from paraflex.campaign import OnProgress, Progress, Result, WholeStudy, Workers, no_workers
 from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
 from paraflex.designs.derivatives.plans import check_has_path, nominal_values
 from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
@@ -33,7 +33,6 @@ from paraflex.writing import whole_file
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 _COLUMNS = ("path", "mode", "metric", "unit", "parameter", "nominal", "value", "derivative", "relative", "error")
 TABLE, LINES, FIGURES = "sensitivity.csv", "sensitivity.parquet", "figures"
 
@@ -170,8 +169,10 @@ class Sensitivities(Result):
 
 
 @dataclass(frozen=True)
-class SensitivityStudy(Study[Sensitivities]):
+class SensitivityStudy(WholeStudy[Sensitivities]):
     """The runs, metrics and parameters of a sensitivity study.
+
+    One path is differentiated after the other: workers have no part in it.
 
     Attributes
     ----------
@@ -181,8 +182,16 @@ class SensitivityStudy(Study[Sensitivities]):
     parameters : tuple of Varied
     at : mapping of str to float
         Values of parameters, where they are not to be those of the mechanism's file.
+
+    Raises
+    ------
+    InputError
+        From `run`: an unknown parameter, or one without a derivative; a method without.
+    NumericalError
+        From `run`: a run that cannot be made.
     """
 
+    gives = Sensitivities
     name: str
     setting: Setting
     parameters: tuple[Varied, ...]
@@ -195,32 +204,11 @@ class SensitivityStudy(Study[Sensitivities]):
         asked = [setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics]
         return digest([*asked, dict(self.at)])
 
-    def run(
-        self,
-        folder: str | Path | None = None,
-        *,
-        workers: Workers | None = None,
-        on_progress: OnProgress | None = None,
-    ) -> Sensitivities:
-        """Differentiate all runs, one path after the other; see `Study.run`.
-
-        The folder gets what `Sensitivities.save` writes. Workers have no part in it.
-
-        Raises
-        ------
-        InputError
-            An unknown parameter, or one without a derivative; a method without; or see `Study.run`.
-        NumericalError
-            A run that cannot be made.
-        """
+    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], Sensitivities]:
         no_workers(workers, "one path is differentiated after the other")
-        with hold_for(folder, SENSITIVITY) as held:
-            found = self._found(on_progress)
-            if held is not None:
-                found.save_in(held)
-        return found
+        return self._run
 
-    def _found(self, on_progress: OnProgress | None) -> Sensitivities:
+    def _run(self, on_progress: OnProgress | None) -> Sensitivities:
         setting, values = self.setting, _values(self.setting, self.at)
         sizes = [_size(parameter, value) for parameter, value in zip(self.parameters, values, strict=True)]
         rows, found, began = [], [], time.perf_counter()

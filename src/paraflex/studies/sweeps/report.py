@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from paraflex.campaign import tables_of
+from paraflex.campaign import LostWorker, Workers, outcomes, tables_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.reopen import StudyFolder, open_study, run_again
-from paraflex.designs.run import Abandoned
 from paraflex.designs.schema import DEFAULT_NAME
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError, ParaflexError
@@ -78,7 +74,11 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
         runs=runs,
         failed=failed,
         found=found,
-        history=[Step(n, np.nan if value is None else value, bool(holds)) for n, value, holds in _history(found)],
+        history=[
+            Step(step[0], np.nan if step[1] is None else step[1], bool(step[2]))
+            for step in found.get("history") or []
+            if len(step) == 3
+        ],
         notes=_notes(study, designs, differ),
     )
     return sweep_page(designs, picked, account)
@@ -92,15 +92,7 @@ def _again(
         return {}, {}, []
     compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism)
 
-    stop = threading.Event()
-
-    def watch(_: float) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
-
-    def again(row: int) -> tuple[xr.Dataset, bool] | str:
-        if stop.is_set():
-            raise Abandoned
+    def again(row: int, watch: Callable[[float], None]) -> tuple[xr.Dataset, bool] | str:
         values, path, mode = designs.values(row), str(designs.path[row]), str(designs.mode[row])
         try:
             data, metrics = run_again(study.setting, values, path, mode, watch)
@@ -109,17 +101,17 @@ def _again(
         rows = {name: designs.metrics[name][row] for name in metrics if name in designs.metrics}
         return data, all(np.isclose(metrics[name], rows[name], rtol=_ROW_DIFFERENCE, equal_nan=True) for name in rows)
 
-    rows = [one.row for one in picked]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        try:
-            outcomes = dict(zip(rows, pool.map(again, rows), strict=True))
-        except KeyboardInterrupt:
-            # Ctrl-C reaches the main thread only; the others stop at their next progress report.
-            stop.set()
-            raise
-    runs = {row: outcome[0] for row, outcome in outcomes.items() if not isinstance(outcome, str)}
-    failed = {row: outcome for row, outcome in outcomes.items() if isinstance(outcome, str)}
-    differ = [row for row, outcome in outcomes.items() if not isinstance(outcome, str) and not outcome[1]]
+    with Workers().open() as engine:
+        found = dict(outcomes(engine, again, [one.row for one in picked]))
+    runs, failed, differ = {}, {}, []
+    for row in (one.row for one in picked):
+        outcome = found[row]
+        assert not isinstance(outcome, LostWorker)  # threads are not lost
+        if isinstance(outcome, str):
+            failed[row] = outcome
+            continue
+        runs[row], same = outcome
+        differ += [] if same else [row]
     return runs, failed, differ
 
 
@@ -175,12 +167,6 @@ def _found(file: Path) -> Mapping[str, Any]:
     found = read_json(file)
     check_listed(file, "run the same command again")
     return found
-
-
-def _history(found: Mapping[str, Any]) -> Sequence[tuple[int, float | None, bool]]:
-    """Number, objective and whether limits hold, if the result has all three."""
-    steps = found.get("history") or []
-    return [tuple(step) for step in steps if len(step) == 3]
 
 
 def _searched(designs: DesignTable, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:
