@@ -41,7 +41,7 @@ _ASIDE = 1e-2
 # Links that must be deflected by more than this part of their size for loops to close do not fit together.
 _LARGEST_DEFLECTION = 0.1
 # Weight of stiffness against mass [s^2] for velocities: rates of deflection are to be small against those of links.
-_VELOCITY_STIFFNESS = 1e3
+VELOCITY_STIFFNESS = 1e3
 
 
 @given_as("a state", "a state, as dynamics.consistent_state makes it")
@@ -321,7 +321,7 @@ def consistent_state(
     q = assembled_position(system, signals, time, q)
     try:
         if velocity is None:
-            v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)
+            v = project_velocity(system, signals, time, q, np.zeros(system.n), VELOCITY_STIFFNESS)
         else:
             v = project_velocity(system, signals, time, q, velocity)
         check_accelerations(system, signals, time, q, v)
