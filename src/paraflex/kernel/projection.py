@@ -21,22 +21,16 @@ def project(system, signals, t, q, v, work):
     """Change q until Phi = 0, then v until Phi' = 0."""
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
-        if not reduce_violation(system, q, work):
+        if largest_violation(system, work.rows) <= NO_VIOLATION:
             break
+        least_change(system, work.rows, work)
+        add(work.x, q)
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
-        if not reduce_violation(system, v, work):
+        if largest_violation(system, work.rows) <= NO_VIOLATION:
             break
-
-
-@routine
-def reduce_violation(system, x, work):
-    """Change coordinates or velocities x by the least that removes the violations in work.rows, if there are any."""
-    if largest_violation(system, work.rows) <= NO_VIOLATION:
-        return False
-    least_change(system, work.rows, work)
-    add(work.x, x)
-    return True
+        least_change(system, work.rows, work)
+        add(work.x, v)
 
 
 @routine
