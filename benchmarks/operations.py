@@ -35,9 +35,12 @@ def _bent_terms(p: PackedSystem, body: np.void) -> int:
     """The same by mass points: slopes at Gauss points, a point's s, s', s'' and its force, which goes back to all."""
     n, total = int(body["nf"]), 40
     total += int(body["slopes"]) * (6 * n + 2 * n + 1) + 4 * n
-    for point in p.masses[body["mass"] : body["mass_end"]]:
-        total += 12 * n + 11 * int(point["reach"]) + 32 + 4 * n
-        if point["inertia"] > 0.0:
+    count, pitch, slopes = int(body["points"]), int(body["pitch"]), int(body["slopes"])
+    weights = p.spans[body["spans"] :][: slopes * pitch].reshape(slopes, pitch)
+    for k in range(count):
+        # A point is shortened by the Gauss points up to it.
+        total += 12 * n + 11 * (1 + int(np.max(np.nonzero(weights[:, k])[0], initial=-1))) + 32 + 4 * n
+        if p.inertias[body["inertias"] + 2 * pitch + k] > 0.0:
             total += 4 * n + 1
     return total
 

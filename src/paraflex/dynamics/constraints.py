@@ -94,15 +94,11 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
     return [parts[held] for held in joint.holds]
 
 
-def axis_of(joint: Joint) -> dict[str, Any]:
-    """Direction and carrier of the axis along which a joint's travel is measured."""
-    return {"direction": joint.direction, "carrier": "frame" if joint.follows_beam else "material"}
-
-
-def _coordinate(joint: Joint, weight: float = 1.0) -> Term:
+def coordinate(joint: Joint, weight: float = 1.0) -> Term:
     """A joint's coordinate times a weight."""
     if joint.slides:
-        return Term(joint.name, AXIS, joint.a, joint.b, weight, **axis_of(joint))
+        carrier = "frame" if joint.follows_beam else "material"
+        return Term(joint.name, AXIS, joint.a, joint.b, weight, joint.direction, carrier)
     return Term(joint.name, ANGLE, joint.a, joint.b, weight)
 
 
@@ -113,7 +109,7 @@ def coordinate_kind(joint: Joint) -> str:
 
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
     """A compliant or driven row of a joint's coordinate."""
-    return Constraint(name, (_coordinate(joint),), (f"{name} {coordinate_kind(joint)}",), **keywords)
+    return Constraint(name, (coordinate(joint),), (f"{name} {coordinate_kind(joint)}",), **keywords)
 
 
 def _constraints(mechanism: Mechanism) -> list[Constraint]:
@@ -133,7 +129,7 @@ def _relation_constraint(mechanism: Mechanism, one: Relation) -> Constraint:
     """Sum of joints' coordinates times their weights less the phase, over the first of these weights."""
     joints, (scale, *_) = [mechanism.joint(name) for name in one.shares], one.shares.values()
     assert one.phase is not None
-    terms = tuple(_coordinate(joint, one.shares[joint.name] / scale) for joint in joints)
+    terms = tuple(coordinate(joint, one.shares[joint.name] / scale) for joint in joints)
     return Constraint(one.name, terms, (f"{one.name} {coordinate_kind(joints[0])}",), rest=one.phase / scale)
 
 

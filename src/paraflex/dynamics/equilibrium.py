@@ -133,15 +133,14 @@ def _sparse_equilibrium(system: System, start: State, held: Sequence[str], motio
     """The same with sparse matrices; springs at joints are stiffness here, not multipliers."""
     forces, elastic = RestingForces(system, start.time), stiffness_diagonal(system)
     signals = moment_signals(system.mechanism, start.time)
-    kept = [float(joint_coordinate(system, name, start.q[None]).value[0]) for name in held]
+    kept, _ = _joints(system, held, start.q)
     rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
     q, mu = start.q.copy(), np.zeros(rigid.size + len(held))
     for _ in range(_MAX_ITERATIONS):
         if motion is not None:
             forces.v, forces.a = motion(q)
-        found = [joint_coordinate(system, name, q[None]) for name in held]
-        off = np.array([joint.value[0] for joint in found]) - kept
-        holding = scipy.sparse.csr_matrix(np.array([joint.rows[0] for joint in found]).reshape(-1, system.n))
+        values, rows = _joints(system, held, q)
+        off, holding = values - kept, scipy.sparse.csr_matrix(rows)
         lam = forces.compliant(q)
         lam[rigid] = mu[: rigid.size]
         f = forces(q, lam)[0] + elastic * q + holding.T @ mu[rigid.size :]
@@ -178,25 +177,26 @@ def _largest_move(system: System, change: Array) -> float:
     return max(float(np.max(np.abs(change / system.units)[body.offset : body.offset + 3])) for body in system.bodies)
 
 
+def _joints(system: System, held: Sequence[str], q: Array) -> tuple[Array, Array]:
+    """Coordinates of the held joints (held,) and their derivatives (held, n)."""
+    found = [joint_coordinate(system, name, q[None]) for name in held]
+    rows = np.array([joint.rows[0] for joint in found]).reshape(-1, system.n)
+    return np.array([joint.value[0] for joint in found]), rows
+
+
 class _Residual:
     """Residuals of forces, constraints and held joints at (q, multipliers, torques), in motion at `v` and `a` (n,)."""
 
     def __init__(self, system: System, start: State, held: Sequence[str]) -> None:
         mechanism = system.mechanism
         self.system, self.time, self.held = system, start.time, held
-        self.kept = self.joints(start.q)[0]
+        self.kept = _joints(system, held, start.q)[0]
         self.signals = moment_signals(mechanism, start.time)
         self.workspace, self.torques = system.workspace(), np.zeros(inputs_of(mechanism).acting)
         self.v, self.a = np.zeros((2, system.n))
         self.largest_effort = 0.0
         # Rows of friction come with a scale of their own, none by default.
         self.workspace.compliance[:] = system.packed.rows["compliance"]
-
-    def joints(self, q: Array) -> tuple[Array, Array]:
-        """Coordinates of the held joints (held,) and their derivatives (held, n)."""
-        found = [joint_coordinate(self.system, name, q[None]) for name in self.held]
-        rows = np.array([joint.rows[0] for joint in found]).reshape(-1, self.system.n)
-        return np.array([joint.value[0] for joint in found]), rows
 
     def __call__(self, z: Array) -> Array:
         system, ws = self.system, self.workspace
@@ -206,7 +206,7 @@ class _Residual:
         phi, _ = system.constraints(self.signals, self.time, q)
         # Rows of springs, dampers and friction have no second derivatives in them.
         closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
-        value, rows = self.joints(q)
+        value, rows = _joints(system, self.held, q)
         holding = rows.T @ torque
         efforts = (np.abs(system.row_units * lam), np.abs(system.units * holding))
         self.largest_effort = max(np.max(part, initial=0.0) for part in efforts)

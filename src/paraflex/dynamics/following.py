@@ -75,6 +75,12 @@ def driven_rows(system: System) -> Iterator[tuple[PrescribedAngle, int]]:
         yield motion, signals.index(signal)
 
 
+def drives_at(system: System, q: Array, rows: set[int]) -> str:
+    """Prescribed motions of the given constraint rows by name, with the values of their joints; empty for none."""
+    driven = (one for one, row in driven_rows(system) if row in rows)
+    return ", ".join(f"{one.name} at {value_text(system, one.joint, q)}" for one in driven)
+
+
 def _away(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Coordinates of driven joints less their prescribed values in their rows (m,), zero in the others."""
     return np.where(system.packed.rows["signal"] >= 0, system.constraints(signals, t, q)[0], 0.0)
@@ -120,8 +126,8 @@ def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array
         step *= 0.5
         if step < _SHORTEST:
             break
-    held = [f"{one.name} at {value_text(system, one.joint, pose)}" for one, row in driven_rows(system) if away[row]]
-    return None, f"the joints bar the way from the assembly to the start of prescribed motions, {', '.join(held)}"
+    held = drives_at(system, pose, set(np.flatnonzero(away).tolist()))
+    return None, f"the joints bar the way from the assembly to the start of prescribed motions, {held}"
 
 
 def _side(system: System, q: Array) -> float:

@@ -28,8 +28,8 @@ def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None
     joint = system.mechanism.joint(name)
     v = np.zeros_like(q) if v is None else v
     if not joint.slides:
-        value_a, rows_a = _angle(system, joint.a, q)
-        value_b, rows_b = _angle(system, joint.b, q)
+        ends = (_marker_angle(system, system.marker(ref), q) for ref in (joint.a, joint.b))
+        (value_a, rows_a), (value_b, rows_b) = ends
         rows = rows_b - rows_a
         return JointCoordinate(value_b - value_a, np.sum(rows * v, axis=1), rows)
     carrier = axis_marker(system, joint)
@@ -74,15 +74,11 @@ def line_direction(system: System, joint: Joint, q: Array) -> Array:
 
 def material_angle(system: System, ref: PointRef, q: Array) -> Array:
     """Angle (k,) of the material at a point, that of its body and the slope; zero on the ground [rad]."""
-    return _angle(system, ref, q)[0]
-
-
-def _angle(system: System, ref: PointRef, q: Array) -> tuple[Array, Array]:
-    """Angle of the material at a point (k,), and its derivative (k, n)."""
-    return _marker_angle(system, system.marker(ref), q)
+    return _marker_angle(system, system.marker(ref), q)[0]
 
 
 def _marker_angle(system: System, marker: Marker, q: Array) -> tuple[Array, Array]:
+    """Angle of the material at a point (k,), and its derivative (k, n)."""
     rows = np.zeros(q.shape, dtype=np.result_type(q, marker.slope))
     if marker.body == GROUND_INDEX:
         return np.zeros(q.shape[0]), rows

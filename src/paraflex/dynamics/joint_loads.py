@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics.constraints import RowTerm, Term, row_order
+from paraflex.dynamics.constraints import RowTerm, Term
 from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
-from paraflex.dynamics.inputs import inputs_of
+from paraflex.dynamics.following import driven_rows
 from paraflex.dynamics.joint_coordinates import axis_angle, line_direction, marker_place
 from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.rank import NO_PART, dependence
@@ -158,14 +158,7 @@ def undetermined_loads(
 
 def drive_torques(system: System, multipliers: Array) -> Array:
     """Torque [N m] or force [N] of every prescribed motion (k, drives), on its joint's second body."""
-    mechanism = system.mechanism
-    numbers = {signal: k for k, signal in enumerate(inputs_of(mechanism).prescribed)}
-    torques, row = np.zeros((len(multipliers), len(numbers)), multipliers.dtype), 0
-    for constraint in row_order(mechanism, system.index):
-        if constraint.signal in numbers:
-            torques[:, numbers[constraint.signal]] = -multipliers[:, row]
-        row += len(constraint.labels)
-    return torques
+    return -multipliers[:, np.array([row for _, row in driven_rows(system)], int)]
 
 
 class LoadErrors(NamedTuple):

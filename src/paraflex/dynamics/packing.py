@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics.constraints import Constraint, Term, axis_of
+from paraflex.dynamics.constraints import Constraint, Term, coordinate
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.scale import mechanism_size
@@ -22,7 +22,6 @@ from paraflex.kernel.packed import (
     LINE,
     LOAD,
     MARKER,
-    MASS,
     MOTOR_SIDE,
     POINT,
     PORT,
@@ -33,6 +32,9 @@ from paraflex.kernel.packed import (
 from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
 from paraflex.mechanism import AngleLaw, Joint, Mechanism, PointRef
+
+# Fields of a line that are those of a spring between points.
+_OF_SPRINGS = ("stiffness", "length", "damping")
 
 
 def pack_system(
@@ -46,13 +48,7 @@ def pack_system(
     for k, motor in zip(inputs_of(mechanism).motors, mechanism.motors, strict=True):
         packer.add_motor(mechanism.joint(motor.joint), k)
     lines = [
-        {
-            **packer.end(spring.a, "a"),
-            **packer.end(spring.b, "b"),
-            "stiffness": spring.stiffness,
-            "length": spring.length,
-            "damping": spring.damping,
-        }
+        packer.end(spring.a, "a") | packer.end(spring.b, "b") | {name: getattr(spring, name) for name in _OF_SPRINGS}
         for spring in mechanism.linear_springs
     ]
     loads = _load_records(mechanism, packer)
@@ -79,9 +75,6 @@ def pack_system(
         columns=np.concatenate([matrix.ravel() for matrix in columns]),
         products=np.concatenate([_products(body).ravel() for body in bodies]),
         bending=_bending(bodies, markers),
-        masses=_mass_records(bodies),
-        mass_shape=np.concatenate([np.zeros((3, 0)), *(_mass_rows(body) for body in bodies)], axis=1),
-        mass_weights=np.concatenate([np.zeros(0), *(w for body in bodies for w in _mass_weights(body))]),
         places=np.concatenate([_places(body).ravel() for body in bodies]),
         spans=np.concatenate([_spans(body).ravel() for body in bodies]),
         inertias=np.concatenate([_inertias(body).ravel() for body in bodies]),
@@ -137,9 +130,7 @@ class _Packer:
         """Add the ports of a term, and the contribution of its ends on the ground to its rows."""
         axis, rows = -1, 2 if term.kind == POINT else 1
         if term.kind == AXIS:
-            axis = self.add_axis(
-                term.a, term.b, direction=term.direction, carrier=term.carrier, row=row, weight=term.weight
-            )
+            axis = self.add_axis(term, row=row)
         for ref, weight in ((term.a, -term.weight), (term.b, term.weight)):
             if ref.on_ground:
                 if term.kind == POINT:
@@ -152,45 +143,25 @@ class _Packer:
                 marker, parts = self.axes[axis]["b"], 2
             else:
                 marker, parts = self.axes[axis]["a"], {"nothing": 2, "track": 4}.get(term.carrier, 3)
-            self.ports[self.index[ref.body]].append(
-                {
-                    "marker": marker,
-                    "kind": term.kind,
-                    "row": row,
-                    "rows": rows,
-                    "parts": parts,
-                    "axis": axis,
-                    "weight": weight,
-                }
-            )
+            port = {"marker": marker, "kind": term.kind, "row": row, "rows": rows, "parts": parts, "axis": axis}
+            self.ports[self.index[ref.body]].append(port | {"weight": weight})
 
-    def add_axis(
-        self,
-        a: PointRef,
-        b: PointRef,
-        *,
-        direction: float,
-        carrier: str,
-        row: int = -1,
-        weight: float = 1.0,
-        signal: int = -1,
-    ) -> int:
-        ends = self.end(a, "a") | self.end(b, "b")
-        track = -1
+    def add_axis(self, term: Term, row: int = -1, signal: int = -1) -> int:
+        ends, carrier, track = self.end(term.a, "a") | self.end(term.b, "b"), term.carrier, -1
         if carrier in ("frame", "track"):
             # The frame has no slope of its own, and a track counts from its origin.
             fixed = self.markers[int(ends["a"])].on_frame
             self.markers[int(ends["a"])] = fixed if carrier == "frame" else replace(fixed, x0=np.zeros(2))
         if carrier == "track":
-            self.tracks.append(self.index[a.body])
+            self.tracks.append(self.index[term.a.body])
             track = len(self.tracks) - 1
-        record = {"angle": direction, "row": row, "weight": weight, "signal": signal, "track": track}
+        record = {"angle": term.direction, "row": row, "weight": term.weight, "signal": signal, "track": track}
         self.axes.append(ends | record | {"between": int(carrier == "nothing")})
         return len(self.axes) - 1
 
     def add_motor(self, joint: Joint, signal: int) -> None:
         if joint.slides:
-            self.add_axis(joint.a, joint.b, signal=signal, **axis_of(joint))
+            self.add_axis(coordinate(joint), signal=signal)
             return
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0)):
             if not ref.on_ground:
@@ -200,32 +171,22 @@ class _Packer:
 
 def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
     """Deflections of beams that points slide on: records, breaks and coefficients."""
-    records, breaks, coefficients = [], [np.zeros(0)], [np.zeros(0)]
-    for body in bodies:
-        pieces = transverse_pieces(body)
-        records.append(
-            {
-                "first": sum(part.size for part in breaks),
-                "pieces": pieces.shape[0],
-                "coefficients": sum(part.size for part in coefficients),
-            }
-        )
-        assert body.mesh is not None
-        breaks.append(body.mesh.nodes)
-        coefficients.append(pieces.ravel())
-    return records, np.concatenate(breaks), np.concatenate(coefficients)
+    breaks = [body.mesh.nodes for body in bodies if body.mesh is not None]
+    pieces = [transverse_pieces(body) for body in bodies]
+    starts = zip(*(np.cumsum([0, *(part.size for part in parts)]).tolist() for parts in (breaks, pieces)), strict=True)
+    records = [
+        {"first": first, "pieces": len(part), "coefficients": coefficients}
+        for (first, coefficients), part in zip(starts, pieces, strict=False)
+    ]
+    return records, np.concatenate([np.zeros(0), *breaks]), np.concatenate([np.zeros(0), *map(np.ravel, pieces)])
 
 
 def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float]]:
     """Components of loads that are numbers, and the signals of those that are laws in time."""
     signals, made = iter(inputs_of(mechanism).loads), []
     for load in mechanism.loads:
-        record: dict[str, float] = {
-            "marker": packer.add_marker(load.point),
-            "x_signal": -1,
-            "y_signal": -1,
-            "torque_signal": -1,
-        }
+        record: dict[str, float] = dict.fromkeys(("x_signal", "y_signal", "torque_signal"), -1)
+        record["marker"] = packer.add_marker(load.point)
         names = (("fx", "x_signal"), ("fy", "y_signal")) if load.kind == "force" else (("torque", "torque_signal"),)
         for (number, signal), given in zip(names, load.components, strict=True):
             if isinstance(given, AngleLaw):
@@ -279,11 +240,9 @@ def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> Arra
     return np.concatenate([np.zeros(0), *(_padded(m.bending).ravel() for m in markers if m.bending is not None)])
 
 
-def _mass_weights(body: BodyCoordinates) -> list[Array]:
-    """Weights of each mass point, up to the last that is not zero."""
-    if body.points is None:
-        return []
-    return [row[: 1 + int(np.max(np.nonzero(row)[0], initial=-1))] for row in body.points.weights]
+def _mass_points(body: BodyCoordinates) -> tuple[int, int]:
+    """Number of mass points, and of the Gauss points that lead them."""
+    return (0, 0) if body.points is None else body.points.weights.shape
 
 
 def _places(body: BodyCoordinates) -> Array:
@@ -305,35 +264,6 @@ def _inertias(body: BodyCoordinates) -> Array:
     return np.zeros((3, 0)) if points is None else _padded(np.stack([points.x, points.mass, points.inertia]))
 
 
-def _mass_rows(body: BodyCoordinates) -> Array:
-    if body.points is None:
-        return np.zeros((3, 0))
-    rows = np.concatenate([body.points.N, body.points.slope[:, None]], axis=1)
-    return rows.transpose(1, 0, 2).reshape(3, -1)
-
-
-def _mass_records(bodies: tuple[BodyCoordinates, ...]) -> NDArray[np.void]:
-    values = []
-    shape = start = 0
-    for body in bodies:
-        for k, weights in enumerate(_mass_weights(body)):
-            points = body.points
-            assert points is not None
-            values.append(
-                {
-                    "shape": shape,
-                    "weights": start,
-                    "reach": weights.size,
-                    "x": points.x[k],
-                    "mass": points.mass[k],
-                    "inertia": points.inertia[k],
-                }
-            )
-            shape += body.nf
-            start += weights.size
-    return records(MASS, values)
-
-
 def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:
     """Records of dictionaries by field, zero where one has none; complex where a number is."""
     blank = dict.fromkeys(dtype.names or (), 0)
@@ -347,13 +277,13 @@ def _body_records(bodies, ports, motor_sides, columns) -> NDArray[np.void]:
     values: list[dict] = []
     start: Counter[str] = Counter()
     for body, body_ports, body_motors, matrix in zip(bodies, ports, motor_sides, columns, strict=True):
-        s, parts = body.integrals, sum(port["parts"] for port in body_ports)
+        s, parts, (points, slopes) = body.integrals, sum(port["parts"] for port in body_ports), _mass_points(body)
         own = _own_sizes(body, parts) | {"port": len(body_ports), "motor": len(body_motors), "columns": matrix.size}
         starts = {name: start[name] for name in own}
         start.update(own)
         values.append(
             starts
-            | {f"{name}_end": start[name] for name in ("port", "motor", "mass")}
+            | {f"{name}_end": start[name] for name in ("port", "motor")}
             | {
                 "offset": body.offset,
                 "nf": body.nf,
@@ -362,8 +292,9 @@ def _body_records(bodies, ports, motor_sides, columns) -> NDArray[np.void]:
                 "damping": starts["damping"] if own["damping"] else -1,
                 "parts": parts,
                 "lanes": _lanes(parts),
-                "slopes": 0 if body.points is None else body.points.weights.shape[1],
-                "pitch": padded(own["mass"]),
+                "points": points,
+                "slopes": slopes,
+                "pitch": padded(points),
                 "full": int(_is_full(body)),
                 "m": s.m,
                 "S1x": s.S1[0],
@@ -382,7 +313,7 @@ def _lanes(parts: int) -> int:
 def _own_sizes(body: BodyCoordinates, parts: int) -> dict[str, int]:
     """Length of a body's part of each array, by the field that holds its start."""
     size, full = 3 + body.nf, _is_full(body)
-    masses, slopes = (0, 0) if body.points is None else body.points.weights.shape
+    points, slopes = _mass_points(body)
     return {
         "flex": body.nf,
         "square": body.nf**2,
@@ -390,10 +321,9 @@ def _own_sizes(body: BodyCoordinates, parts: int) -> dict[str, int]:
         "damping": _coupled_damping(body).size,
         "block": parts * _lanes(parts),
         "jac": size * _lanes(parts),
-        "mass": masses,
-        "places": 3 * body.nf * padded(masses),
-        "spans": slopes * padded(masses),
-        "inertias": 3 * padded(masses),
+        "places": 3 * body.nf * padded(points),
+        "spans": slopes * padded(points),
+        "inertias": 3 * padded(points),
         "dense": size**2 if full else 0,
         "inverse": size * padded(size) if full else 0,
     }

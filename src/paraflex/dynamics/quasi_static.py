@@ -16,12 +16,10 @@ from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.projection import LeastChange, constraint_change, project, second_rates
 from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.state import State
+from paraflex.dynamics.state import VELOCITY_STIFFNESS, State
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import AngleLaw, Load, PrescribedAngle
 
-# Weight of stiffness against mass [s^2]: that of `dynamics.state`, links move and do not begin to bend.
-_STIFFNESS = 1e3
 # How far the mechanism moves for a central difference [m, rad].
 _DIFFERENCE_MOVE = 1e-3
 
@@ -142,7 +140,7 @@ class _Motion:
         return project(self._change(q), np.zeros(self.system.n) if near is None else near, partial(self._rates, q))
 
     def _change(self, q: Array) -> LeastChange:
-        return constraint_change(self.system, q, _STIFFNESS, every_spring=True)
+        return constraint_change(self.system, q, VELOCITY_STIFFNESS, every_spring=True)
 
     def _rates(self, q: Array, v: Array) -> Array:
         return self.system.constraints(self.signals, self.time, q, v)[1]

@@ -33,11 +33,6 @@ _MOST_DENSE = 1000
 _WORTH_WHILE = 0.5
 
 
-def width(system: System) -> int:
-    """The largest number of coordinates of a body."""
-    return max(3 + body.nf for body in system.bodies)
-
-
 def without_stiffness(packed: PackedSystem) -> PackedSystem:
     """The same system with zero bending stiffness of beams, as their stiffness, known exactly, dominates all else."""
     modal = packed.modal.copy()
@@ -53,7 +48,7 @@ def body_masses(system: System, q: Array) -> list[Array]:
     """
     bare = without_stiffness(system.packed)
     bare = bare._replace(gravity=np.zeros(2), loads=bare.loads[:0], lines=bare.lines[:0])
-    columns = width(system)
+    columns = max(3 + body.nf for body in system.bodies)
     a, forces = np.zeros((2, columns, system.n))
     for body in system.bodies:
         a[np.arange(3 + body.nf), np.arange(body.all.start, body.all.stop)] = 1.0

@@ -8,8 +8,8 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.dynamics.following import driven_rows
-from paraflex.dynamics.joint_coordinates import joint_coordinate, value_text
+from paraflex.dynamics.following import drives_at
+from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.projection import NAMED, second_rates
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence
 from paraflex.dynamics.system import System
@@ -77,5 +77,4 @@ def barred_drives(system: System, q: Array, found: Dependence) -> str:
     for k, row in enumerate(found.dropped):
         part = np.abs(found.coefficients[:, k]) * units[found.kept] / units[row]
         rows |= {row, *found.kept[part > _PART * max(1.0, part.max(initial=0.0))].tolist()}
-    drives = [motion for motion, row in driven_rows(system) if row in rows]
-    return ", ".join(f"{one.name} at {value_text(system, one.joint, q)}" for one in drives)
+    return drives_at(system, q, rows)

@@ -19,7 +19,7 @@ from paraflex.dynamics.projection import assemble, constraint_change, least_chan
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.special import special_start
-from paraflex.dynamics.state import State, consistent_state, reference_pose, undeformed
+from paraflex.dynamics.state import VELOCITY_STIFFNESS, State, consistent_state, reference_pose, undeformed
 from paraflex.dynamics.system import System, build_system
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
@@ -44,8 +44,6 @@ _SLIP = 1e-6
 _SMALL_TERMS = 1e-4
 # Given deflections of one beam may contradict each other by this fraction of them.
 _CONTRADICTION = 1e-9
-# Weight of stiffness against mass [s^2]: links move and do not begin to bend, unless they must.
-_VELOCITY_STIFFNESS = 1e3
 
 
 @checked_arguments()
@@ -237,7 +235,7 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
             body = system.body(name)
             v[body.all] = _all_values(body, values, f"start.rates.{name}")
     else:
-        for stiffness in (_VELOCITY_STIFFNESS, 0.0):
+        for stiffness in (VELOCITY_STIFFNESS, 0.0):
             change = least_change(link_metric(system, q, stiffness), C, units)
             v = project(change, np.zeros(system.n), lambda v: C @ v - wanted)
             # Flexures move by bending alone: while links are held stiff their projection is too ill-conditioned.

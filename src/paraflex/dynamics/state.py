@@ -13,6 +13,7 @@ import scipy
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
+from paraflex.dynamics.joint_coordinates import marker_position
 from paraflex.dynamics.projection import (
     NAMED,
     assemble,
@@ -41,7 +42,7 @@ _ASIDE = 1e-2
 # Links that must be deflected by more than this part of their size for loops to close do not fit together.
 _LARGEST_DEFLECTION = 0.1
 # Weight of stiffness against mass [s^2] for velocities: rates of deflection are to be small against those of links.
-_VELOCITY_STIFFNESS = 1e3
+VELOCITY_STIFFNESS = 1e3
 
 
 @given_as("a state", "a state, as dynamics.consistent_state makes it")
@@ -162,13 +163,7 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
 
 def point_position(system: System, q: Array, ref: PointRef) -> Array:
     """Ground-frame position (2,) of a named point at q [m]."""
-    marker = system.marker(ref)
-    if ref.on_ground:
-        return marker.x0
-    body = system.bodies[marker.body]
-    c, s = np.cos(q[body.angle]), np.sin(q[body.angle])
-    local = marker.place(q[body.flexible])
-    return q[body.position] + np.array([c * local[0] - s * local[1], s * local[0] + c * local[1]])
+    return marker_position(system, system.marker(ref), q[None])[0]
 
 
 def assembled_position(system: System, signals: Signals, t: float, q: Array) -> Array:
@@ -321,7 +316,7 @@ def consistent_state(
     q = assembled_position(system, signals, time, q)
     try:
         if velocity is None:
-            v = project_velocity(system, signals, time, q, np.zeros(system.n), _VELOCITY_STIFFNESS)
+            v = project_velocity(system, signals, time, q, np.zeros(system.n), VELOCITY_STIFFNESS)
         else:
             v = project_velocity(system, signals, time, q, velocity)
         check_accelerations(system, signals, time, q, v)

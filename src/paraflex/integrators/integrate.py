@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -376,17 +376,9 @@ def _solution(
         work=samples.energy[reached, 2],
         status=status,
         message=message,
-        steps=figures.steps,
-        rejected=figures.rejected,
-        newton_iterations=figures.newton_iterations,
-        factorisations=figures.factorisations,
         wall_time=wall_time,
-        constraint_position_max=figures.constraint_position_max,
-        constraint_velocity_max=figures.constraint_velocity_max,
-        energy_balance_max=figures.energy_balance_max,
         singular_positions=tuple(figures.passages.mean(axis=0).tolist()),
         method=options.method.name,
-        evaluations=figures.evaluations,
-        multiplier_errors=figures.multiplier_errors,
+        **{one.name: getattr(figures, one.name) for one in fields(figures) if one.name != "passages"},
         event="" if crossing is None else str(crossing.function.event),
     )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from math import factorial, perm
+from math import factorial
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
 from paraflex.arrays import Array
 from paraflex.dynamics import Inputs
@@ -47,16 +48,8 @@ def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
     short = float(np.min(np.diff(signals.breaks[first : last + 1])))
     rounding = _ROUNDING * float(np.sum(largest * short ** np.arange(largest.size)))
     for order in range(derivatives):
-        left, right = _derivative(before, order, x), _derivative(after, order, 0.0)
+        left, right = (float(polyval(at, polyder(one, order))) for one, at in ((before, x), (after, 0.0)))
         size = max(abs(left), factorial(order) * largest[order])
         if abs(right - left) > max(_SMOOTH * size, rounding / short**order):
             return True
     return False
-
-
-def _derivative(coefficients: Array, order: int, x: float) -> float:
-    """Derivative of a polynomial with coefficients of ascending powers."""
-    value = 0.0
-    for power in range(coefficients.size - 1, order - 1, -1):
-        value = value * x + perm(power, order) * float(coefficients[power])
-    return value

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import Inputs
@@ -42,13 +41,10 @@ def step_limits(signals: Signals, inputs: Inputs) -> StepLimits:
     if not own:
         return StepLimits(np.zeros(0), np.zeros(0))
     times = np.unique(np.concatenate([limits.times for limits in own]))
-    steps = np.min([limits.steps[_piece(limits.times, times)] for limits in own], axis=0)
+    pieces = [np.clip(np.searchsorted(limits.times, times, side="right") - 1, 0, None) for limits in own]
+    steps = np.min([limits.steps[piece] for limits, piece in zip(own, pieces, strict=True)], axis=0)
     first = np.append(True, steps[1:] != steps[:-1])
     return StepLimits(np.ascontiguousarray(times[first]), np.ascontiguousarray(steps[first]))
-
-
-def _piece(starts: Array, times: Array) -> NDArray[np.intp]:
-    return np.clip(np.searchsorted(starts, times, side="right") - 1, 0, None)
 
 
 def _limits_of(signals: Signals, k: int, order: int) -> StepLimits:

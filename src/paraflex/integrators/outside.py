@@ -17,8 +17,8 @@ from paraflex.integrators.scipy_methods import ScipyStepper
 from paraflex.integrators.stepper import Stepper, Steps
 from paraflex.integrators.stiffness import warn_if_stiff
 from paraflex.integrators.sundials import CvodeStepper, IdaStepper
+from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.linear import factor_system
-from paraflex.kernel.ode import stored_energy
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import FINISHED, PAUSED, Samples
 

@@ -12,16 +12,8 @@ from __future__ import annotations
 from math import atan2, cos, sin
 
 from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import apply_force, apply_torque, marker_angle, marker_motion
-from paraflex.kernel.packed import CONSTRAINT, SPRING
-
-
-@inlined
-def axis_end(system, marker, x, y, q, v, a):
-    """Position, velocity and acceleration of one end of an axis, and R s there: zero on the ground."""
-    if marker < 0:
-        return x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    return marker_motion(system, system.markers[marker], q, v, a)
+from paraflex.kernel.joints import apply_force, apply_torque, end_motion, marker_angles, row_part
+from paraflex.kernel.packed import CONSTRAINT
 
 
 @inlined
@@ -34,13 +26,12 @@ def line_turn(dx, dy, ux, uy):
 @inlined
 def axis_frame(system, axis, q, v, a):
     """Geometry of an axis: d and its two derivatives, the angle theta and its two, and R s of both ends."""
-    pax, pay, vax, vay, aax, aay, rax, ray = axis_end(system, axis.a, axis.ax, axis.ay, q, v, a)
-    pbx, pby, vbx, vby, abx, aby, rbx, rby = axis_end(system, axis.b, axis.bx, axis.by, q, v, a)
+    pax, pay, vax, vay, aax, aay, rax, ray = end_motion(system, axis.a, axis.ax, axis.ay, q, v, a)
+    pbx, pby, vbx, vby, abx, aby, rbx, rby = end_motion(system, axis.b, axis.bx, axis.by, q, v, a)
     theta, w, dw = axis.angle, 0.0, 0.0
     if axis.a >= 0:
-        marker = system.markers[axis.a]
-        theta += marker_angle(system, marker, q)
-        w, dw = marker_angle(system, marker, v), marker_angle(system, marker, a)
+        angle, w, dw = marker_angles(system, system.markers[axis.a], q, v, a)
+        theta += angle
     d = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
     if axis.between:
         # The second derivative of theta has no share in the value's, as n . d is zero.
@@ -73,9 +64,9 @@ def axis_motion(system, k, q, v, a):
     if axis.track >= 0:
         # e is the normal of the beam's axis, (ey, -ex) points along it.
         x, dx, ddx, across = component(ey, -ex, d, w, dw)
-        W_u, slope, bend = track_deflection(system, axis, x, q)
-        W_v, slope_v, _ = track_deflection(system, axis, x, v)
-        W_a, _, _ = track_deflection(system, axis, x, a)
+        W_u, slope, bend, _ = track_deflection(system, axis, x, q)
+        W_v, slope_v, _, _ = track_deflection(system, axis, x, v)
+        W_a, _, _, _ = track_deflection(system, axis, x, a)
         value -= W_u
         rate -= slope * dx + W_v
         acceleration -= slope * ddx + bend * dx * dx + 2.0 * slope_v * dx + W_a
@@ -85,50 +76,51 @@ def axis_motion(system, k, q, v, a):
 
 
 @inlined
-def track_piece(system, track, x):
-    """The piece of a track at x, and the distance from the piece's start; the end pieces extend beyond the ends."""
-    piece = 0
+def track_piece(system, axis, x):
+    """Of an axis's track: its body, the first coefficient of the piece at x, and the distance from the piece's start.
+
+    The end pieces extend beyond the ends.
+    """
+    track, owner, piece = system.tracks[axis.track], system.markers[axis.a].body, 0
     while piece < track.pieces - 1 and x > system.track_breaks[track.first + piece + 1]:
         piece += 1
-    return piece, x - system.track_breaks[track.first + piece]
+    first = track.coefficients + piece * 6 * system.bodies[owner].nf
+    return owner, first, x - system.track_breaks[track.first + piece]
 
 
 @inlined
 def track_row(system, at, stride, z):
-    """One entry of W, W' and W'': a polynomial of degree five in z, coefficients `stride` apart."""
-    value, slope, bend = 0.0, 0.0, 0.0
+    """One entry of W and its three derivatives: a polynomial of degree five in z, coefficients `stride` apart."""
+    value, slope, bend, third = 0.0, 0.0, 0.0, 0.0
     for power in range(5, -1, -1):
+        third = third * z + 3.0 * bend
         bend = bend * z + 2.0 * slope
         slope = slope * z + value
         value = value * z + system.track_coefficients[at + power * stride]
-    return value, slope, bend
+    return value, slope, bend, third
 
 
 @routine
 def track_deflection(system, axis, x, vector):
-    """W(x), W'(x) and W''(x) of a track times the flexible part of a system vector."""
-    track = system.tracks[axis.track]
-    body = system.bodies[system.markers[axis.a].body]
-    piece, z = track_piece(system, track, x)
-    at = track.coefficients + piece * 6 * body.nf
-    total, slope, bend = 0.0, 0.0, 0.0
+    """W(x) of a track, and its three derivatives, times the flexible part of a system vector."""
+    owner, at, z = track_piece(system, axis, x)
+    body = system.bodies[owner]
+    total, slope, bend, third = 0.0, 0.0, 0.0, 0.0
     for j in range(body.nf):
-        w0, w1, w2 = track_row(system, at + j, body.nf, z)
+        w0, w1, w2, w3 = track_row(system, at + j, body.nf, z)
         u = vector[body.offset + 3 + j]
         total += w0 * u
         slope += w1 * u
         bend += w2 * u
-    return total, slope, bend
+        third += w3 * u
+    return total, slope, bend, third
 
 
 @routine
 def add_track(system, k, x, scale, row, at):
     """Add scale W(x) of axis k to row[at:]."""
-    axis = system.axes[k]
-    track = system.tracks[axis.track]
-    nf = system.bodies[system.markers[axis.a].body].nf
-    piece, z = track_piece(system, track, x)
-    start = track.coefficients + piece * 6 * nf
+    owner, start, z = track_piece(system, system.axes[k], x)
+    nf = system.bodies[owner].nf
     for j in range(nf):
         row[at + j] += scale * track_row(system, start + j, nf, z)[0]
 
@@ -157,12 +149,7 @@ def apply_axes(system, q, v, a, lam, weights, torques, f, rows):
             force = -torques[axis.signal]
         else:
             force = axis.weight * lam[axis.row]
-            kind = system.rows[axis.row].kind
-            if kind == CONSTRAINT:
-                part = weights[0] * acceleration + weights[1] * rate + weights[2] * value
-            else:
-                part = value if kind == SPRING else rate
-            rows[axis.row] += axis.weight * part
+            rows[axis.row] += axis.weight * row_part(system.rows[axis.row].kind, weights, (value, rate, acceleration))
         apply_axis(system, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f)
 
 

@@ -35,14 +35,14 @@ def second_order_equations(system, i, q, v, a, f, points):
     place_sums(system, i, q, v, a, points)
     fx, fy, lever_y, lever_x, turning = zeros(), zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
-        y, slope, mass = pitch + block, 2 * pitch + block, load(system.inertias, body.inertias + pitch + block)
+        y, slope = pitch + block, 2 * pitch + block
+        mass, inertia = masses(system, i, block)
         sx, vx, bx = shortened(system, i, block, points)
         sy, vy, by = load(points.q, y), load(points.v, y), load(points.a, y)
         relative = add_scaled(add_scaled(add_scaled(bx, sy, -dw), sx, -w * w), vy, -2.0 * w)
         mx = add_product(add_scaled(zeros(), mass, ax), mass, relative)
         relative = add_scaled(add_scaled(add_scaled(by, sx, dw), sy, -w * w), vx, 2.0 * w)
         my = add_product(add_scaled(zeros(), mass, ay), mass, relative)
-        inertia = load(system.inertias, body.inertias + 2 * pitch + block)
         turn = add_product(add_scaled(zeros(), inertia, dw), inertia, load(points.a, slope))
         store(points.shares, block, mx)
         store(points.shares, y, my)
@@ -58,6 +58,13 @@ def second_order_equations(system, i, q, v, a, f, points):
     f[o] = c * summed(fx) - s * summed(fy)
     f[o + 1] = s * summed(fx) + c * summed(fy)
     f[o + 2] = summed(lever_x) - summed(lever_y) + summed(turning)
+
+
+@inlined
+def masses(system, i, block):
+    """Masses and moments of inertia of eight mass points."""
+    at, pitch = system.bodies[i].inertias + block, system.bodies[i].pitch
+    return load(system.inertias, at + pitch), load(system.inertias, at + 2 * pitch)
 
 
 @inlined
@@ -105,8 +112,8 @@ def second_order_energy(system, i, q, v, points):
     # Twice the energy: of the origin's motion, of motion against it, and of the two together.
     total, together_x, together_y, square = zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
-        y, slope, at = pitch + block, 2 * pitch + block, body.inertias + block
-        mass, inertia = load(system.inertias, at + pitch), load(system.inertias, at + 2 * pitch)
+        y, slope = pitch + block, 2 * pitch + block
+        mass, inertia = masses(system, i, block)
         sx, vx, _ = shortened(system, i, block, points)
         vx, vy = add_scaled(vx, load(points.q, y), -w), add_scaled(load(points.v, y), sx, w)
         square = add_product(add_product(zeros(), vx, vx), vy, vy)
@@ -133,10 +140,7 @@ def second_order_mass(system, i, q, work, points):
     place_sums(system, i, q, q, q, points)
     m, first_x, first_y, second = zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
-        mass, inertia = (
-            load(system.inertias, body.inertias + pitch + block),
-            load(system.inertias, body.inertias + 2 * pitch + block),
-        )
+        mass, inertia = masses(system, i, block)
         sx, _, _ = shortened(system, i, block, points)
         sy = load(points.q, pitch + block)
         store(points.shares, block, sx)
@@ -168,10 +172,7 @@ def second_order_mass_row(system, i, l, mass, points):
         for j in range(body.slopes):
             scale = -points.q[2 * pitch + j] * system.places[place + 2 * pitch + j]
             x = add_scaled(x, load(system.spans, body.spans + j * pitch + block), scale)
-        m, inertia = (
-            load(system.inertias, body.inertias + pitch + block),
-            load(system.inertias, body.inertias + 2 * pitch + block),
-        )
+        m, inertia = masses(system, i, block)
         store(points.rows, 2 * pitch * l + block, x)
         m_x, m_y = add_product(zeros(), m, x), add_product(zeros(), m, y)
         store(points.rows, 2 * pitch * l + pitch + block, m_x)
@@ -184,10 +185,7 @@ def second_order_mass_row(system, i, l, mass, points):
     for d in range(l + 1):
         total, other = zeros(), body.places + 3 * pitch * d
         for block in range(0, pitch, LANES):
-            m, inertia = (
-                load(system.inertias, body.inertias + pitch + block),
-                load(system.inertias, body.inertias + 2 * pitch + block),
-            )
+            m, inertia = masses(system, i, block)
             total = add_product(
                 total, load(points.rows, 2 * pitch * l + pitch + block), load(points.rows, 2 * pitch * d + block)
             )

@@ -10,7 +10,7 @@ from math import cos, sin
 
 from paraflex.kernel.bending import second_order_energy, second_order_equations, second_order_shortening
 from paraflex.kernel.compiling import inlined, kernel
-from paraflex.kernel.joints import apply_lines, apply_loads
+from paraflex.kernel.joints import apply_lines, apply_loads, line_energy, spring_energy
 from paraflex.kernel.packed import DAMPING, OMEGA2, S2X, S2Y
 from paraflex.kernel.sums import GJ_SUM, I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums, clear_shares, hand_on
 from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
@@ -183,3 +183,11 @@ def add_energies(system, q, v, scratch, points):
         kinetic += t
         strain += u
     return kinetic, strain
+
+
+@kernel
+def stored_energy(system, q, v, lam, scratch):
+    """Kinetic energy, strain energy with that of springs, and work of gravity: see `weight_work`."""
+    kinetic, strain = system_energy(system, q, v, scratch)
+    strain += spring_energy(system, lam) + line_energy(system, q, v)[0]
+    return kinetic, strain, weight_work(system, q, scratch)

@@ -16,7 +16,7 @@ from paraflex.kernel.joints import (
     apply_force,
     apply_torque,
     body_joints,
-    marker_angle,
+    marker_angles,
     marker_motion,
     start_rows,
 )
@@ -84,9 +84,7 @@ def task_values(system, marker, coordinates, q, v, a, out):
         elif coordinates[i] == 1:
             out[0, i], out[1, i], out[2, i] = py, vy, ay
         else:
-            out[0, i] = marker_angle(system, marker, q)
-            out[1, i] = marker_angle(system, marker, v)
-            out[2, i] = marker_angle(system, marker, a)
+            out[0, i], out[1, i], out[2, i] = marker_angles(system, marker, q, v, a)
 
 
 @routine

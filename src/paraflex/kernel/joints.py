@@ -65,11 +65,23 @@ def marker_angle(system, marker, vector):
 
 
 @inlined
+def marker_angles(system, marker, q, v, a):
+    """The angle of a marker, its rate and its acceleration."""
+    return marker_angle(system, marker, q), marker_angle(system, marker, v), marker_angle(system, marker, a)
+
+
+@inlined
+def marker_shapes(system, marker, q, v, a):
+    """N u of a marker with its two derivatives, and halves of f with its."""
+    shapes = marker_shape(system, marker, q), marker_shape(system, marker, v), marker_shape(system, marker, a)
+    return shapes, marker_shortening(system, system.bending, marker, q, v, a)
+
+
+@inlined
 def marker_motion(system, marker, q, v, a):
     """Position, velocity and acceleration of a marker in the ground frame, and its s there: (p, p', p'', R s)."""
     angle = q[system.bodies[marker.body].offset + 2]
-    shapes = marker_shape(system, marker, q), marker_shape(system, marker, v), marker_shape(system, marker, a)
-    shortening = marker_shortening(system, system.bending, marker, q, v, a)
+    shapes, shortening = marker_shapes(system, marker, q, v, a)
     return point_motion(system, marker, cos(angle), sin(angle), shapes, shortening, q, v, a)
 
 
@@ -77,17 +89,7 @@ def marker_motion(system, marker, q, v, a):
 def point_motion(system, marker, c, s, shapes, shortening, q, v, a):
     """Result of `marker_motion`, by N u and its rates, halves of f and its, cosine and sine of the body's angle."""
     o = system.bodies[marker.body].offset
-    w, dw = v[o + 2], a[o + 2]
-    (sx, sy), (ux, uy), (bx, by) = shapes
-    f0, f1, f2 = shortening
-    sx += marker.x - f0
-    sy += marker.y
-    ux -= f1
-    bx -= f2
-    # Body-frame velocity and acceleration relative to the origin.
-    vx, vy = ux - w * sy, uy + w * sx
-    ax = bx - dw * sy - w * w * sx - 2.0 * w * uy
-    ay = by + dw * sx - w * w * sy + 2.0 * w * ux
+    (sx, sy), _, (vx, vy), (ax, ay) = relative_motion(marker, v[o + 2], a[o + 2], shapes, shortening)
     rx, ry = c * sx - s * sy, s * sx + c * sy
     return (
         q[o] + rx,
@@ -99,6 +101,20 @@ def point_motion(system, marker, c, s, shapes, shortening, q, v, a):
         rx,
         ry,
     )
+
+
+@inlined
+def relative_motion(marker, w, dw, shapes, shortening):
+    """Motion of a marker relative to its body's origin, in the body frame: s, its own rate, velocity, acceleration."""
+    (sx, sy), (ux, uy), (bx, by) = shapes
+    f0, f1, f2 = shortening
+    sx += marker.x - f0
+    sy += marker.y
+    ux -= f1
+    bx -= f2
+    ax = bx - dw * sy - w * w * sx - 2.0 * w * uy
+    ay = by + dw * sx - w * w * sy + 2.0 * w * ux
+    return (sx, sy), (ux, uy), (ux - w * sy, uy + w * sx), (ax, ay)
 
 
 @inlined
@@ -223,20 +239,19 @@ def apply_loads(system, q, torques, f):
 
 
 @inlined
-def line_end(system, marker, x, y, q, v):
-    """Position and velocity of an end of a line spring, and R s there: (px, py, vx, vy, rx, ry)."""
+def end_motion(system, marker, x, y, q, v, a):
+    """Motion of one end of an axis or a line, as `marker_motion`: a marker, or at rest at (x, y) on the ground."""
     if marker < 0:
-        return x, y, 0.0, 0.0, 0.0, 0.0
-    px, py, vx, vy, _, _, rx, ry = marker_motion(system, system.markers[marker], q, v, v)
-    return px, py, vx, vy, rx, ry
+        return x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return marker_motion(system, system.markers[marker], q, v, a)
 
 
 @routine
 def line_state(system, k, q, v):
     """Elongation, its rate, and the unit vector from a to b of line spring k; zero length has no direction."""
     line = system.lines[k]
-    ax, ay, vax, vay, _, _ = line_end(system, line.a, line.ax, line.ay, q, v)
-    bx, by, vbx, vby, _, _ = line_end(system, line.b, line.bx, line.by, q, v)
+    ax, ay, vax, vay, _, _, _, _ = end_motion(system, line.a, line.ax, line.ay, q, v, v)
+    bx, by, vbx, vby, _, _, _, _ = end_motion(system, line.b, line.bx, line.by, q, v, v)
     dx, dy = bx - ax, by - ay
     length = sqrt(dx * dx + dy * dy)
     if length == 0.0:
@@ -253,11 +268,13 @@ def apply_lines(system, q, v, f):
         stretch, rate, ex, ey = line_state(system, k, q, v)
         pull = line.stiffness * stretch + line.damping * rate
         if line.a >= 0:
-            _, _, _, _, rx, ry = line_end(system, line.a, line.ax, line.ay, q, v)
-            apply_force(system, system.markers[line.a], q, -pull * ex, -pull * ey, rx, ry, f)
+            marker = system.markers[line.a]
+            _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, v, v)
+            apply_force(system, marker, q, -pull * ex, -pull * ey, rx, ry, f)
         if line.b >= 0:
-            _, _, _, _, rx, ry = line_end(system, line.b, line.bx, line.by, q, v)
-            apply_force(system, system.markers[line.b], q, pull * ex, pull * ey, rx, ry, f)
+            marker = system.markers[line.b]
+            _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, v, v)
+            apply_force(system, marker, q, pull * ex, pull * ey, rx, ry, f)
 
 
 @routine
@@ -285,18 +302,11 @@ def load_power(system, q, v, torques):
 
 
 @inlined
-def angle_row(system, marker, kind, weights, q, v, a):
-    """Contribution of a marker's angle and its rates to a row of a kind; linear in q, v and a."""
-    angles = marker_angle(system, marker, q), marker_angle(system, marker, v), marker_angle(system, marker, a)
-    return angle_part(kind, weights, angles)
-
-
-@inlined
-def angle_part(kind, weights, angles):
-    """Contribution of an angle and its rates to a row of a kind."""
+def row_part(kind, weights, values):
+    """Contribution of a value and its two derivatives to a row of a kind; linear in these."""
     if kind == CONSTRAINT:
-        return weights[0] * angles[2] + weights[1] * angles[1] + weights[2] * angles[0]
-    return angles[0] if kind == SPRING else angles[1]
+        return weights[0] * values[2] + weights[1] * values[1] + weights[2] * values[0]
+    return values[0] if kind == SPRING else values[1]
 
 
 @inlined
@@ -364,9 +374,8 @@ def add_joints(system, i, q, v, a, lam, weights, scratch, f, rows):
         marker = system.markers[port.marker]
         r, weight, x = port.row, port.weight, marker.column
         if port.kind == ANGLE:
-            rows[r] += weight * angle_part(
-                system.rows[r].kind, weights, angle_by_sums(system, marker, q, v, a, scratch)
-            )
+            angles = angle_by_sums(system, marker, q, v, a, scratch)
+            rows[r] += weight * row_part(system.rows[r].kind, weights, angles)
             share_torque(system, marker, weight * lam[r], scratch, f)
         elif port.kind != AXIS:
             px, py, vx, vy, ax, ay, rx, ry = motion_by_sums(system, marker, q, v, a, scratch)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from math import ceil, inf, pi, sqrt
 
 from paraflex.kernel.arrays import add, copy, fill
-from paraflex.kernel.bodies import system_energy, weight_work
+from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.compiling import kernel, releases_lock, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.error import note_forces
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_system
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.near import note_crossing
@@ -161,10 +160,8 @@ def start(system, signals, controls, march, work, out):
     """First stage and first sample of a run."""
     begin(system, signals, controls, march, work)
     t, a, lam = march.clock[TIME], march.stage_a[1, 0], march.stage_lam[0]
-    kinetic, strain = system_energy(system, march.q, march.v, work.scratch)
-    strain += spring_energy(system, lam) + line_energy(system, march.q, march.v)[0]
+    kinetic, strain, march.clock[WEIGHT_0] = stored_energy(system, march.q, march.v, lam, work.scratch)
     march.clock[ENERGY_0] = kinetic + strain
-    march.clock[WEIGHT_0] = weight_work(system, march.q, work.scratch)
     if out.times.size > 0 and out.times[0] <= t:
         copy(march.q, out.q[0])
         copy(march.v, out.v[0])
@@ -253,9 +250,8 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
         march.counts[PREPARED] = 0
     note_forces(h, march)
     note_cycle(system, controls, march)
-    kinetic, strain = system_energy(system, march.q, march.v, work.scratch)
-    strain += spring_energy(system, march.stage_lam[0]) + line_energy(system, march.q, march.v)[0]
-    done = march.clock[WORK] + weight_work(system, march.q, work.scratch) - march.clock[WEIGHT_0]
+    kinetic, strain, weight = stored_energy(system, march.q, march.v, march.stage_lam[0], work.scratch)
+    done = march.clock[WORK] + weight - march.clock[WEIGHT_0]
     balance = abs(kinetic + strain - march.clock[ENERGY_0] - done)
     march.clock[BALANCE] = max(march.clock[BALANCE], balance)
     note_constraints(system, signals, t + h, march, work)

@@ -118,18 +118,9 @@ def hold_rows(system, work, held, lag, rows, scratch):
     matrix's times 1 + lag / root.
     """
     for i in range(system.rows.size):
-        first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
-        follows, square = 0.0, 0.0
-        for k in range(first, i):
-            follows += work.schur[start + k] * scratch[k]
-            square += work.schur[start + k] * work.schur[start + k]
-        inverse = work.schur[start + i]
-        if inverse == 0.0:
-            scratch[i] = 0.0
-            continue
+        follows, inverse, root = rest_of_row(system, work, i, scratch)
         scratch[i] = (rows[i] - follows) * inverse
-        root = 1.0 / sqrt(1.0 + square * inverse * inverse)
-        if work.redundant[i] > 0.0 or root > FAR * held:
+        if inverse == 0.0 or work.redundant[i] > 0.0 or root > FAR * held:
             continue
         scratch[i] = 0.0 if root < held else scratch[i] / (1.0 + lag / root)
         rows[i] = follows + scratch[i] / inverse
@@ -139,20 +130,23 @@ def hold_rows(system, work, held, lag, rows, scratch):
 def damp_rows(system, work, held, rows, scratch):
     """Right-hand sides of rows, reduced as if roots below `held` were `held`."""
     for i in range(system.rows.size):
-        first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
-        follows, square = 0.0, 0.0
-        for k in range(first, i):
-            follows += work.schur[start + k] * scratch[k]
-            square += work.schur[start + k] * work.schur[start + k]
-        inverse = work.schur[start + i]
-        if inverse == 0.0:
-            scratch[i] = 0.0
-            continue
-        root = 1.0 / sqrt(1.0 + square * inverse * inverse)
+        follows, inverse, root = rest_of_row(system, work, i, scratch)
         scratch[i] = (rows[i] - follows) * inverse
-        if root < held and work.redundant[i] == 0.0:
+        if inverse != 0.0 and root < held and work.redundant[i] == 0.0:
             scratch[i] *= root / held
             rows[i] = follows + scratch[i] / inverse
+
+
+@inlined
+def rest_of_row(system, work, i, scratch):
+    """What row i has by the reduced rows before it, the inverse of its pivot, and the root of its part left."""
+    first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
+    follows, square = 0.0, 0.0
+    for k in range(first, i):
+        follows += work.schur[start + k] * scratch[k]
+        square += work.schur[start + k] * work.schur[start + k]
+    inverse = work.schur[start + i]
+    return follows, inverse, 1.0 / sqrt(1.0 + square * inverse * inverse)
 
 
 @routine
@@ -172,17 +166,20 @@ def return_to_constraints(system, signals, t, held, march, work):
     march.counts[HELD_END] = 1 if work.least[0] < held * held else 0
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
-        if largest_violation(system, work.rows) > NO_VIOLATION:
-            hold_rows(system, work, held, 0.0, work.rows, work.mu)
-            least_change(system, work.rows, work)
-            add(work.x, q)
+        remove_violation(system, held, q, work)
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
-        if largest_violation(system, work.rows) > NO_VIOLATION:
-            hold_rows(system, work, held, 0.0, work.rows, work.mu)
-            least_change(system, work.rows, work)
-            add(work.x, v)
+        remove_violation(system, held, v, work)
     return distance * LEAVING if march.counts[DRIFTED] > 0 else distance
+
+
+@routine
+def remove_violation(system, held, x, work):
+    """Change coordinates or velocities x so that rows with the violations in work.rows hold: see `hold_rows`."""
+    if largest_violation(system, work.rows) > NO_VIOLATION:
+        hold_rows(system, work, held, 0.0, work.rows, work.mu)
+        least_change(system, work.rows, work)
+        add(work.x, x)
 
 
 @routine

@@ -6,11 +6,9 @@ A third part is added to (q, v), the work done so far: whoever integrates the mo
 from __future__ import annotations
 
 from paraflex.kernel.arrays import add, copy, fill
-from paraflex.kernel.bodies import system_energy, weight_work
 from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.packed import CONSTRAINT, INDEX_1
 from paraflex.kernel.stage import equations
@@ -64,14 +62,6 @@ def rates(system, signals, t, weights, y, a, lam, torques, work, dependent_part,
         dy[n + j] = a[j]
     dy[2 * n] = input_power(system, signals, t, q, v, lam, torques, work)
     return dependent
-
-
-@kernel
-def stored_energy(system, q, v, lam, scratch):
-    """Kinetic energy, strain energy with that of springs, and work of gravity: see `bodies.weight_work`."""
-    kinetic, strain = system_energy(system, q, v, scratch)
-    strain += spring_energy(system, lam) + line_energy(system, q, v)[0]
-    return kinetic, strain, weight_work(system, q, scratch)
 
 
 @kernel
@@ -140,29 +130,26 @@ def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direc
             direction.q[j] = 1.0
             residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
             direction.q[j] = 0.0
-            fill_column(direction, j, out)
+            fill_column(direction, n, 2 * n, j, out)
             direction.v[j], direction.a[j] = 1.0, c
             residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
             direction.v[j], direction.a[j] = 0.0, 0.0
-            fill_column(direction, n + j, out)
+            fill_column(direction, n, 2 * n, n + j, out)
             out[j, j], out[j, n + j] = c, -1.0
     for r in range(m):
         direction.lam[r] = 1.0
         residual_tangent(system, weights, q, v, a, lam, torques, work.compliance, 0, system.bodies.size, direction)
         direction.lam[r] = 0.0
-        fill_column(direction, 2 * n + r, out)
+        fill_column(direction, n, 2 * n, 2 * n + r, out)
     drop_rows(dropped, 2 * n, 2 * n, out)
     out[2 * n + m, 2 * n + m] = c
 
 
 @routine
-def fill_column(direction, column, out):
-    """The changes of the equations of motion and of the rows into a column of out, below n rows."""
-    n = direction.f.size
-    for k in range(n):
-        out[n + k, column] = direction.f[k]
-    for r in range(direction.rows.size):
-        out[2 * n + r, column] = direction.rows[r]
+def fill_column(direction, first, rows, column, out):
+    """The changes of the equations of motion and of the rows into a column of out, from `first` and from `rows` on."""
+    copy(direction.f, out[first : first + direction.f.size, column])
+    copy(direction.rows, out[rows : rows + direction.rows.size, column])
 
 
 @routine
@@ -221,23 +208,23 @@ def stabilised_jacobian(system, y, dy, c, dropped, weight, torques, idle, work, 
         for j in range(system.bodies[i].offset, system.bodies[i].offset + 3 + system.bodies[i].nf):
             direction.q[j] = 1.0
             residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
-            fill_column(direction, j, out)
+            fill_column(direction, n, 2 * n, j, out)
             reaction_tangent(system, places, q, idle, idle, mu, idle, i, i + 1, direction)
             direction.q[j] = 0.0
-            fill_reactions(direction, j, out)
+            fill_column(direction, 0, 2 * n + m, j, out)
             direction.v[j], direction.a[j] = 1.0, c
             residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
             direction.v[j], direction.a[j] = 0.0, 0.0
-            fill_column(direction, n + j, out)
+            fill_column(direction, n, 2 * n, n + j, out)
             out[j, j] += weight[j] * c
             out[j, n + j] = -weight[j]
     for r in range(m):
         direction.lam[r] = 1.0
         residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, 0, system.bodies.size, direction)
-        fill_column(direction, 2 * n + r, out)
+        fill_column(direction, n, 2 * n, 2 * n + r, out)
         if not dropped[r] and system.rows[r].kind == CONSTRAINT:
             reaction_tangent(system, places, q, idle, idle, mu, idle, 0, system.bodies.size, direction)
-            fill_reactions(direction, 2 * n + m + r, out)
+            fill_column(direction, 0, 2 * n + m, 2 * n + m + r, out)
         else:
             fill(out[2 * n + m + r], 0.0)
         direction.lam[r] = 0.0
@@ -247,13 +234,3 @@ def stabilised_jacobian(system, y, dy, c, dropped, weight, torques, idle, work, 
             out[2 * n + m + r, 2 * n + m + r] = 1.0
     drop_rows(dropped, 2 * n, 2 * n, out)
     out[2 * n + 2 * m, 2 * n + 2 * m] = c
-
-
-@routine
-def fill_reactions(direction, column, out):
-    """The changes of Phi_q^T mu and of Phi into a column of out."""
-    n, m = direction.f.size, direction.rows.size
-    for k in range(n):
-        out[k, column] = direction.f[k]
-    for r in range(m):
-        out[2 * n + m + r, column] = direction.rows[r]

@@ -49,8 +49,7 @@ BODY = np.dtype(
         ("parts", np.int64),  # rows of its ports' Jacobians
         ("lanes", np.int64),  # columns of `Workspace.jac` and `Workspace.response`: these rows and three more, padded
         ("jac", np.int64),  # first entry of its (3 + nf) x lanes matrices there
-        ("mass", np.int64),  # its mass points, of second-order geometry: mass .. mass_end, none of linear
-        ("mass_end", np.int64),
+        ("points", np.int64),  # number of its mass points, of second-order geometry: none of linear
         ("slopes", np.int64),  # the first so many of them are Gauss points
         ("pitch", np.int64),  # the number of its mass points, padded
         ("places", np.int64),  # first entry of its nf x 3 pitch matrix in `places`
@@ -75,17 +74,6 @@ MARKER = np.dtype(
         ("bending", np.int64),  # first entry of its matrix in `bending`, -1 for none
         ("x", np.float64),
         ("y", np.float64),
-    ],
-    align=True,
-)
-MASS = np.dtype(
-    [
-        ("shape", np.int64),  # first column of its rows in `mass_shape`
-        ("weights", np.int64),  # first of its weights in `mass_weights`
-        ("reach", np.int64),  # and how many: the Gauss points up to it
-        ("x", np.float64),
-        ("mass", np.float64),
-        ("inertia", np.float64),
     ],
     align=True,
 )
@@ -201,10 +189,7 @@ class PackedSystem(NamedTuple):
     # Of second-order geometry; without it, and without dense iteration matrices, there is no `bending`, and kernels are
     # compiled without all that needs it.
     bending: NDArray[np.float64] | None  # nf x stride of every marker that bending moves: f = u . bending u
-    masses: NDArray[np.void]
-    mass_shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every mass point
-    mass_weights: NDArray[np.float64]
-    # The same for vectors: Nx, Ny and N2' of all points by coordinate; weights of all by Gauss point; x, mass and
+    # Of every body's mass points: Nx, Ny and N2' of all by coordinate; weights of all by Gauss point; x, mass and
     # moment of inertia.
     places: NDArray[np.float64]
     spans: NDArray[np.float64]

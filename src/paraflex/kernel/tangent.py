@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
 from paraflex.kernel.constraints import joint_rates
-from paraflex.kernel.joints import angle_row, apply_torque, line_end, load_at, marker_motion
+from paraflex.kernel.joints import apply_torque, end_motion, load_at, marker_angles, marker_motion, row_part
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem
 from paraflex.kernel.tangent_axes import axes_tangent
 from paraflex.kernel.tangent_bodies import body_terms_tangent
@@ -40,8 +40,7 @@ class Tangent(NamedTuple):
 def make_tangent(system: PackedSystem) -> Tangent:
     """Allocate a direction, zero, and the changes along it."""
     n, m = int(sum(3 + body["nf"] for body in system.bodies)), system.rows.size
-    width = int((system.bodies["mass_end"] - system.bodies["mass"]).max(initial=0))
-    points = None if system.bending is None else np.zeros((8, width))
+    points = None if system.bending is None else np.zeros((8, int(system.bodies["points"].max(initial=0))))
     q, v, a, f = (np.zeros(n) for _ in range(4))
     return Tangent(q, v, a, np.zeros(m), f, np.zeros(m), np.zeros(m), points)
 
@@ -55,9 +54,8 @@ def joints_tangent(system, i, weights, q, v, a, lam, direction):
         marker = system.markers[port.marker]
         r, weight = port.row, port.weight
         if port.kind == ANGLE:
-            direction.rows[r] += weight * angle_row(
-                system, marker, system.rows[r].kind, weights, direction.q, direction.v, direction.a
-            )
+            angles = marker_angles(system, marker, direction.q, direction.v, direction.a)
+            direction.rows[r] += weight * row_part(system.rows[r].kind, weights, angles)
             apply_torque(system, marker, weight * direction.lam[r], direction.f)
         elif port.kind != AXIS:
             _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, v, a)
@@ -86,8 +84,8 @@ def lines_tangent(system, q, v, direction):
     """Subtract the change of the generalised forces of springs and dampers between points from direction.f."""
     for k in range(system.lines.size):
         line = system.lines[k]
-        ax, ay, vax, vay, rax, ray = line_end(system, line.a, line.ax, line.ay, q, v)
-        bx, by, vbx, vby, rbx, rby = line_end(system, line.b, line.bx, line.by, q, v)
+        ax, ay, vax, vay, _, _, rax, ray = end_motion(system, line.a, line.ax, line.ay, q, v, v)
+        bx, by, vbx, vby, _, _, rbx, rby = end_motion(system, line.b, line.bx, line.by, q, v, v)
         dx, dy = bx - ax, by - ay
         length = sqrt(dx * dx + dy * dy)
         # Without length there is no direction, and `line_state` has no force.

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from paraflex.kernel.axes import axis_frame, component, line_turn, track_piece
+from paraflex.kernel.axes import axis_frame, component, line_turn, track_deflection, track_piece, track_row
 from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.joints import apply_torque, marker_angle
-from paraflex.kernel.packed import CONSTRAINT, SPRING
+from paraflex.kernel.joints import apply_torque, marker_angles, row_part
 from paraflex.kernel.tangent_points import end_tangent, force_tangent
 
 
@@ -33,39 +32,12 @@ def component_tangent(ex, ey, at, change, w, dw, turn, d_w, d_dw):
 
 
 @routine
-def track_sums(system, axis, x, vector):
-    """W, W', W'' and W''' of a track at x, times the flexible part of a system vector."""
-    track = system.tracks[axis.track]
-    body = system.bodies[system.markers[axis.a].body]
-    n = body.nf
-    piece, z = track_piece(system, track, x)
-    at = track.coefficients + piece * 6 * n
-    sums = (0.0, 0.0, 0.0, 0.0)
-    for j in range(n):
-        value, slope, bend, third = 0.0, 0.0, 0.0, 0.0
-        for power in range(5, -1, -1):
-            third = third * z + 3.0 * bend
-            bend = bend * z + 2.0 * slope
-            slope = slope * z + value
-            value = value * z + system.track_coefficients[at + j + power * n]
-        u = vector[body.offset + 3 + j]
-        sums = (sums[0] + value * u, sums[1] + slope * u, sums[2] + bend * u, sums[3] + third * u)
-    return sums
-
-
-@routine
 def add_track_tangent(system, axis, x, d_x, force, d_force, direction):
     """Subtract from direction.f the change of force W(x) along a track."""
-    track = system.tracks[axis.track]
-    body = system.bodies[system.markers[axis.a].body]
-    n = body.nf
-    piece, z = track_piece(system, track, x)
-    at = track.coefficients + piece * 6 * n
-    for j in range(n):
-        value, slope = 0.0, 0.0
-        for power in range(5, -1, -1):
-            slope = slope * z + value
-            value = value * z + system.track_coefficients[at + j + power * n]
+    owner, at, z = track_piece(system, axis, x)
+    body = system.bodies[owner]
+    for j in range(body.nf):
+        value, slope, _, _ = track_row(system, at + j, body.nf, z)
         direction.f[body.offset + 3 + j] -= d_force * value + force * slope * d_x
 
 
@@ -83,12 +55,7 @@ def axis_tangent(system, k, q, v, a, direction):
     change = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
     turn, d_w, d_dw = 0.0, 0.0, 0.0
     if axis.a >= 0:
-        marker = system.markers[axis.a]
-        turn, d_w, d_dw = (
-            marker_angle(system, marker, direction.q),
-            marker_angle(system, marker, direction.v),
-            marker_angle(system, marker, direction.a),
-        )
+        turn, d_w, d_dw = marker_angles(system, system.markers[axis.a], direction.q, direction.v, direction.a)
     if axis.between:
         # Where n . d is zero the second derivative is stationary in w, and has no part of dw.
         turn, d_w, d_dw = line_turn(at[0], at[1], change[0], change[1]), 0.0, 0.0
@@ -100,12 +67,12 @@ def axis_tangent(system, k, q, v, a, direction):
     if axis.track >= 0:
         x, dx, ddx, across = component(ey, -ex, at, w, dw)
         d_x, d_dx, d_ddx, d_across = component_tangent(ey, -ex, at, change, w, dw, turn, d_w, d_dw)
-        _, slope, bend, third = track_sums(system, axis, x, q)
-        _, slope_v, bend_v, _ = track_sums(system, axis, x, v)
-        _, slope_a, _, _ = track_sums(system, axis, x, a)
-        W_dq, slope_dq, bend_dq, _ = track_sums(system, axis, x, direction.q)
-        W_dv, slope_dv, _, _ = track_sums(system, axis, x, direction.v)
-        W_da, _, _, _ = track_sums(system, axis, x, direction.a)
+        _, slope, bend, third = track_deflection(system, axis, x, q)
+        _, slope_v, bend_v, _ = track_deflection(system, axis, x, v)
+        _, slope_a, _, _ = track_deflection(system, axis, x, a)
+        W_dq, slope_dq, bend_dq, _ = track_deflection(system, axis, x, direction.q)
+        W_dv, slope_dv, _, _ = track_deflection(system, axis, x, direction.v)
+        W_da, _, _, _ = track_deflection(system, axis, x, direction.a)
         d_slope, d_bend = bend * d_x + slope_dq, third * d_x + bend_dq
         value_ -= slope * d_x + W_dq
         rate_ -= d_slope * dx + slope * d_dx + slope_v * d_x + W_dv
@@ -132,11 +99,7 @@ def axes_tangent(system, weights, q, v, a, lam, torques, direction):
             force = -torques[axis.signal]
         else:
             force, d_force = axis.weight * lam[axis.row], axis.weight * direction.lam[axis.row]
-            kind = system.rows[axis.row].kind
-            if kind == CONSTRAINT:
-                part = weights[0] * acceleration + weights[1] * rate + weights[2] * value
-            else:
-                part = value if kind == SPRING else rate
+            part = row_part(system.rows[axis.row].kind, weights, (value, rate, acceleration))
             direction.rows[axis.row] += axis.weight * part
         fx, fy = force * ex, force * ey
         d_fx, d_fy = d_force * ex + force * d_ex, d_force * ey + force * d_ey

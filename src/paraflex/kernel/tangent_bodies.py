@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from math import cos, sin
-
 from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.packed import DAMPING, GJ, I1, NX, NY, OMEGA2, S2X, S2Y, SLOPE
+from paraflex.kernel.packed import DAMPING, GJ, I1, OMEGA2, S2X, S2Y
+from paraflex.kernel.tangent_points import rotated_tangent, turned_axes
 
 # Rows of Tangent.points: slopes at the Gauss points, their two derivatives, the axial force carried there; and changes
 # of these.
@@ -13,8 +12,8 @@ W0, W1, W2, AXIAL_FORCE, DW0, DW1, DW2, DAXIAL_FORCE = range(8)
 
 
 @inlined
-def plane_sums(shapes, x, y, first, n, e, u, d_u):
-    """Sums of n coordinates from e on by rows x and y of a table of shapes, from column `first` on: of u and of d_u.
+def plane_sums(shapes, x, y, stride, n, e, u, d_u):
+    """Sums of n coordinates from e on, of u and of d_u, by shapes from x and from y on, `stride` apart.
 
     Returns
     -------
@@ -22,7 +21,7 @@ def plane_sums(shapes, x, y, first, n, e, u, d_u):
     """
     along, across, d_along, d_across = 0.0, 0.0, 0.0, 0.0
     for j in range(n):
-        Nx, Ny = shapes[x, first + j], shapes[y, first + j]
+        Nx, Ny = shapes[x + j * stride], shapes[y + j * stride]
         along += Nx * u[e + j]
         across += Ny * u[e + j]
         d_along += Nx * d_u[e + j]
@@ -31,21 +30,28 @@ def plane_sums(shapes, x, y, first, n, e, u, d_u):
 
 
 @inlined
-def body_tangent(system, i, q, v, a, direction):
-    """Change of M q'' + h + D u' + K u of body i, less its weight, into direction.f: see `bodies.body_equations`."""
-    body = system.bodies[i]
-    o, n, k = body.offset, body.nf, body.flex
-    e = o + 3
-    c, s = cos(q[o + 2]), sin(q[o + 2])
-    w, dw, turn = v[o + 2], a[o + 2], direction.q[o + 2]
-    d_w, d_dw = direction.v[o + 2], direction.a[o + 2]
+def frame_tangent(system, i, q, a, direction):
+    """Axes of body i, their turn, and in them its acceleration less gravity and the change of that."""
+    o = system.bodies[i].offset
+    c, s, turn = turned_axes(system, i, q, direction)
     gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
     d_ax = c * direction.a[o] + s * direction.a[o + 1] + turn * ay
     d_ay = c * direction.a[o + 1] - s * direction.a[o] - turn * ax
-    (ux, uy), (d_sx, d_sy) = plane_sums(system.modal, S2X, S2Y, k, n, e, q, direction.q)
-    (vx, vy), (d_vx, d_vy) = plane_sums(system.modal, S2X, S2Y, k, n, e, v, direction.v)
-    (fx, fy), (d_fx, d_fy) = plane_sums(system.modal, S2X, S2Y, k, n, e, a, direction.a)
+    return (c, s, turn), ax, ay, d_ax, d_ay
+
+
+@inlined
+def body_tangent(system, i, q, v, a, direction):
+    """Change of M q'' + h + D u' + K u of body i, less its weight, into direction.f: see `bodies.body_equations`."""
+    body = system.bodies[i]
+    o, n, k = body.offset, body.nf, body.flex
+    e, x, y, width = o + 3, body.columns + S2X, body.columns + S2Y, body.width
+    w, dw, d_w, d_dw = v[o + 2], a[o + 2], direction.v[o + 2], direction.a[o + 2]
+    axes, ax, ay, d_ax, d_ay = frame_tangent(system, i, q, a, direction)
+    (ux, uy), (d_sx, d_sy) = plane_sums(system.columns, x, y, width, n, e, q, direction.q)
+    (vx, vy), (d_vx, d_vy) = plane_sums(system.columns, x, y, width, n, e, v, direction.v)
+    (fx, fy), (d_fx, d_fy) = plane_sums(system.columns, x, y, width, n, e, a, direction.a)
     sx, sy = body.S1x + ux, body.S1y + uy
     i1u, i1v, d_i1u, d_i1v = 0.0, 0.0, 0.0, 0.0
     for j in range(n):
@@ -88,8 +94,7 @@ def body_tangent(system, i, q, v, a, direction):
     by = body.m * ay + sx * dw + fy - w * w * sy + 2.0 * w * vx
     d_bx = body.m * d_ax - d_sy * dw - sy * d_dw + d_fx - w * w * d_sx - 2.0 * (w * d_w * sx + d_w * vy + w * d_vy)
     d_by = body.m * d_ay + d_sx * dw + sx * d_dw + d_fy - w * w * d_sy - 2.0 * (w * d_w * sy - d_w * vx - w * d_vx)
-    direction.f[o] = c * d_bx - s * d_by - turn * (s * bx + c * by)
-    direction.f[o + 1] = s * d_bx + c * d_by + turn * (c * bx - s * by)
+    direction.f[o], direction.f[o + 1] = rotated_tangent(axes, bx, by, d_bx, d_by)
     direction.f[o + 2] = d_sx * ay + sx * d_ay - d_sy * ax - sy * d_ax + d_mpf_a
     direction.f[o + 2] += (2.0 * d_i1u + d_uI2u) * dw + (body.I0 + 2.0 * i1u + uI2u) * d_dw
     direction.f[o + 2] += 2.0 * (d_w * (i1v + uI2v) + w * (d_i1v + d_uI2v))
@@ -101,11 +106,10 @@ def second_order_slopes(system, i, q, v, a, direction, points):
     body = system.bodies[i]
     e = body.offset + 3
     for j in range(body.slopes):
-        h = system.masses[body.mass + j].shape
         for row in range(8):
             points[row, j] = 0.0
         for l in range(body.nf):
-            slope = system.mass_shape[SLOPE, h + l]
+            slope = system.places[body.places + (3 * l + 2) * body.pitch + j]
             points[W0, j] += slope * q[e + l]
             points[W1, j] += slope * v[e + l]
             points[W2, j] += slope * a[e + l]
@@ -118,15 +122,10 @@ def second_order_slopes(system, i, q, v, a, direction, points):
 def second_order_tangent(system, i, q, v, a, direction, points):
     """Change of M q'' + h + D u' + K u of body i, less its weight, into direction.f: see `second_order_equations`."""
     body = system.bodies[i]
-    o, n = body.offset, body.nf
-    e = o + 3
-    c, s = cos(q[o + 2]), sin(q[o + 2])
-    w, dw, d_phi = v[o + 2], a[o + 2], direction.q[o + 2]
-    d_w, d_dw = direction.v[o + 2], direction.a[o + 2]
-    gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
-    ax, ay = c * gx + s * gy, c * gy - s * gx
-    d_ax = c * direction.a[o] + s * direction.a[o + 1] + d_phi * ay
-    d_ay = c * direction.a[o + 1] - s * direction.a[o] - d_phi * ax
+    o, n, pitch = body.offset, body.nf, body.pitch
+    e, stride = o + 3, 3 * pitch
+    w, dw, d_w, d_dw = v[o + 2], a[o + 2], direction.v[o + 2], direction.a[o + 2]
+    axes, ax, ay, d_ax, d_ay = frame_tangent(system, i, q, a, direction)
     second_order_slopes(system, i, q, v, a, direction, points)
     for l in range(n):
         direction.f[e + l] = (
@@ -134,15 +133,15 @@ def second_order_tangent(system, i, q, v, a, direction, points):
             + system.modal[DAMPING, body.flex + l] * direction.v[e + l]
         )
     fx, fy, d_fx, d_fy, d_torque = 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(body.mass, body.mass_end):
-        point = system.masses[k]
-        h = point.shape
-        (ux, sy), (d_sx, d_sy) = plane_sums(system.mass_shape, NX, NY, h, n, e, q, direction.q)
-        (vx, vy), (d_vx, d_vy) = plane_sums(system.mass_shape, NX, NY, h, n, e, v, direction.v)
-        (bx, by), (d_bx, d_by) = plane_sums(system.mass_shape, NX, NY, h, n, e, a, direction.a)
-        sx = point.x + ux
-        for j in range(point.reach):
-            weight = system.mass_weights[point.weights + j]
+    for k in range(body.points):
+        x, y, turns, at = body.places + k, body.places + pitch + k, body.places + 2 * pitch + k, body.inertias + k
+        mass, inertia = system.inertias[at + pitch], system.inertias[at + 2 * pitch]
+        (ux, sy), (d_sx, d_sy) = plane_sums(system.places, x, y, stride, n, e, q, direction.q)
+        (vx, vy), (d_vx, d_vy) = plane_sums(system.places, x, y, stride, n, e, v, direction.v)
+        (bx, by), (d_bx, d_by) = plane_sums(system.places, x, y, stride, n, e, a, direction.a)
+        sx = system.inertias[at] + ux
+        for j in range(body.slopes):
+            weight = system.spans[body.spans + j * pitch + k]
             s0, s1, s2 = points[W0, j], points[W1, j], points[W2, j]
             d0, d1, d2 = points[DW0, j], points[DW1, j], points[DW2, j]
             sx -= 0.5 * weight * s0 * s0
@@ -151,23 +150,23 @@ def second_order_tangent(system, i, q, v, a, direction, points):
             d_sx -= weight * s0 * d0
             d_vx -= weight * (d0 * s1 + s0 * d1)
             d_bx -= weight * (2.0 * s1 * d1 + d0 * s2 + s0 * d2)
-        mx = point.mass * (ax + bx - dw * sy - w * w * sx - 2.0 * w * vy)
-        my = point.mass * (ay + by + dw * sx - w * w * sy + 2.0 * w * vx)
+        mx = mass * (ax + bx - dw * sy - w * w * sx - 2.0 * w * vy)
+        my = mass * (ay + by + dw * sx - w * w * sy + 2.0 * w * vx)
         d_mx = d_ax + d_bx - d_dw * sy - dw * d_sy - w * w * d_sx - 2.0 * (w * d_w * sx + d_w * vy + w * d_vy)
         d_my = d_ay + d_by + d_dw * sx + dw * d_sx - w * w * d_sy - 2.0 * (w * d_w * sy - d_w * vx - w * d_vx)
-        d_mx, d_my = point.mass * d_mx, point.mass * d_my
+        d_mx, d_my = mass * d_mx, mass * d_my
         turn = 0.0
-        if point.inertia > 0.0:
+        if inertia > 0.0:
             turn = d_dw
             for l in range(n):
-                turn += system.mass_shape[SLOPE, h + l] * direction.a[e + l]
-            turn *= point.inertia
+                turn += system.places[turns + l * stride] * direction.a[e + l]
+            turn *= inertia
             for l in range(n):
-                direction.f[e + l] += system.mass_shape[SLOPE, h + l] * turn
+                direction.f[e + l] += system.places[turns + l * stride] * turn
         for l in range(n):
-            direction.f[e + l] += system.mass_shape[NX, h + l] * d_mx + system.mass_shape[NY, h + l] * d_my
-        for j in range(point.reach):
-            weight = system.mass_weights[point.weights + j]
+            direction.f[e + l] += system.places[x + l * stride] * d_mx + system.places[y + l * stride] * d_my
+        for j in range(body.slopes):
+            weight = system.spans[body.spans + j * pitch + k]
             points[AXIAL_FORCE, j] += weight * mx
             points[DAXIAL_FORCE, j] += weight * d_mx
         fx += mx
@@ -176,12 +175,10 @@ def second_order_tangent(system, i, q, v, a, direction, points):
         d_fy += d_my
         d_torque += d_sx * my + sx * d_my - d_sy * mx - sy * d_mx + turn
     for j in range(body.slopes):
-        h = system.masses[body.mass + j].shape
         force = points[DW0, j] * points[AXIAL_FORCE, j] + points[W0, j] * points[DAXIAL_FORCE, j]
         for l in range(n):
-            direction.f[e + l] -= system.mass_shape[SLOPE, h + l] * force
-    direction.f[o] = c * d_fx - s * d_fy - d_phi * (s * fx + c * fy)
-    direction.f[o + 1] = s * d_fx + c * d_fy + d_phi * (c * fx - s * fy)
+            direction.f[e + l] -= system.places[body.places + (3 * l + 2) * pitch + j] * force
+    direction.f[o], direction.f[o + 1] = rotated_tangent(axes, fx, fy, d_fx, d_fy)
     direction.f[o + 2] = d_torque
 
 

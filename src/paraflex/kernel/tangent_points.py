@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.joints import marker_shape, marker_shortening
+from paraflex.kernel.joints import marker_shape, marker_shapes, relative_motion
 from paraflex.kernel.packed import NX, NY
 
 
@@ -31,21 +31,27 @@ def shortening_tangent(system, bending, marker, q, v, a, direction):
     return f0, f1, f2
 
 
+@inlined
+def turned_axes(system, i, q, direction):
+    """Cosine and sine of a body's angle, and the change of the angle."""
+    angle = system.bodies[i].offset + 2
+    return cos(q[angle]), sin(q[angle]), direction.q[angle]
+
+
+@inlined
+def rotated_tangent(axes, x, y, d_x, d_y):
+    """Change of R (x, y), of a vector in the body frame that changes by (d_x, d_y), with `turned_axes`."""
+    c, s, turn = axes
+    return c * d_x - s * d_y - turn * (s * x + c * y), s * d_x + c * d_y + turn * (c * x - s * y)
+
+
 @routine
 def marker_tangent(system, marker, q, v, a, direction):
     """Changes of the results of `joints.marker_motion`: a marker's position, velocity, acceleration and R s."""
-    o = system.bodies[marker.body].offset
-    c, s = cos(q[o + 2]), sin(q[o + 2])
-    w, dw, turn = v[o + 2], a[o + 2], direction.q[o + 2]
-    d_w, d_dw = direction.v[o + 2], direction.a[o + 2]
-    sx, sy = marker_shape(system, marker, q)
-    ux, uy = marker_shape(system, marker, v)
-    bx, by = marker_shape(system, marker, a)
-    f0, f1, f2 = marker_shortening(system, system.bending, marker, q, v, a)
-    sx += marker.x - f0
-    sy += marker.y
-    ux -= f1
-    bx -= f2
+    o, axes = system.bodies[marker.body].offset, turned_axes(system, marker.body, q, direction)
+    w, dw, d_w, d_dw = v[o + 2], a[o + 2], direction.v[o + 2], direction.a[o + 2]
+    shapes, shortening = marker_shapes(system, marker, q, v, a)
+    (sx, sy), (ux, uy), (vx, vy), (ax, ay) = relative_motion(marker, w, dw, shapes, shortening)
     d_sx, d_sy = marker_shape(system, marker, direction.q)
     d_ux, d_uy = marker_shape(system, marker, direction.v)
     d_bx, d_by = marker_shape(system, marker, direction.a)
@@ -53,23 +59,14 @@ def marker_tangent(system, marker, q, v, a, direction):
     d_sx -= g0
     d_ux -= g1
     d_bx -= g2
-    vx, vy = ux - w * sy, uy + w * sx
     d_vx, d_vy = d_ux - d_w * sy - w * d_sy, d_uy + d_w * sx + w * d_sx
-    ax = bx - dw * sy - w * w * sx - 2.0 * w * uy
-    ay = by + dw * sx - w * w * sy + 2.0 * w * ux
     d_ax = d_bx - d_dw * sy - dw * d_sy - w * w * d_sx - 2.0 * (w * d_w * sx + d_w * uy + w * d_uy)
     d_ay = d_by + d_dw * sx + dw * d_sx - w * w * d_sy - 2.0 * (w * d_w * sy - d_w * ux - w * d_ux)
-    rx, ry = c * d_sx - s * d_sy - turn * (s * sx + c * sy), s * d_sx + c * d_sy + turn * (c * sx - s * sy)
-    return (
-        direction.q[o] + rx,
-        direction.q[o + 1] + ry,
-        direction.v[o] + c * d_vx - s * d_vy - turn * (s * vx + c * vy),
-        direction.v[o + 1] + s * d_vx + c * d_vy + turn * (c * vx - s * vy),
-        direction.a[o] + c * d_ax - s * d_ay - turn * (s * ax + c * ay),
-        direction.a[o + 1] + s * d_ax + c * d_ay + turn * (c * ax - s * ay),
-        rx,
-        ry,
-    )
+    rx, ry = rotated_tangent(axes, sx, sy, d_sx, d_sy)
+    vx, vy = rotated_tangent(axes, vx, vy, d_vx, d_vy)
+    ax, ay = rotated_tangent(axes, ax, ay, d_ax, d_ay)
+    x, y = direction.q[o] + rx, direction.q[o + 1] + ry
+    return x, y, direction.v[o] + vx, direction.v[o + 1] + vy, direction.a[o] + ax, direction.a[o + 1] + ay, rx, ry
 
 
 @routine
@@ -77,7 +74,7 @@ def force_tangent(system, marker, q, force, d_force, lever, d_lever, direction):
     """Add to direction.f the change of the generalised force of a force (x, y) at a marker, whose R s is the lever."""
     body = system.bodies[marker.body]
     o, e, k, n = body.offset, body.offset + 3, marker.shape, body.nf
-    c, s, turn = cos(q[o + 2]), sin(q[o + 2]), direction.q[o + 2]
+    c, s, turn = turned_axes(system, marker.body, q, direction)
     fx, fy = force
     d_fx, d_fy = d_force
     direction.f[o] += d_fx

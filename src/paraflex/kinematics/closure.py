@@ -323,19 +323,9 @@ class PathClosure:
         q, v, a = apart((3, k, n))
         basis = apart((k, n, self.coordinates.size))
         q[0] = pose
-        status, index, residual = close_path(
-            self.packed,
-            self.signals,
-            self.marker,
-            self.coordinates,
-            times,
-            target,
-            q,
-            v,
-            a,
-            basis,
-            make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size),
-        )
+        scratch = make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size)
+        given = (self.packed, self.signals, self.marker, self.coordinates, times, target)
+        status, index, residual = close_path(*given, q, v, a, basis, scratch)
         return status, int(index), residual, (q, v, a, basis)
 
     def approach(self, path: Path, pose: Array, start: float, end: float) -> Array:

@@ -52,20 +52,8 @@ class TrapezoidalLaw:
         t = np.clip(t, 0.0, self.duration)
         w = 2.0 * pi / T
         sine = a * np.sin(w * t)
-        # One half period of sine-shaped acceleration: its speed and distance as functions of time.
-        rising = np.minimum(t, 0.5 * T)
-        falling = np.maximum(t - T, 0.0)
-
-        def speed(x):
-            return a / w * (1.0 - np.cos(w * x))
-
-        def distance(x):
-            return a / w * (x - np.sin(w * x) / w)
-
-        cruise = a * T / pi
-        covered = distance(rising) + cruise * np.maximum(t - 0.5 * T, 0.0) - distance(falling)
-        acceleration = np.where(t < 0.5 * T, sine, np.where(t < T, 0.0, -sine))
-        return covered, speed(rising) - speed(falling), acceleration
+        covered, speed, _, _ = _ramped(t, 0.5 * T, T, w, a / w, a * T / pi)
+        return covered, speed, np.where(t < 0.5 * T, sine, np.where(t < T, 0.0, -sine))
 
 
 @dataclass(frozen=True)
@@ -113,16 +101,25 @@ class CruiseLaw:
     def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
         """Length covered [m], speed and acceleration at times t [s]; at rest outside the motion."""
         R, v, end = self.ramp, self.speed, self.duration
-        t = np.clip(t, 0.0, end)
-        rising, falling = np.minimum(t, R), np.maximum(t - (end - R), 0.0)
         w = pi / R
+        covered, speed, rising, falling = _ramped(np.clip(t, 0.0, end), R, end - R, w, 0.5 * v, v)
+        return covered, speed, 0.5 * v * w * (np.sin(w * rising) - np.sin(w * falling))
 
-        def distance(x):
-            return 0.5 * v * (x - np.sin(w * x) / w)
 
-        def rate(x):
-            return 0.5 * v * (1.0 - np.cos(w * x))
+def _ramped(
+    t: Array, ramp: float, slows: float, w: float, half: float, cruise: float
+) -> tuple[Array, Array, Array, Array]:
+    """Length covered and speed at times t by ramps up from 0 and down from `slows` on, and times in either ramp.
 
-        covered = distance(rising) + v * np.maximum(t - R, 0.0) - distance(falling)
-        acceleration = 0.5 * v * w * (np.sin(w * rising) - np.sin(w * falling))
-        return covered, rate(rising) - rate(falling), acceleration
+    A ramp's acceleration is half w sin(w x), up to twice `half`, the speed of the cruise.
+    """
+    rising, falling = np.minimum(t, ramp), np.maximum(t - slows, 0.0)
+
+    def distance(x):
+        return half * (x - np.sin(w * x) / w)
+
+    def speed(x):
+        return half * (1.0 - np.cos(w * x))
+
+    covered = distance(rising) + cruise * np.maximum(t - ramp, 0.0) - distance(falling)
+    return covered, speed(rising) - speed(falling), rising, falling

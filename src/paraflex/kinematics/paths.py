@@ -247,10 +247,7 @@ class PointPath(CheckedFields):
     def _spline(self) -> scipy.interpolate.BSpline:
         points = np.array(self.points)
         chords = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
-        times = self.motion_time * np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
-        still = np.zeros(points.shape[1])
-        rest = [(1, still), (2, still)]
-        return scipy.interpolate.make_interp_spline(times, points, k=5, bc_type=(rest, rest))
+        return _resting(self.motion_time * np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum(), points)
 
     @property
     def duration(self) -> float:
@@ -264,17 +261,11 @@ class PointPath(CheckedFields):
 
     def evaluate(self, t: Array) -> PathMotion:
         """The motion at times t."""
-        return PathMotion(*self._motion(t)[:, :, :2])
+        return PathMotion(*_rest_to_rest(self._spline, t, self.motion_time)[:, :, :2])
 
     def turning(self, t: Array) -> Array | None:
         """Angle [rad] of the end-effector, its rate and acceleration at times t (3, k); None without angles."""
-        return self._motion(t)[:, :, 2] if len(self.points[0]) > 2 else None
-
-    def _motion(self, t: Array) -> Array:
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        inside = ((t >= 0.0) & (t <= self.motion_time))[:, None]
-        x = np.clip(t, 0.0, self.motion_time)
-        return np.stack([self._spline(x), *(np.where(inside, self._spline(x, k), 0.0) for k in (1, 2))])
+        return _rest_to_rest(self._spline, t, self.motion_time)[:, :, 2] if len(self.points[0]) > 2 else None
 
 
 @dataclass(frozen=True)
@@ -355,9 +346,8 @@ class TabulatedPath(CheckedFields):
 
     @cached_property
     def _timed(self) -> scipy.interpolate.BSpline:
-        times, still = np.array(self.times), np.zeros(2)
-        rest = [(1, still), (2, still)]
-        return scipy.interpolate.make_interp_spline(times - times[0], self.points, k=5, bc_type=(rest, rest))
+        times = np.array(self.times)
+        return _resting(times - times[0], np.array(self.points))
 
     @cached_property
     def _curve(self) -> _Curve:
@@ -407,11 +397,22 @@ class TabulatedPath(CheckedFields):
 
     def evaluate(self, t: Array) -> PathMotion:
         """The motion at times t."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
         if self.times is None:
-            return self._curve.motion(*self._law.evaluate(t))
-        inside, x = ((t >= 0.0) & (t <= self.duration))[:, None], np.clip(t, 0.0, self.duration)
-        return PathMotion(self._timed(x), *(np.where(inside, self._timed(x, k), 0.0) for k in (1, 2)))
+            return self._curve.motion(*self._law.evaluate(np.atleast_1d(np.asarray(t, dtype=float))))
+        return PathMotion(*_rest_to_rest(self._timed, t, self.duration))
+
+
+def _resting(times: Array, points: Array) -> scipy.interpolate.BSpline:
+    """The quintic spline through points (k, columns) at times (k,), at rest without acceleration at both ends."""
+    rest = [(order, np.zeros(points.shape[1])) for order in (1, 2)]
+    return scipy.interpolate.make_interp_spline(times, points, k=5, bc_type=(rest, rest))
+
+
+def _rest_to_rest(spline: scipy.interpolate.BSpline, t: Array, end: float) -> Array:
+    """Values of a spline on [0, end] and two derivatives (3, k, columns) at times t; at rest before and after."""
+    t = np.atleast_1d(np.asarray(t, dtype=float))
+    inside, x = ((t >= 0.0) & (t <= end))[:, None], np.clip(t, 0.0, end)
+    return np.stack([spline(x), *(np.where(inside, spline(x, order), 0.0) for order in (1, 2))])
 
 
 class _Curve:

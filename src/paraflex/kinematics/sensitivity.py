@@ -85,7 +85,8 @@ def _residual_change(
 ) -> tuple[Array, Array]:
     """Derivative of the residuals along a change of the motion, and the Jacobians of the motion itself."""
     total = np.zeros((*motion.q.shape, 3 + closure.coordinates.size))
-    here, jacobians = _residuals(closure, closure.packed, closure.signals, motion.t, _target(closure, motion), motion)
+    target = closure.target(motion.path, motion.t)
+    here, jacobians = _residuals(closure, closure.packed, closure.signals, motion.t, target, motion)
     for near in nearby:
         moved = MotionChange(
             *(x + near.place * dx for x, dx in zip((motion.q, motion.v, motion.a, motion.basis), change, strict=True))
@@ -94,10 +95,6 @@ def _residual_change(
         # Less what there is here: what does not change leaves no rounding.
         total += near.weight * (found - here)
     return total, jacobians
-
-
-def _target(closure: PathClosure, motion: RigidMotion) -> Array:
-    return closure.target(motion.path, motion.t)
 
 
 def _residuals(

@@ -115,16 +115,14 @@ def _axial_force(bodies: Sequence[Bending], run: Solution, limit: float) -> Indi
     body, k = _largest(bodies, [np.abs(body.axial) for body in bodies])
     value = float(abs(body.axial[k]))
     text = f"{body.name}'s axial force reaches {value:.2g} of its buckling load at {run.instant(k)}"
-    return Indicator("axial force", value, limit, body.name, float(run.t[k]), f"{text}{_upto(limit)}", _remedy(body))
+    return _indicator("axial force", value, limit, body, run.t[k], text)
 
 
 def _slope(bodies: Sequence[Bending], run: Solution) -> Indicator:
     body, k = _largest(bodies, [body.slope for body in bodies])
     value = float(body.slope[k])
     text = f"{body.name} bends to a slope of {value:.2g} rad at {run.instant(k)}"
-    return Indicator(
-        "slope", value, SLOPE_LIMIT, body.name, float(run.t[k]), f"{text}{_upto(SLOPE_LIMIT)}", _remedy(body)
-    )
+    return _indicator("slope", value, SLOPE_LIMIT, body, run.t[k], text)
 
 
 def _shortening(bodies: Sequence[Bending], run: Solution, following: Following) -> Indicator:
@@ -135,15 +133,7 @@ def _shortening(bodies: Sequence[Bending], run: Solution, following: Following) 
         f"bending shortens {body.name} by {1e3 * shortening:.2g} mm at {run.instant(k)}, which is left out; with the "
         f"actuation's condition number of {following.condition:.2g} that is {value:.2g} of the tracking error"
     )
-    return Indicator(
-        "shortening",
-        value,
-        SHORTENING_LIMIT,
-        body.name,
-        float(run.t[k]),
-        f"{text}{_upto(SHORTENING_LIMIT)}",
-        _remedy(body),
-    )
+    return _indicator("shortening", value, SHORTENING_LIMIT, body, run.t[k], text)
 
 
 def of_second_order(bodies: Sequence[Bending], run: Solution) -> list[Indicator]:
@@ -155,9 +145,9 @@ def of_second_order(bodies: Sequence[Bending], run: Solution) -> list[Indicator]
     value = float(fourth_order(body.slope[k], _steady(body), tangent=body.tangent))
     text = (
         f"{body.name} bends to a slope of {body.slope[k]:.2g} rad at {run.instant(k)}; terms of fourth order, which "
-        f"are left out, are about {100.0 * value:.2g} % of its deflection (limit {100.0 * FOURTH_ORDER_LIMIT:g} %)"
+        f"are left out, are about {100.0 * value:.2g} % of its deflection"
     )
-    return [Indicator(_SECOND_ORDER, value, FOURTH_ORDER_LIMIT, body.name, float(run.t[k]), text, _remedy(body))]
+    return [_indicator(_SECOND_ORDER, value, FOURTH_ORDER_LIMIT, body, run.t[k], text, percent=True)]
 
 
 def fourth_order(slope: Number, compression: float, *, tangent: bool) -> Number:
@@ -187,8 +177,11 @@ def _largest(bodies: Sequence[Bending], values: Sequence[Array]) -> tuple[Bendin
     return bodies[one], int(np.argmax(values[one]))
 
 
-def _upto(limit: float) -> str:
-    return f" (limit {limit:g})"
+def _indicator(
+    name: str, value: float, limit: float, body: Bending, time: float, text: str, *, percent: bool = False
+) -> Indicator:
+    bound = f"{100.0 * limit:g} %" if percent else f"{limit:g}"
+    return Indicator(name, value, limit, body.name, float(time), f"{text} (limit {bound})", _remedy(body))
 
 
 def _remedy(body: Bending) -> str:

@@ -221,16 +221,15 @@ def _laws(mechanism: Mechanism, size: float, times: Array) -> Iterator[Finding]:
 
 def _drives(mechanism: Mechanism) -> Iterator[Finding]:
     driven = {one.joint: one.name for one in mechanism.prescribed}
+    shared: dict[str, list[str]] = {}
     for motor in mechanism.motors:
+        shared.setdefault(motor.joint, []).append(motor.name)
         if motor.joint in driven:
             yield Finding(
                 "motor-prescribed", f"motor.{motor.name}",
                 f"its joint {motor.joint} follows [prescribed.{driven[motor.joint]}] whatever the motor does",
                 "leave one of them out",
             )  # fmt: skip
-    shared: dict[str, list[str]] = {}
-    for motor in mechanism.motors:
-        shared.setdefault(motor.joint, []).append(motor.name)
     for joint, names in shared.items():
         if len(names) > 1:
             yield Finding(
@@ -248,13 +247,7 @@ def _beam(body: Beam, size: float) -> Iterator[Finding]:
     for material in dict.fromkeys(materials):
         yield from _material(f"{place}.material", material)
     for lump in body.lumps:
-        if lump.mass > 0.0 and lump.inertia > lump.mass * (GYRATION * size) ** 2 > 0.0:
-            yield Finding(
-                "mass", f"{place}.lumps.{lump.point}",
-                f"{lump.inertia:.3g} kg m^2 at {lump.mass:.3g} kg is a radius of gyration of "
-                f"{math.sqrt(lump.inertia / lump.mass):.3g} m, in a mechanism of {size:.3g} m",
-                "inertia is in kg m^2, about the centre of mass",
-            )  # fmt: skip
+        yield from _gyration(f"{place}.lumps.{lump.point}", lump.mass, lump.inertia, size)
     places = list(body.points.values())
     if len(places) > 1 and max(places) - min(places) < OVERHANG * body.length:
         yield Finding(
@@ -315,15 +308,17 @@ def _rigid(body: RigidBody, size: float) -> Iterator[Finding]:
             f"{away:.3g} m from the nearest of its points, in a mechanism of {size:.3g} m",
             "it is in m, in the body's own frame: is it in mm?",
         )  # fmt: skip
-    if size and body.mass > 0.0:
-        gyration = math.sqrt(max(body.inertia, 0.0) / body.mass)
-        if gyration > GYRATION * size:
-            yield Finding(
-                "mass", f"body.{body.name}.inertia",
-                f"{body.inertia:.3g} kg m^2 at {body.mass:.3g} kg is a radius of gyration of {gyration:.3g} m, "
-                f"in a mechanism of {size:.3g} m",
-                "inertia is in kg m^2, about the centre of mass",
-            )  # fmt: skip
+    yield from _gyration(f"body.{body.name}.inertia", body.mass, body.inertia, size)
+
+
+def _gyration(place: str, mass: float, inertia: float, size: float) -> Iterator[Finding]:
+    if mass > 0.0 and inertia > mass * (GYRATION * size) ** 2 > 0.0:
+        yield Finding(
+            "mass", place,
+            f"{inertia:.3g} kg m^2 at {mass:.3g} kg is a radius of gyration of {math.sqrt(inertia / mass):.3g} m, "
+            f"in a mechanism of {size:.3g} m",
+            "inertia is in kg m^2, about the centre of mass",
+        )  # fmt: skip
 
 
 def _masses(mechanism: Mechanism, size: float) -> Iterator[Finding]:

@@ -39,8 +39,6 @@ LOST = 0.5
 TORQUE = 30.0
 # Force of a joint or drive over the same, and what it is multiplied by: also of the slowest of mechanisms.
 FORCE = 1000.0
-# Acceleration that masses count with at least: that of gravity [m/s^2].
-_LEAST_ACCELERATION = 9.81
 # Part of the samples that a force is as large in, so that a pole at a singular position is none.
 _LASTING = 0.1
 # A body that closing the loops turned further than this had another angle in mind, or another elbow [rad].
@@ -240,47 +238,40 @@ def _turned_over(system: System, solution: Solution) -> float:
     return float(np.trapezoid(power, solution.t)) if rates else 0.0
 
 
-class _UncertainLoad(NamedTuple):
-    """A load of a joint or drive: its name, its unit, how far it may be off, and its largest value."""
-
-    name: str
-    unit: str
-    error: float
-    peak: float
-
-
 def _unresolved(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
     """Forces that errors of integration leave uncertain, as of vibrations that are faster than the steps follow."""
     # Where beams vibrate faster than the steps follow, tables have the errors beside the numbers.
     if solution.multiplier_errors is None or system.n_flexible:
         return
-    loads = list(_uncertain_loads(system, solution, solution.multiplier_errors))
+    error = _loads(system, solution.multiplier_errors)
+    peak = _loads(system, np.nanmax(np.abs(solution.multipliers), axis=0, initial=0.0))
     weight = system.total_mass * STANDARD_GRAVITY
     least = {
-        unit: _NO_FORCE * max([weight * arm, *(one.peak for one in loads if one.unit == unit)])
+        unit: _NO_FORCE * max([weight * arm, *(peak[one] for one in peak if one[1] == unit)])
         for unit, arm in (("N", 1.0), ("N m", system.size))
     }
-    off = [one for one in loads if one.error > RESOLVED * one.peak and one.peak > least[one.unit]]
+    off = [one for one in peak if error[one] > RESOLVED * peak[one] and peak[one] > least[one[1]]]
     if not off:
         return
-    worst = sorted(off, key=lambda one: -one.error / one.peak)[:_NAMED]
-    listed = "; ".join(f"the {one.name} by {one.error:.1g} of {one.peak:.3g} {one.unit}" for one in worst)
+    worst = sorted(off, key=lambda one: -error[one] / peak[one])[:_NAMED]
+    listed = "; ".join(
+        f"the {name} by {error[name, unit]:.1g} of {peak[name, unit]:.3g} {unit}" for name, unit in worst
+    )
     text = f"forces may be off by errors of integration: {listed}"
     text += f" and {len(off) - len(worst)} more" if len(off) > len(worst) else ""
     yield Finding("forces-unresolved", where.place, text, 'give a smaller tolerance, or control = "forces"')
 
 
-def _uncertain_loads(system: System, solution: Solution, errors: Array) -> Iterator[_UncertainLoad]:
-    """Forces and moments of the joints and of the prescribed motions."""
-    mechanism, largest = system.mechanism, np.nanmax(np.abs(solution.multipliers), axis=0, initial=0.0)
-    names = [joint.name for joint in mechanism.joints]
-    off, peak = (load_errors(system, names, each) for each in (errors, largest))
-    for k, name in enumerate(names):
-        yield _UncertainLoad(f"force in {name}", "N", float(off.force[k]), float(peak.force[k]))
-        yield _UncertainLoad(f"moment in {name}", "N m", float(off.moment[k]), float(peak.moment[k]))
-    for k, one in enumerate(mechanism.prescribed):
-        what, unit = ("force", "N") if mechanism.slides(one.joint) else ("torque", "N m")
-        yield _UncertainLoad(f"{what} of prescribed.{one.name}", unit, float(off.drive[k]), float(peak.drive[k]))
+def _loads(system: System, multipliers: Array) -> dict[tuple[str, str], float]:
+    """Bounds of the loads of joints and prescribed motions, by name and unit, from those of the multipliers (m,)."""
+    names, prescribed = [joint.name for joint in system.mechanism.joints], system.mechanism.prescribed
+    found, drives = load_errors(system, names, multipliers), {}
+    for one, load in zip(prescribed, found.drive.tolist(), strict=True):
+        what, unit = ("force", "N") if system.mechanism.slides(one.joint) else ("torque", "N m")
+        drives[f"{what} of prescribed.{one.name}", unit] = load
+    forces = {(f"force in {name}", "N"): load for name, load in zip(names, found.force.tolist(), strict=True)}
+    moments = {(f"moment in {name}", "N m"): load for name, load in zip(names, found.moment.tolist(), strict=True)}
+    return forces | moments | drives
 
 
 def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
@@ -331,7 +322,7 @@ def _expected(system: System, mechanism: Mechanism, acceleration: float, t: Arra
     """The force that accelerates and holds the whole mass, with all loads [N]; and all torques applied [N m]."""
     loads = sum(one.largest(t) for one in mechanism.loads if isinstance(one, PointForce))
     turning = sum(one.largest(t) for one in mechanism.loads if not isinstance(one, PointForce))
-    felt = max(acceleration + math.hypot(*mechanism.gravity), _LEAST_ACCELERATION)
+    felt = max(acceleration + math.hypot(*mechanism.gravity), STANDARD_GRAVITY)
     return system.total_mass * felt + loads, turning
 
 
