@@ -152,9 +152,13 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
     names = [joint.name for joint in system.described.joints]
     found = undetermined_loads(system, names, solution.q, solution.acting)
     drives = [f"prescribed.{one.name}" for one in system.described.prescribed]
-    forces, moments, drives_too = found.force.any(axis=(0, 2)), found.moment.any(axis=0), found.drive.any(axis=0)
+    forces, moments, drives_too = (
+        np.any(found.force, axis=(0, 2)),
+        np.any(found.moment, axis=0),
+        np.any(found.drive, axis=0),
+    )
     kinds = ("forces in", names, forces), ("moments in", names, moments), ("torques or forces of", drives, drives_too)
-    named = [(kind, ", ".join(itertools.compress(whose, at.tolist()))) for kind, whose, at in kinds]
+    named = [(kind, ", ".join(itertools.compress(whose, at))) for kind, whose, at in kinds]
     parts = [f"{kind} {which}" for kind, which in named if which]
     if parts:
         yield Finding(
