@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.control.described_laws import LawNames, Numbers, of_names
-from paraflex.control.together import check_distinct, check_name, check_whole, multiple_of
+from paraflex.control.described_laws import LawNames, of_names
+from paraflex.control.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError
 from paraflex.mechanism import AngleLaw, Mechanism
 from paraflex.mechanism.loads import InTime

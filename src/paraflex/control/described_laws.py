@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
+from paraflex.control.together import Numbers
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import all_known, known
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from paraflex.control.laws import JointPID
     from paraflex.control.rates import RateFeedback
 
-Numbers = float | Mapping[str, float]
 Rows = Sequence[Sequence[float]]
 # Of a PID law.
 _GAINS = ("stiffness", "damping", "integral")

@@ -9,12 +9,11 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.coloured import deviation_and_filter
 from paraflex.control.controllers import Plant
-from paraflex.control.described_laws import Numbers
 from paraflex.control.estimators import quantisation_noise
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.references import OPEN_LOOP
 from paraflex.control.regulators import LQGDesign, lqg
-from paraflex.control.together import numbers_by_name
+from paraflex.control.together import Numbers, numbers_by_name
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel, linearise, reduce
 from paraflex.mechanism import mode_of_motors

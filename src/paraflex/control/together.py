@@ -12,6 +12,8 @@ import numpy as np
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import all_known, known, positive
 
+# One number, or one for each of some names.
+Numbers = float | Mapping[str, float]
 # Instants closer than this part of the shortest period are one.
 SAME = 1e-9
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from itertools import count
 from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from paraflex.control.shaped import ShapedPath
 from paraflex.control.shaping import Shaper
@@ -40,9 +40,6 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.quantities import joint_pair
 
-if TYPE_CHECKING:
-    from paraflex.files.model import Model
-
 _BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
 # What all beams of a file may have in common at its top, and what they have where it says nothing.
 _SHARED = {"reference": "pinned", "curvature": "separate"}
@@ -51,7 +48,7 @@ _NAMED_TABLES = {"section": "section", "material": "material", "lump": "lumps"}
 
 
 def model_tables(
-    model: Model, *, file: Mapping[str, Any] | None = None, before: Mechanism | None = None, each: bool = False
+    model: Any, *, file: Mapping[str, Any] | None = None, before: Mechanism | None = None, each: bool = False
 ) -> dict[str, Any]:
     """What a model file says of a model; what is as it is where a file says nothing is left out.
 
@@ -127,7 +124,7 @@ def _member(member: Any) -> dict[str, Any]:
     return pairs | fields_said(member, "name", *(name for names in together.values() for name in names))
 
 
-def _laws(model: Model) -> Iterator[tuple[str, AngleLaw]]:
+def _laws(model: Any) -> Iterator[tuple[str, AngleLaw]]:
     """Laws in time of a model, each with its place in a file."""
     torques = model.study.torques
     yield from ((f"prescribed.{one.name}.law", one.law) for one in model.mechanism.prescribed)

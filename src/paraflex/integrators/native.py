@@ -69,9 +69,6 @@ _FORCE_SAFETY = 2.0
 # So much of a turn, or of a vibration given in time, is in a step at most [rad]: forces and work follow it to less
 # than a thousandth. By the order of a method, four for higher ones.
 _PHASES = {1: 0.15, 2: 0.15, 3: 0.4, 4: 0.7}
-# Changes of forces at samples that are none, as parts of the largest: curves between stages stay as they are there.
-# With flexible bodies they have vibrations, which one more stage knows no better.
-_NO_CHANGE, _NO_CHANGE_FLEXIBLE = 1e-5, 5e-2
 # Points this close are one, as a part of the mechanism's size.
 _SAME_PLACE = 1e-9
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
@@ -269,7 +266,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         by_cycle=int(options.step is None and options.per is TolerancePer.CYCLE),
         force_part=options.force_part(system),
         force_control=int(options.control is Control.FORCES),
-        no_change=_NO_CHANGE_FLEXIBLE if system.n_flexible else _NO_CHANGE,
+        solved_samples=int(not system.n_flexible),
         newton_fraction=options.newton_fraction or method.newton_fraction,
         alpha=options.alpha,
         beta=options.beta,

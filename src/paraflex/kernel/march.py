@@ -225,7 +225,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
     first = place_samples(tableau, t, h, march, out)
     # Near a singular position forces have poles.
-    if march.counts[NEAR] == 0:
+    if controls.solved_samples == 1 and march.counts[NEAR] == 0:
         solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
     sample_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)

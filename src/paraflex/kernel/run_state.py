@@ -91,7 +91,7 @@ class Controls(NamedTuple):
     by_cycle: int  # whether the cycle is that of the motion where that is shorter than the run
     force_part: float  # error allowed in forces within a cycle, as a part of the largest; zero where none are looked at
     force_control: int  # whether steps are chosen by that, too
-    no_change: float  # a change of forces at a sample that is none, as a part of the largest until then
+    solved_samples: int  # whether the equations of motion are solved at samples: a stage knows vibrations no better
     newton_fraction: float  # of the error allowed in a step, the part left to Newton
     alpha: float
     beta: float

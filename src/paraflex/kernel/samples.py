@@ -32,6 +32,8 @@ from paraflex.kernel.step import constraint_weights
 SAME_TIME = 1e-9
 # Forces at a sample are solved to this part of the largest, in so many iterations at most.
 FORCES, MOST = 1e-6, 12
+# Where they change by less than this part curves between stages stay as they are.
+NO_CHANGE = 1e-5
 # And between samples that are kept, interpolated ones may be off by this part.
 FORCES_BETWEEN = 2e-2
 
@@ -77,7 +79,7 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
 
     Of samples that only serve to find the largest loads those are left that the last one solved lets expect to be near.
     Each is a stage of its own, with the g and b of the last one and such explicit parts that q and v are those between
-    the stages where the acceleration is: elastic coordinates too stiff to be resolved follow the forces at the sample.
+    the stages where the acceleration is.
     """
     for i in range(first, march.counts[SAMPLE]):
         needed = out.asked[i] or march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN
@@ -114,7 +116,7 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
     for r in range(lam.size):
         work.mu[r] = lam[r] - march.guess_lam[r]
     march.clock[SAMPLE_CHANGE] = largest_part(work.mu, march.forces[PEAK]) if largest(march.forces[PEAK]) > 0.0 else 1.0
-    if march.clock[SAMPLE_CHANGE] <= controls.no_change:
+    if march.clock[SAMPLE_CHANGE] <= NO_CHANGE:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
         solved = False
