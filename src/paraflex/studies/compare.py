@@ -7,13 +7,13 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.arrays import Array
-from paraflex.campaign import OnProgress, Progress, WholeStudy, Workers, no_workers
+from paraflex.campaign import OnProgress, Progress, Result, WholeStudy, Workers, no_workers
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.methods import Family, Method, find_method
@@ -104,7 +104,7 @@ class ComparisonStudy(WholeStudy[MethodComparison], CheckedFields):
         From `run`: no converged run to compare with.
     """
 
-    gives = MethodComparison
+    gives: ClassVar[type[Result]] = MethodComparison
     case: Case
     methods: Sequence[Method | str] | None = None
     options: ComparisonOptions | None = None

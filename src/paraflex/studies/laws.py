@@ -9,10 +9,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
-from paraflex.campaign import THREADS, LostWorker, OnProgress, Progress, Row, WholeStudy, Workers, outcomes
+from paraflex.campaign import THREADS, LostWorker, OnProgress, Progress, Result, Row, WholeStudy, Workers, outcomes
 from paraflex.control.chain import SampledController
 from paraflex.control.described import NONE, ControllerDescription
 from paraflex.designs.measure import members_of, metrics_of
@@ -68,7 +68,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
     """
 
     _own = ("laws",)
-    gives = LawComparison
+    gives: ClassVar[type[Result]] = LawComparison
     tasks: Mapping[str, TrackingTask]
     laws: Mapping[str, Sequence[Any]]
     modes: Sequence[str | ActuationMode]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import xarray as xr
 
@@ -118,7 +118,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     """
 
     _own = ("method",)
-    gives = StudyResult
+    gives: ClassVar[type[Result]] = StudyResult
     task: TrackingTask
     modes: Sequence[str | ActuationMode]
     options: IntegrationOptions | None = None

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments
-from paraflex.campaign import OnProgress, Progress, WholeStudy, Workers, no_workers
+from paraflex.campaign import OnProgress, Progress, Result, WholeStudy, Workers, no_workers
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines import ENGINES, check_dwell, check_engine
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
@@ -85,7 +85,7 @@ class VerificationStudy(WholeStudy[Verification], CheckedFields):
         mechanism, before anything runs.
     """
 
-    gives = Verification
+    gives: ClassVar[type[Result]] = Verification
     task: TrackingTask
     modes: Sequence[str | ActuationMode]
     models: Sequence[str] = FIDELITIES

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -191,7 +191,7 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
         From `run`: a run that cannot be made.
     """
 
-    gives = Sensitivities
+    gives: ClassVar[type[Result]] = Sensitivities
     name: str
     setting: Setting
     parameters: tuple[Varied, ...]
