@@ -84,7 +84,7 @@ def _laws(model: Model, request: CompareLawsRequest) -> Laws:
 
 
 def _asked(model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> dict[str, Any]:
-    """What was compared."""
+    """Laws, paths and modes compared, for provenance."""
     return {
         "laws": {name: [one.name for one in together] for name, together in laws.items()},
         "paths": list(paths),

@@ -31,7 +31,7 @@ def asked_model(choice: ModelChoice) -> Model:
 
 
 def asked_of(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
-    """What was asked for, for provenance: a model, its file, --set and the rest of a run."""
+    """Provenance of a command: a model, its file, --set and the rest of a run."""
     return {
         "model": dict(model.parameters),
         "run": {"mechanism": model.source, "set": dict(model.settings)} | dict(run),

@@ -136,7 +136,7 @@ class SampledController:
             self.law.check(self.inputs, self.outputs, self.period)
 
     def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[Any], ...]:
-        """What stands around the law, in the order of sensors and motors; None where there is nothing.
+        """Components around the law, in the order of sensors and motors; None where there is nothing.
 
         Resolution of readings, their filters (numerator, denominator), limits (lowest, highest) of torques [N m, N] and
         of their rates [N m/s, N/s].

@@ -318,7 +318,7 @@ def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
 
 
 def _done(inside: SampledLaw) -> list[Array]:
-    """What a controller in the compiled time loop has done so far: times, readings, torques wanted and given."""
+    """Samples of a controller in the compiled time loop so far: times, readings, torques wanted and given."""
     return [each[: inside.counts[SAMPLED]] for each in (inside.t, inside.readings, inside.wanted, inside.given)]
 
 

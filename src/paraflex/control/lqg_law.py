@@ -129,7 +129,7 @@ class LQGDesign:
 
     @property
     def _integrals(self) -> Array:
-        """What a reading adds to integrals (integrated, measured)."""
+        """Contribution of a reading to the integrals (integrated, measured)."""
         return self.period * np.eye(len(self.measured))[[self.measured.index(one) for one in self.regulator.integrated]]
 
     def law(self) -> LQGLaw:

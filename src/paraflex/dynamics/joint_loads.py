@@ -122,9 +122,9 @@ class Undetermined(NamedTuple):
     Attributes
     ----------
     force, moment : (k, joints, 2) and (k, joints) arrays of bool
-        Of joints.
+        Components of the forces, and moments, in joints.
     drive : (k, drives) array of bool
-        Of prescribed motions.
+        Torques or forces of prescribed motions.
     """
 
     force: NDArray[np.bool_]
@@ -135,7 +135,7 @@ class Undetermined(NamedTuple):
 def undetermined_loads(
     system: System, names: Sequence[str], q: Array, acting: NDArray[np.int64] | None = None
 ) -> Undetermined:
-    """What redundant rows, of those acting, share of the loads of joints by name and of all drives.
+    """Loads of joints by name and of all drives that redundant rows, of those acting, share in any way.
 
     Rows are redundant in all poses (k, n) or in none that is looked at: the first one shows it.
     """

@@ -77,7 +77,7 @@ def axis_motion(system, k, q, v, a):
 
 @inlined
 def track_piece(system, axis, x):
-    """Of an axis's track: its body, the first coefficient of the piece at x, and the distance from the piece's start.
+    """Body of an axis's track, first coefficient of the piece at x, and distance from the piece's start.
 
     The end pieces extend beyond the ends.
     """

@@ -139,7 +139,7 @@ def damp_rows(system, work, held, rows, scratch):
 
 @inlined
 def rest_of_row(system, work, i, scratch):
-    """What row i has by the reduced rows before it, the inverse of its pivot, and the root of its part left."""
+    """Contribution of the reduced rows before row i, inverse of its pivot, and root of its part left."""
     first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
     follows, square = 0.0, 0.0
     for k in range(first, i):

@@ -122,7 +122,7 @@ class FramesChoice:
 
 @dataclass(frozen=True)
 class FilesChoice:
-    """What is written and printed of one dataset; no files without a folder."""
+    """Files and output of one dataset; no files without a folder."""
 
     out: Annotated[
         str | None,

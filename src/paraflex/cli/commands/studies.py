@@ -27,7 +27,7 @@ class StudyRequest:
 
     @property
     def folder(self) -> Path:
-        """Where results go: where it is said, else results/ and the name of the study's file."""
+        """Folder of the results: the one given, else results/ and the name of the study's file."""
         return Path("results") / Path(self.study).stem if self.output is None else Path(self.output)
 
 
