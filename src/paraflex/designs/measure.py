@@ -40,11 +40,9 @@ Runs = TrackingRun | MotionRun | Statics
 RunsTraces = RunTraces | MotionTraces | StaticsTraces
 _OF_RUNS = {PATH: "runs along a path", MOTION: "runs without a path", STATICS: "statics"}
 
-# Metrics that short peaks between samples may be missing from.
-_LARGEST_LOADS = (
-    "stress_max", "safety_factor_min", "section_moment_max", "drive_torque_max", "drive_power_max", "joint_force_max",
-)  # fmt: skip
-_SHARED_LOADS = _LARGEST_LOADS[3:]
+# Metrics of loads that redundant constraints may share, and those that short peaks between samples may be missing from.
+_SHARED_LOADS = ("drive_torque_max", "drive_power_max", "joint_force_max")
+_LARGEST_LOADS = ("stress_max", "safety_factor_min", "section_moment_max", *_SHARED_LOADS)
 # Metrics that have derivatives.
 SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)
 

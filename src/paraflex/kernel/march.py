@@ -55,7 +55,7 @@ from paraflex.kernel.run_state import (
     WORK,
 )
 from paraflex.kernel.sampled import CHANGED, FAILED, SLACK, control, next_instant
-from paraflex.kernel.samples import place_samples, sample_energies, solve_samples, step_work
+from paraflex.kernel.samples import place_samples, solve_samples, step_work, write_energies
 from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
@@ -227,7 +227,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     # Near a singular position forces have poles.
     if controls.solved_samples == 1 and march.counts[NEAR] == 0:
         solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
-    sample_energies(system, tableau, t, h, first, march, work, out)
+    write_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)
     copy(march.stage_v[last], march.v)
     march.clock[WORK] += step_work(tableau, h, march)

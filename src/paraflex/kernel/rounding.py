@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import add, apart, copy, largest
 from paraflex.kernel.bending import note_all_axial_forces
-from paraflex.kernel.bodies import system_energy, weight_work
+from paraflex.kernel.bodies import stored_energy, weight_work
 from paraflex.kernel.compiling import by_reference, inlined, kernel, releases_lock, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import SAMPLE, WORK
-from paraflex.kernel.samples import begin_sample, place_samples, sample_energies as write_energies, step_work
+from paraflex.kernel.samples import begin_sample, place_samples, step_work, write_energies
 from paraflex.kernel.stage import equations, note_torques, place
 from paraflex.kernel.step import input_power, stage_start
 from paraflex.kernel.tangent import note_slopes
@@ -219,6 +218,4 @@ def sample_energies(system, q, v, lam, scratch, out):
     q, v : (k, n) arrays; lam : (k, m) array; out : (k, 3) array.
     """
     for i in range(q.shape[0]):
-        out[i, 0], out[i, 1] = system_energy(system, q[i], v[i], scratch)
-        out[i, 1] += spring_energy(system, lam[i]) + line_energy(system, q[i], v[i])[0]
-        out[i, 2] = weight_work(system, q[i], scratch)
+        out[i, 0], out[i, 1], out[i, 2] = stored_energy(system, q[i], v[i], lam[i], scratch)

@@ -6,11 +6,10 @@ from math import isfinite
 
 from paraflex.kernel.arrays import add, copy, fill, largest
 from paraflex.kernel.bending import note_all_axial_forces
-from paraflex.kernel.bodies import system_energy, weight_work
+from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.joints import line_energy, spring_energy
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.packed import INDEX_1
@@ -110,13 +109,10 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
         factor_bodies(system, b, q, aside)
         orient(system, q, aside, controls.dependent_part)
         solved = solve_at(system, signals, out.times[i], weights, g, b, march, aside, a, lam, march.torques)
-    if not solved:
-        copy(march.eq, a)
-        copy(march.guess_lam, lam)
     for r in range(lam.size):
-        work.mu[r] = lam[r] - march.guess_lam[r]
+        work.mu[r] = lam[r] - march.guess_lam[r] if solved else 0.0
     march.clock[SAMPLE_CHANGE] = largest_part(work.mu, march.forces[PEAK]) if largest(march.forces[PEAK]) > 0.0 else 1.0
-    if march.clock[SAMPLE_CHANGE] <= NO_CHANGE:
+    if not solved or march.clock[SAMPLE_CHANGE] <= NO_CHANGE:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
         solved = False
@@ -161,17 +157,17 @@ def solve_at(system, signals, t, weights, g, b, march, work, a, lam, torques):
 
 
 @routine
-def sample_energies(system, tableau, t, h, first, march, work, out):
+def write_energies(system, tableau, t, h, first, march, work, out):
     """Energies and work at the samples of the step from the first on."""
     for i in range(first, march.counts[SAMPLE]):
-        out.energy[i, 0], out.energy[i, 1] = system_energy(system, out.q[i], out.v[i], work.scratch)
-        out.energy[i, 1] += spring_energy(system, out.lam[i]) + line_energy(system, out.q[i], out.v[i])[0]
+        kinetic, strain, weight = stored_energy(system, out.q[i], out.v[i], out.lam[i], work.scratch)
+        out.energy[i, 0], out.energy[i, 1] = kinetic, strain
         # Within the step by the cubic with the power at its ends; over the whole step by the scheme's own quadrature.
         done, last = min(max((out.times[i] - t) / h, 0.0), 1.0), march.power.size - 1
         left = 1.0 - done
         out.energy[i, 2] = march.clock[WORK] + done * done * (3.0 - 2.0 * done) * step_work(tableau, h, march)
         out.energy[i, 2] += h * done * left * (left * march.power[0] - done * march.power[last])
-        out.energy[i, 2] += weight_work(system, out.q[i], work.scratch) - march.clock[WEIGHT_0]
+        out.energy[i, 2] += weight - march.clock[WEIGHT_0]
 
 
 @routine

@@ -14,7 +14,7 @@ from paraflex.control.laws import internal_torques
 from paraflex.control.loop import ControllerRecord
 from paraflex.control.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
-from paraflex.dynamics.joint_loads import drive_torques, joint_parts, load_in, undetermined_loads
+from paraflex.dynamics.joint_loads import Undetermined, drive_torques, joint_parts, load_in, undetermined_loads
 from paraflex.dynamics.points import point_motion
 from paraflex.equilibria.given import Coordinate
 from paraflex.equilibria.result import Statics
@@ -71,9 +71,7 @@ class SolutionTraces(Generic[R]):
     @cached_property
     def drive_torque(self) -> Trace:
         """Torque [N m] or force [N] of every prescribed motion (k, drives); NaN where not determined."""
-        torques = drive_torques(self.system, self.solution.multipliers)
-        shared = undetermined_loads(self.system, (), self.solution.q.real, self.solution.acting).drive
-        return np.where(shared, np.nan, torques)
+        return np.where(self._undetermined.drive, np.nan, drive_torques(self.system, self.solution.multipliers))
 
     @cached_property
     def drive_power(self) -> Trace:
@@ -89,8 +87,7 @@ class SolutionTraces(Generic[R]):
             load_in(system, joint.name, joint_parts(system, joint.name), solution.q, multipliers, self.torque)[0]
             for joint in system.described.joints
         ]
-        names = [joint.name for joint in system.described.joints]
-        shared = undetermined_loads(system, names, solution.q.real, solution.acting).force.any(axis=2)
+        shared = self._undetermined.force.any(axis=2)
         return np.where(shared, np.nan, stacked([length(each) for each in forces], len(solution.q)))
 
     @cached_property
@@ -102,6 +99,11 @@ class SolutionTraces(Generic[R]):
     def controllers(self) -> tuple[ControllerRecord, ...]:
         """What controllers did; none where there were none."""
         return self.run.controllers if isinstance(self.run, ControlledTracking | ControlledMotion) else ()
+
+    @cached_property
+    def _undetermined(self) -> Undetermined:
+        names = [joint.name for joint in self.system.described.joints]
+        return undetermined_loads(self.system, names, self.solution.q.real, self.solution.acting)
 
     def _of_joints(self, names: list[str]) -> Trace:
         """Rates of joints by name (k, joints)."""
