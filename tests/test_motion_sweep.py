@@ -14,7 +14,7 @@ from paraflex.designs.sweep import load_sweep
 from shell import paraflex
 
 METRICS = ["drive_torque_max", "drive_power_max", "joint_force_max", "joint_speed_max", "stress_max",
-           "safety_factor_min", "section_moment_max", "strain_energy_max"]  # fmt: skip
+           "safety_factor_min", "section_moment_max", "strain_energy_max", "drive_torque_error", "joint_force_error"]  # fmt: skip
 # A slider-crank that a constant speed drives, without the library's published start.
 LIBRARY = Path(pf.__file__).parent / "mechanism" / "library" / "slider_crank_flexible.toml"
 MODEL = re.sub(r"(?ms)^# The published start.*?(?=^\[study\])", "", LIBRARY.read_text(encoding="utf-8"))
@@ -73,10 +73,14 @@ def test_rows_are_what_runs_of_each_design_say(swept):
             "stress_max": data["stress_max"].max(),
             "safety_factor_min": data["safety_factor"].min(),
             "strain_energy_max": data["strain_energy"].max(),
+            "drive_torque_error.drive": data["drive_torque_error"].max(),
+            "joint_force_error": data["joint_force_error"].max(),
             **{f"joint_speed_max.{joint}": speeds.sel(joint=joint) for joint in data["joint"].values},
         }
         for column, value in expected.items():
             assert row[column] == pytest.approx(float(value), rel=1e-6), column
+        off = row["joint_force_error"] > 0.01 * row["joint_force_max"]
+        assert ("errors of integration" in row["reason"]) == off, row["reason"]
     assert table["drive_torque_max.drive"].nunique() == 4
 
 

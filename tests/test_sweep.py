@@ -484,6 +484,8 @@ def test_the_error_of_the_mechanism_s_study_comes_first(error, first):
     assert metrics_of([], setting.error)[0] == first
     along_path = {name for name, metric in METRICS.items() if PATH in metric.runs}
     others = {
+        "drive_torque_error",
+        "joint_force_error",
         "joint_force_max",
         "joint_speed_max",
         "settling_time",

@@ -34,7 +34,7 @@ from paraflex.results.metrics import (
 )
 from paraflex.results.run_traces import MotionTraces, RunTraces, StaticsTraces, run_traces
 from paraflex.tracking import TrackingRun
-from paraflex.validity import shared_loads
+from paraflex.validity import shared_loads, unresolved_loads
 
 Runs = TrackingRun | MotionRun | Statics
 RunsTraces = RunTraces | MotionTraces | StaticsTraces
@@ -161,16 +161,18 @@ def measure(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
 
 
 def coarseness(run: Runs, names: Sequence[str]) -> str:
-    """Why metrics of loads may not be the largest, between samples, or are not determined; empty otherwise."""
+    """Why metrics of loads may be off: peaks between samples, errors of integration, not determined; empty otherwise."""
     found = [one for one in run.solution.findings if one.code == COARSE] if set(names) & set(_LARGEST_LOADS) else []
-    found += shared_loads(run_traces(run).system, run.solution) if set(names) & set(_SHARED_LOADS) else []
+    if set(names) & set(_SHARED_LOADS):
+        system = run_traces(run).system
+        found += [*shared_loads(system, run.solution), *unresolved_loads(system, run.solution)]
     return "; ".join(f"{one.text}; {one.remedy}" for one in found)
 
 
 def coarse_runs(runs: int) -> str:
-    """A sentence on runs whose metrics do not have the largest loads: too few samples, or not determined."""
+    """A sentence on runs whose loads `coarseness` doubts."""
     which = "one run has" if runs == 1 else f"{runs} runs have"
-    return f"{which} loads that metrics lack, between the samples or not determined (column reason) [{COARSE}]"
+    return f"{which} loads that are larger between samples, off by errors of integration, or not determined (column reason)"
 
 
 def smooth_metrics(names: Sequence[str]) -> tuple[str, ...]:

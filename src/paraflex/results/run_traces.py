@@ -14,7 +14,15 @@ from paraflex.control.laws import internal_torques
 from paraflex.control.loop import ControllerRecord
 from paraflex.control.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
-from paraflex.dynamics.joint_loads import Undetermined, drive_torques, joint_parts, load_in, undetermined_loads
+from paraflex.dynamics.joint_loads import (
+    LoadErrors,
+    Undetermined,
+    drive_torques,
+    joint_parts,
+    load_errors,
+    load_in,
+    undetermined_loads,
+)
 from paraflex.dynamics.points import point_motion
 from paraflex.equilibria.given import Coordinate
 from paraflex.equilibria.result import Statics
@@ -89,6 +97,13 @@ class SolutionTraces(Generic[R]):
         ]
         shared = self._undetermined.force.any(axis=2)
         return np.where(shared, np.nan, stacked([length(each) for each in forces], len(solution.q)))
+
+    @cached_property
+    def load_errors(self) -> LoadErrors:
+        """How far forces of joints and drives may be off by errors of integration; NaN where that is not known."""
+        errors = self.solution.multiplier_errors
+        joints = [joint.name for joint in self.system.described.joints]
+        return load_errors(self.system, joints, np.full(self.system.m, np.nan) if errors is None else errors)
 
     @cached_property
     def joint_speed(self) -> Trace:

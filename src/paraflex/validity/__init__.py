@@ -34,6 +34,7 @@ from paraflex.validity.plausibility import (
     moved_far as moved_far,
     shared_loads as shared_loads,
     stiff_modes as stiff_modes,
+    unresolved_loads as unresolved_loads,
 )
 
 

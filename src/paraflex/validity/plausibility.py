@@ -132,7 +132,8 @@ def doubtful_results(
         *_large_slopes(where, system, solution),
         *_overstressed(where, system, solution),
         *_unbalanced(where, system, solution),
-        *_unresolved(where, system, solution),
+        # Where beams vibrate faster than the steps follow, tables have the errors beside the numbers.
+        *(() if system.n_flexible else unresolved_loads(system, solution, where.place)),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
         *shared_loads(system, solution),
@@ -243,10 +244,9 @@ def _turned_over(system: System, solution: Solution) -> float:
     return float(np.trapezoid(power, solution.t)) if rates else 0.0
 
 
-def _unresolved(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
-    """Forces that errors of integration leave uncertain, as of vibrations that are faster than the steps follow."""
-    # Where beams vibrate faster than the steps follow, tables have the errors beside the numbers.
-    if solution.multiplier_errors is None or system.n_flexible:
+def unresolved_loads(system: System, solution: Solution, place: str = "") -> Iterator[Finding]:
+    """Findings about forces that errors of integration leave uncertain, as of vibrations faster than the steps follow."""
+    if solution.multiplier_errors is None:
         return
     error = _loads(system, solution.multiplier_errors)
     peak = _loads(system, np.nanmax(np.abs(solution.multipliers), axis=0, initial=0.0))
@@ -264,7 +264,7 @@ def _unresolved(where: _Where, system: System, solution: Solution) -> Iterator[F
     )
     text = f"forces may be off by errors of integration: {listed}"
     text += f" and {len(off) - len(worst)} more" if len(off) > len(worst) else ""
-    yield Finding("forces-unresolved", where.place, text, 'give a smaller tolerance, or control = "forces"')
+    yield Finding("forces-unresolved", place, text, 'give a smaller tolerance, or control = "forces"')
 
 
 def _loads(system: System, multipliers: Array) -> dict[tuple[str, str], float]:
