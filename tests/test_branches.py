@@ -362,3 +362,18 @@ def test_light_links_do_not_change_the_start(mass):
     assert turned[1] - turned[0] == pytest.approx(5.0, abs=max(1e-6, mass))
     _, rate = run.system.constraints(moment_signals(mechanism, 0.0), 0.0, run.solution.q[0], run.solution.v[0])
     assert np.max(np.abs(rate)) < 1e-9
+
+
+def test_a_start_at_a_change_point_is_on_one_of_the_branches():
+    """Their rates are enough as they are printed; any other is refused. The pole at the start is no shared load."""
+    mechanism = folded(ConstantSpeed(np.pi, 1.0))
+    with pytest.raises(InputError, match=r"on neither branch of a change point.* D at 0\.689898 or -0\.289898 rad/s") as caught:
+        pf.simulate_motion(mechanism, 0.1, start=Start(angular={"rocker": 0.5}))
+    assert caught.value.field == "start.velocity.angular.rocker"
+    run = pf.simulate_motion(mechanism, 0.1, samples=11, start=Start(angular={"rocker": 0.689898}))
+    assert run.solution.singular_positions == (0.0,)
+    assert np.all(np.isnan(run.solution.multipliers[0]))
+    assert np.all(np.isfinite(run.solution.multipliers[1:]))
+    assert not {"loads-undetermined", "samples-coarse"} & {one.code for one in run.doubts}
+    model = pf.Model(mechanism, start=Start(angular={"rocker": 0.689898}))
+    assert not [one for one in pf.check(model).findings if one.code == "assembly-open"]

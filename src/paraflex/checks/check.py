@@ -68,7 +68,11 @@ def check(
     duration = model.study.duration if isinstance(model, Model) else None
     found: list[Finding] = [*doubtful_numbers(mechanism, duration), *pose_findings(seen, at_rest=at_rest)]
     if isinstance(model, Model):
-        found += [*file_findings(model), *start_findings(model, seen, assembly)]
+        refused = list(start_findings(model, seen, assembly))
+        if model.start is not None and seen.chosen is not None and seen.chosen.undecided and not refused:
+            decided = "assembly-open", f"assembly.{seen.chosen.assembly}"
+            found = [one for one in found if (one.code, one.place) != decided]
+        found += [*file_findings(model), *refused]
         loose = loose_tolerance(model.study.integration().tolerance_for(seen.system), seen.system.size)
         found += [] if loose is None else [loose]
     # Without an assembly there is no pose to run from.

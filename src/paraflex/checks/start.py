@@ -15,7 +15,8 @@ from paraflex.validity.numbers import FAST, mechanism_size
 
 def start_findings(model: Model, seen: Examination, assembly: str | None) -> Iterator[Finding]:
     """Deflections and velocities of [start] that joints, prescribed motions or one another do not allow."""
-    if model.start is None or (seen.starts and (seen.chosen is None or seen.chosen.state is None)):
+    open_ = seen.chosen is None or not (seen.chosen.closes or seen.chosen.undecided)
+    if model.start is None or (seen.starts and open_):
         return
     chosen = model.mechanism.assembly(assembly) if seen.starts else None
     try:

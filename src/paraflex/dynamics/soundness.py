@@ -64,6 +64,11 @@ class Closure:
         """Whether there is a consistent start."""
         return self.state is not None
 
+    @property
+    def undecided(self) -> bool:
+        """Whether the loops close and yet velocities do not follow: those of [start] may."""
+        return self.state is None and self.gap == 0.0
+
 
 def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure:
     """Close an assembly, and report the gaps; it raises nothing if the assembly cannot be closed.
@@ -79,7 +84,7 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
         gaps = joint_gaps(system, system.constraints(signals, time, error.partial)[0])
         return Closure(assembly.name, before, nan, nan, max(gaps.values()), tuple(gaps), error.cause, None)
     except (InconsistentConstraintsError, ProportionError) as error:
-        return Closure(assembly.name, before, nan, nan, 0.0, (), error.cause, None, error.remedy)
+        return Closure(assembly.name, before, nan, nan, 0.0, (), error.cause.rstrip(","), None, error.remedy)
     phi, rate = system.constraints(signals, time, state.q, state.v)
     position, velocity = (float(np.max(np.abs(part), initial=0.0)) for part in (phi, rate))
     return Closure(assembly.name, before, position, velocity, 0.0, (), "", state)

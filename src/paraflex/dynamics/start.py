@@ -19,9 +19,16 @@ from paraflex.dynamics.projection import assemble, constraint_change, least_chan
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.special import special_start
-from paraflex.dynamics.state import VELOCITY_STIFFNESS, State, consistent_state, reference_pose, undeformed
+from paraflex.dynamics.state import (
+    VELOCITY_STIFFNESS,
+    State,
+    check_accelerations,
+    consistent_state,
+    reference_pose,
+    undeformed,
+)
 from paraflex.dynamics.system import System, build_system
-from paraflex.errors import InputError
+from paraflex.errors import InconsistentConstraintsError, InputError
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
 from paraflex.mechanism import (
@@ -248,9 +255,20 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SMALL_TERMS)
     if np.any(bad):
         _refuse_velocities(system, given, slip, bad)
+    fields = [entry.field for entry in given]
     cause, remedy = special_start(system, signals, time, q, C, wanted)
     if cause:
-        raise InputError(cause.rstrip(","), field=given[0].field if given else "start", remedy=remedy)
+        raise InputError(cause.rstrip(","), field=fields[0] if fields else "start", remedy=remedy)
+    try:
+        check_accelerations(system, signals, time, q, v)
+    except InconsistentConstraintsError as error:
+        # Without the velocity that contradicts the branches they are known.
+        for k, one in enumerate(fields):
+            others = np.arange(len(wanted)) != system.m + k
+            cause, remedy = special_start(system, signals, time, q, C[others], wanted[others])
+            if cause:
+                raise InputError(f"on neither branch of {cause.rstrip(',')}", field=one, value=given[k].value, remedy=remedy)
+        raise InputError(error.cause.rstrip(","), field="start", remedy=error.remedy) from None
     return v
 
 

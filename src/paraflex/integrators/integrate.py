@@ -13,6 +13,7 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, dependence
+from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.special import barred_drives
 from paraflex.errors import (
     ConstraintDriftError,
@@ -356,6 +357,15 @@ def _before_singular(method: str, time: float) -> str:
     )
 
 
+def _singular_start(run: Run, times: Array, q: Array) -> Array:
+    """The start as a passage (2, 1) if more rows depend on others there than at the next sample (times (k,)); else (2, 0)."""
+    initial, system = run.problem.initial.time, run.problem.system
+    if run.dependent_rows and times.size > 1 and times[0] == initial and system.m <= DENSE_ROWS:
+        lasting = dependence(system, q[1]).dropped.size
+        return np.full((2, int(lasting < run.dependent_rows)), initial)
+    return np.zeros((2, 0))
+
+
 def _solution(
     run: Run, options: IntegrationOptions, wall_time: float, status: str, message: str, crossing: Crossing | None
 ) -> Solution:
@@ -363,7 +373,8 @@ def _solution(
     figures, system = run.figures(), run.problem.system
     reached = slice(0, run.reached if crossing is None else samples.times.size)
     multipliers = least_norm(system, samples.q[reached], samples.lam[reached], run.dependent_rows)
-    for first, last in figures.passages.T:
+    passages = np.hstack([_singular_start(run, samples.times[reached], samples.q[reached]), figures.passages])
+    for first, last in passages.T:
         multipliers[(samples.times[reached] >= first) & (samples.times[reached] <= last)] = np.nan
     return Solution(
         t=samples.times[reached],
@@ -377,7 +388,7 @@ def _solution(
         status=status,
         message=message,
         wall_time=wall_time,
-        singular_positions=tuple(figures.passages.mean(axis=0).tolist()),
+        singular_positions=tuple(passages.mean(axis=0).tolist()),
         method=options.method.name,
         **{one.name: getattr(figures, one.name) for one in fields(figures) if one.name != "passages"},
         event="" if crossing is None else str(crossing.function.event),

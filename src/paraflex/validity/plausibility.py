@@ -152,11 +152,13 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
     """Findings about loads of joints and drives that redundant constraints share in any way."""
     names = [joint.name for joint in system.described.joints]
     found = undetermined_loads(system, names, solution.q, solution.acting)
+    # At singular positions loads have poles.
+    lasting = np.isfinite(solution.multipliers).any(axis=1)
     drives = [f"prescribed.{one.name}" for one in system.described.prescribed]
     forces, moments, drives_too = (
-        np.any(found.force, axis=(0, 2)),
-        np.any(found.moment, axis=0),
-        np.any(found.drive, axis=0),
+        np.any(found.force[lasting], axis=(0, 2)),
+        np.any(found.moment[lasting], axis=0),
+        np.any(found.drive[lasting], axis=0),
     )
     kinds = ("forces in", names, forces), ("moments in", names, moments), ("torques or forces of", drives, drives_too)
     named = [(kind, ", ".join(itertools.compress(whose, at))) for kind, whose, at in kinds]
