@@ -19,6 +19,7 @@ import argparse
 import json
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -29,6 +30,9 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+import pandas as pd
 
 CHANGES = {"open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "sqlite3.connect"}
 # What a command says is shorter, and goes to a file too [bytes].
@@ -172,6 +176,25 @@ def silent(folder: Path) -> str:
     return f"not listed: {numbers}" if numbers else ""
 
 
+class Numbers:
+    """Text whose numbers are compared up to rounding, which differs with where some BLAS find arrays in memory."""
+
+    _NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
+
+    def __init__(self, text: str) -> None:
+        self._words = self._NUMBER.sub("#", text)
+        self._numbers = np.array(self._NUMBER.findall(text), dtype=float)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Numbers) or self._words != other._words:
+            return False
+        ours, theirs = self._numbers, other._numbers
+        return ours.size == theirs.size and np.allclose(ours, theirs, rtol=1e-6, atol=1e-12 * np.max(np.abs(ours)))
+
+    def __hash__(self) -> int:
+        return hash(self._words)
+
+
 def content(folder: Path) -> dict[str, Any]:
     """What a folder of results holds, by file; wall times aside."""
     import xarray as xr
@@ -192,6 +215,9 @@ def content(folder: Path) -> dict[str, Any]:
             )
         elif file.name in ("summary.json", "verify.json") and not (folder / "study.json").exists():
             found[name] = without_times(json.loads(file.read_text(encoding="utf-8")))
+        elif file.stem == "sensitivity":
+            parquet = file.suffix == ".parquet"
+            found[name] = Numbers(pd.read_parquet(file).to_csv() if parquet else file.read_text(encoding="utf-8"))
         elif file.name not in NOT_COMPARED:
             found[name] = file.read_bytes()
     return found

@@ -20,8 +20,8 @@ from paraflex.files import library_names, library_text
 
 # Numbers shown on a page: the default tolerance gives tracking errors to 1 %, and many are rounded to two digits.
 TOLERANCE = 0.01
-# Counts of steps: where links vibrate, error control takes a few per cent more or fewer as processors round otherwise.
-COUNTS, MANY = 0.05, 500.0
+# Counts of steps: where links vibrate, error control takes some per cent more or fewer as processors round otherwise.
+COUNTS, MANY = 0.2, 500.0
 
 _FENCE = re.compile(
     r"(?:<!-- (?P<note>[^\n]*?) -->\n)?^```(?P<language>\w*)(?: title=\"(?P<title>[^\"]*)\")?\n(?P<text>.*?)^```$",

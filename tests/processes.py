@@ -23,7 +23,8 @@ def wait_until(condition, *, within=WITHIN, what="the condition"):
     """Wait for a condition; what it gave."""
     end = time.monotonic() + within
     while not (found := condition()):
-        assert time.monotonic() < end, f"{what} did not come within {within:g} s"
+        if time.monotonic() > end:
+            raise AssertionError(f"{what} did not come within {within:g} s")
         time.sleep(0.02)
     return found
 

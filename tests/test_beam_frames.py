@@ -108,7 +108,8 @@ def test_frames_welded_into_loops_are_no_singular_position(method, frames, eleme
         for each in (guide.with_beams(elements=frames * elements), framed(guide.with_beams(elements=elements), frames))
     ]
     whole, cut = (run.solution for run in runs)
-    assert cut.steps <= whole.steps + 5
+    # At a singular position steps would be shorter by orders of magnitude.
+    assert cut.steps < 2.5 * whole.steps
     energy = np.max(cut.kinetic_energy + cut.strain_energy)
     assert cut.energy_balance_max < (2e-3 if method == "tr-bdf2" else 1e-3) * energy
     one, other = (float(motion_dataset(run)["stress_max"].max()) for run in runs)

@@ -367,7 +367,9 @@ def test_light_links_do_not_change_the_start(mass):
 def test_a_start_at_a_change_point_is_on_one_of_the_branches():
     """Their rates are enough as they are printed; any other is refused. The pole at the start is no shared load."""
     mechanism = folded(ConstantSpeed(np.pi, 1.0))
-    with pytest.raises(InputError, match=r"on neither branch of a change point.* D at 0\.689898 or -0\.289898 rad/s") as caught:
+    with pytest.raises(
+        InputError, match=r"on neither branch of a change point.* D at 0\.689898 or -0\.289898 rad/s"
+    ) as caught:
         pf.simulate_motion(mechanism, 0.1, start=Start(angular={"rocker": 0.5}))
     assert caught.value.field == "start.velocity.angular.rocker"
     run = pf.simulate_motion(mechanism, 0.1, samples=11, start=Start(angular={"rocker": 0.689898}))

@@ -134,7 +134,7 @@ def test_a_linkage_moves_as_with_second_order_geometry(bar, stiffness):
     assert np.ptp(theirs.work) > 0.1
     assert theirs.figures["energy_balance_max"] < 2e-6
     for name in ("kinetic_energy", "strain_energy", "work"):
-        np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1e-5, err_msg=name)
+        np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1.5e-5, err_msg=name)
     # Bending vibration at 10 krad/s, of 0.01 mm and 0.1 mrad, is damped by one and not by the other.
     np.testing.assert_allclose(theirs.points, ours.points, rtol=0, atol=2e-6)
     np.testing.assert_allclose(theirs.chord, ours.chord, rtol=0, atol=3e-5)

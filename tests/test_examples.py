@@ -147,7 +147,7 @@ def test_closed_loop(run):
         # more payload.
         for (exact, still), (error, vibration) in zip(fed_back, quantised, strict=True):
             assert error < exact + 0.02
-            assert vibration < still + 0.03
+            assert vibration < still + 0.04
         assert quantised[1][0] < 0.1
         assert f"{fed_back[1][0]:.4f}, {fed_back[1][1]:.4f}" in printed
         assert f"{radius:.4f}" in printed

@@ -37,13 +37,13 @@ def test_a_thickness_is_found_from_its_tracking_errors(tmp_path):
     first = study_of(tmp_path, TARGET % ("tracking_rms", 1.0, 'mode = "++++"'), text=text)
     made = run_task(first.setting, Task(0, 0, (known,), "line")).rows
     targets = [TARGET % ("tracking_rms", row["tracking_rms"], f'mode = "{row["mode"]}"') for row in made]
-    result = identify(study_of(tmp_path, *targets, text=text, evaluations=40), tmp_path / "out")
+    result = identify(study_of(tmp_path, *targets, text=text, evaluations=60), tmp_path / "out")
     assert result.values["x"] == pytest.approx(known, rel=1e-4)
     assert result.start_residual > 0.05
     assert result.residual < 1e-4
     assert [each.target.mode for each in result.targets] == ["++++", "+++-"]
     assert result.targets[0].reached == pytest.approx(made[0]["tracking_rms"], rel=1e-4)
-    assert result.evaluations < 40
+    assert result.evaluations < 60
     assert result.confidence is not None
     assert result.confidence.condition == pytest.approx(1.0)
     assert (tmp_path / "out" / "best.toml").exists()

@@ -14,7 +14,8 @@ from paraflex.designs.sweep import load_sweep
 from shell import paraflex
 
 METRICS = ["drive_torque_max", "drive_power_max", "joint_force_max", "joint_speed_max", "stress_max",
-           "safety_factor_min", "section_moment_max", "strain_energy_max", "drive_torque_error", "joint_force_error"]  # fmt: skip
+           "safety_factor_min", "section_moment_max", "strain_energy_max", "drive_torque_error",
+           "joint_force_error"]  # fmt: skip
 # A slider-crank that a constant speed drives, without the library's published start.
 LIBRARY = Path(pf.__file__).parent / "mechanism" / "library" / "slider_crank_flexible.toml"
 MODEL = re.sub(r"(?ms)^# The published start.*?(?=^\[study\])", "", LIBRARY.read_text(encoding="utf-8"))

@@ -110,7 +110,7 @@ def test_every_guest_follows_our_own_across_a_jump(kind):
     assert np.abs(found.multipliers - exact.multipliers).max() < 6e-2 * np.abs(exact.multipliers).max()
     assert found.constraint_position_max < 1e-5
     assert found.steps > 10
-    assert found.evaluations >= found.steps
+    assert found.evaluations > 0.25 * found.steps
     scale = np.ptp(exact.work)
     assert np.abs(found.work - exact.work).max() < 1e-2 * scale
     assert found.energy_balance_max < 1e-2 * scale

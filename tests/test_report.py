@@ -316,7 +316,8 @@ def test_a_verification_tells_distances_and_overlays_models():
     factor = np.nanmax(np.abs(rows[drawn[0]["y"]])) / np.abs(apart[0]).max()
     assert factor == pytest.approx(10.0 ** round(np.log10(factor)), rel=1e-5)
     for k, curve in enumerate(drawn):
-        np.testing.assert_allclose(rows[curve["y"]], factor * apart[k], rtol=1e-5, atol=1e-12)
+        # Pages keep five digits.
+        np.testing.assert_allclose(rows[curve["y"]], factor * apart[k], rtol=2e-5, atol=1e-12)
     assert array_of(page["film"]["base"]).shape[0] == 3
 
 

@@ -62,7 +62,8 @@ def test_four_coordinates_a_node_make_104(task):
 )
 def test_tracking_error_of_the_reference_set(task, mode, known):
     run = simulate(task, mode, options=IntegrationOptions(tolerance=2e-6))
-    assert error_of(run) == pytest.approx(known, rel=2e-3)
+    # To the digits of the prototype.
+    assert float(f"{error_of(run):.3e}") == pytest.approx(known, rel=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_tracking_error_of_the_reference_set(task, mode, known):
 )
 def test_second_order_geometry_meets_geometrically_exact_beams(mode, exact, within):
     task = plan_tracking(raparm_i().with_geometry("second-order"), SQUARE, duration=0.7)
-    run = simulate(task, mode, options=IntegrationOptions(tolerance=2e-5))
+    run = simulate(task, mode, options=IntegrationOptions(tolerance=1e-5))
     assert error_of(run) == pytest.approx(exact, rel=within)
 
 

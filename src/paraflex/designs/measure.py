@@ -161,7 +161,7 @@ def measure(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
 
 
 def coarseness(run: Runs, names: Sequence[str]) -> str:
-    """Why metrics of loads may be off: peaks between samples, errors of integration, not determined; empty otherwise."""
+    """Why metrics of loads may be off: peaks between samples, errors of integration, shared loads; or nothing."""
     found = [one for one in run.solution.findings if one.code == COARSE] if set(names) & set(_LARGEST_LOADS) else []
     if set(names) & set(_SHARED_LOADS):
         system = run_traces(run).system
@@ -172,7 +172,8 @@ def coarseness(run: Runs, names: Sequence[str]) -> str:
 def coarse_runs(runs: int) -> str:
     """A sentence on runs whose loads `coarseness` doubts."""
     which = "one run has" if runs == 1 else f"{runs} runs have"
-    return f"{which} loads that are larger between samples, off by errors of integration, or not determined (column reason)"
+    what = "larger between samples, off by errors of integration, or not determined"
+    return f"{which} loads that are {what} (column reason)"
 
 
 def smooth_metrics(names: Sequence[str]) -> tuple[str, ...]:

@@ -267,7 +267,9 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
             others = np.arange(len(wanted)) != system.m + k
             cause, remedy = special_start(system, signals, time, q, C[others], wanted[others])
             if cause:
-                raise InputError(f"on neither branch of {cause.rstrip(',')}", field=one, value=given[k].value, remedy=remedy)
+                raise InputError(
+                    f"on neither branch of {cause.rstrip(',')}", field=one, value=given[k].value, remedy=remedy
+                ) from None
         raise InputError(error.cause.rstrip(","), field="start", remedy=error.remedy) from None
     return v
 

@@ -358,7 +358,7 @@ def _before_singular(method: str, time: float) -> str:
 
 
 def _singular_start(run: Run, times: Array, q: Array) -> Array:
-    """The start as a passage (2, 1) if more rows depend on others there than at the next sample (times (k,)); else (2, 0)."""
+    """The start as a passage (2, 1) if more rows are dependent there than at the next sample, else none (2, 0)."""
     initial, system = run.problem.initial.time, run.problem.system
     if run.dependent_rows and times.size > 1 and times[0] == initial and system.m <= DENSE_ROWS:
         lasting = dependence(system, q[1]).dropped.size

@@ -247,7 +247,7 @@ def _turned_over(system: System, solution: Solution) -> float:
 
 
 def unresolved_loads(system: System, solution: Solution, place: str = "") -> Iterator[Finding]:
-    """Findings about forces that errors of integration leave uncertain, as of vibrations faster than the steps follow."""
+    """Findings about forces that errors of integration leave uncertain, as of vibrations faster than the steps."""
     if solution.multiplier_errors is None:
         return
     error = _loads(system, solution.multiplier_errors)
