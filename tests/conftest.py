@@ -37,6 +37,8 @@ from paraflex.tracking import plan_tracking
 # In the background of a shell, or under nohup, processes ignore it, and so do all that they start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 SQUARE = ((0.050, 0.314), (-0.050, 0.314), (-0.050, 0.214), (0.050, 0.214))
 DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
 # Soft enough that bending, stretching and inertia are of one magnitude in a random state.

@@ -234,6 +234,8 @@ def test_control_of_forces_resolves_a_stiff_spring(model):
         ({"control": "forces", "method": "radau"}, "control"),
         ({"control": "forces", "step": 1e-3}, "control"),
         ({"tolerance_per": "second"}, "tolerance_per"),
+        ({"tolerance_per": "run", "method": "rk45"}, "tolerance_per"),
+        ({"tolerance_per": "cycle", "step": 1e-3}, "tolerance_per"),
         ({"tolerance": float("nan")}, "tolerance"),
     ],
 )
@@ -250,3 +252,17 @@ def test_a_run_that_failed_has_no_loads_and_no_good_verdict():
     run = failed.value.partial
     assert run.validity is None or not run.validity.holds
     assert load_figures(pf.motion_dataset(run)) == {}
+
+
+def test_what_a_method_or_step_that_is_chosen_leaves_without_effect_goes_with_the_study(model):
+    """A study's way of choosing steps goes with its method, as its step does; what is asked for stays."""
+    study = model(ARM + '[study]\nduration = 0.1\ncontrol = "forces"\ntolerance_per = "run"\n').study
+    assert study.integration({"method": "esdirk4"}).control is pf.integrators.Control.FORCES
+    for chosen in ({"method": "bdf"}, {"step": 1e-3}):
+        found = study.integration(chosen)
+        assert found.control is found.tolerance_per is None
+    assert study.integration({"method": "newmark"}).tolerance_per is pf.integrators.TolerancePer.RUN
+    with pytest.raises(pf.InputError, match=r"^control: "):
+        study.integration({"method": "bdf", "control": "forces"})
+    with pytest.raises(pf.InputError, match=r"study\.control: .*choose an ESDIRK method"):
+        model(ARM + '[study]\nduration = 0.1\ncontrol = "forces"\nmethod = "newmark"\n')

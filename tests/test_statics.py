@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ellipe, ellipk
 
 import paraflex as pf
 from flexures import (
@@ -53,6 +54,34 @@ def test_columns_of_euler_buckle_at_their_loads(lower: str, upper: str, factor: 
     found = pf.statics(column(lower, upper), loads={"column.B.y": -0.5 * wanted}, steps=1)
     assert found.buckling[:, 0] == pytest.approx([2.0, 2.0], rel=1e-5)
     assert found.stable.all()
+
+
+@pytest.mark.parametrize(("tip", "steps"), [(60.0, 10), (120.0, 10), (120.0, 3)])
+def test_a_column_pushed_across_its_load_bends_as_the_elastica(tip: float, steps: int) -> None:
+    """It leaves its axis within a small part of the load, and no factor of the straight column is left."""
+    modulus = math.sin(math.radians(tip / 2.0)) ** 2
+    K, whole = ellipk(modulus), ellipe(modulus)
+    load = K**2 * EI / LENGTH**2
+    beams, welds = chain("leaf", 16)
+    root = pf.WeldJoint("root", pf.PointRef("ground", "O"), pf.PointRef("leaf1", "A"))
+    bar = pf.Mechanism(
+        name="column", ground={"O": (0.0, 0.0)}, bodies=tuple(beams), joints=(root, *welds),
+        assemblies=(pf.Assembly("flat", {beam.name: 0.0 for beam in beams}),), gravity=(0.0, 0.0),
+    )  # fmt: skip
+    loads = {"leaf16.B.x": -load, "leaf16.B.y": 1e-4 * load}
+    found = pf.statics(bar, loads=loads, steps=steps, warning=False)
+    assert found.stable.all()
+    place = [found.place(name)[-1] / LENGTH for name in ("leaf16.B.x", "leaf16.B.y")]
+    assert place == pytest.approx([2.0 * whole / K - 1.0, 2.0 * math.sqrt(modulus) / K], abs=1e-3)
+    assert np.isnan(found.buckling[0, 0])
+    assert "contradicts" in found.equilibria[0].buckling.reason
+
+
+def test_travel_along_a_column_buckles_it_at_the_shortening_of_its_load() -> None:
+    shortening = math.pi**2 * EI / LENGTH**2 * LENGTH / (E * WIDTH * THICKNESS)
+    found = pf.statics(column("pinned", "pinned"), moved={"column.B.y": -2.5 * shortening}, steps=4, warning=False)
+    assert found.buckling[0, 0] == pytest.approx(0.4, rel=1e-4)
+    assert found.stable.tolist() == [True, True, False, False, False]
 
 
 def test_beyond_its_load_a_column_is_unstable_and_the_motion_that_grows_is_told() -> None:

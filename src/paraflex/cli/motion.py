@@ -209,8 +209,9 @@ def _report(out: Console, summary: dict) -> None:
     # Points that segments made by the program hang together at are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
     wide = max((abs(x) for at in places.values() for x in at), default=0.0)
+    unknown = max(_ROUNDING * wide, summary["constraint_position_max"])
     for point, position in list(places.items())[:_MOST_POINTS]:
-        x, y = (0.0 if abs(each) < _ROUNDING * wide else each for each in position)
+        x, y = (0.0 if abs(each) < unknown else each for each in position)
         out.print(f"  {point}: ({x:.6g}, {y:.6g}) m")
     if len(places) > _MOST_POINTS:
         out.print(f"  and {len(places) - _MOST_POINTS} more points in results.nc")

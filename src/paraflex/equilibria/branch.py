@@ -27,6 +27,8 @@ _MOST_ITERATIONS = 25
 _CONVERGED, _ROUNDED = 1e-10, 1e-7
 # An iteration that moves links by more than this is shortened, at the start [sizes of the mechanism, rad].
 _LONGEST_MOVE = 0.3
+# Steps grow with displacements up to these [sizes of the mechanism, rad].
+_WHOLE = 1.0
 # What a step may leave of constraints [sizes of the mechanism, rad].
 _GAP = 1e-9
 # Steps grow after so few iterations and shrink by these parts; none is longer than this many of the wanted steps.
@@ -131,6 +133,12 @@ class Branch:
                     yield b
             if turned and branch._back(first, here, there):
                 break
+            # Displacements count by the largest so far: near the limit of a load steps grow with how links bend.
+            moved = min(_WHOLE, self._size(there.at.plus(first.at, -1.0)._replace(s=0.0)))
+            if moved > move:
+                move, branch = moved, replace(self, weight=self.weight / moved**2)
+                unit = 1.0 / branch._size(there.tangent)
+                there = there._replace(tangent=there.tangent.plus(there.tangent, unit - 1.0))
             here = there
         raise self._ended(turned, furthest)
 

@@ -148,7 +148,7 @@ def _reduced(equations: Equations, at: Unknowns, shapes: Array, typical: float) 
 
 
 def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> Buckling:
-    """Factors of the first of some equilibria along their branch, less what the others contradict.
+    """Factors of the first of some equilibria along their branch, none where the others contradict the first.
 
     Where stable equilibria lead to a limit point it is that of the limit point.
     """
@@ -164,13 +164,13 @@ def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> 
             lost = there.at.s
             break
         reached = there.at.s
-    kept = [k for k, factor in enumerate(own.factors) if factor > reached or reached == point.at.s]
-    reason = own.reason
-    if np.isfinite(own.factors[:1]).any() and not np.any(own.factors[kept[:1]] <= lost):
-        kept, reason = [], f"the branch contradicts the linear estimate: stable up to {reached:.4g} of what is given"
-    parts = (np.append(own.factors[kept], np.full(count, np.nan)), np.pad(own.shapes[:, kept], ((0, 0), (0, count)),
-                                                                        constant_values=np.nan))  # fmt: skip
-    return Buckling(parts[0][:count], parts[1][:, :count], reason)
+    first, held = own.factors[0] if count else np.nan, reached == point.at.s
+    if np.isfinite(first) and (not (held or first > reached) or first > lost):
+        return Buckling(
+            np.full(count, np.nan), np.full_like(own.shapes[:, :count], np.nan),
+            f"the branch contradicts the linear estimate: stable up to {reached:.4g} of what is given",
+        )  # fmt: skip
+    return Buckling(own.factors[:count], own.shapes[:, :count], own.reason)
 
 
 def _largest_one(equations: Equations, shapes: Array) -> Array:

@@ -21,8 +21,6 @@ from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, Start
 from paraflex.validity import warn
 
-# Factors of buckling beyond those asked for, in place of those that the branch contradicts.
-_SPARE = 3
 # A limit point is looked for where the linear estimate is further away, as it is off by no more than its distance; and
 # no further along than so much of what is given.
 _NEAR, _FURTHEST = 0.01, 2.0
@@ -137,7 +135,7 @@ def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibri
         kept = np.flatnonzero(~np.isin(equations.holding, moved))
         free = vibrations(equations, found._replace(rows=csr_matrix(found.rows[kept])))
     return Equilibrium(
-        point, vibration, free, buckling_about(equations, point, found, vibration, buckling and buckling + _SPARE),
+        point, vibration, free, buckling_about(equations, point, found, vibration, buckling),
         stiffness_at(equations, point.at, found, equations.given.measured),
     )  # fmt: skip
 

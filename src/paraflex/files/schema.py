@@ -754,10 +754,10 @@ class StudyDefaultsTable(_Table):
         "the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
     )
     tolerance_per: Literal["cycle", "run"] | None = _optional(
-        'the time in which errors may add up to it: a "cycle" of the motion or the "run"'
+        'the time in which errors may add up to it: a "cycle" of the motion or the "run"; own methods only'
     )
     control: Literal["positions", "forces"] | None = _optional(
-        'whose errors choose the steps: "positions", or "forces", the default of rigid bodies'
+        'whose errors choose the steps: "positions", the default, or "forces" as well, with ESDIRK methods'
     )
     step: Number | None = _optional("a fixed step in s, with methods that take one")
     after: Literal["free", "hold"] = _optional(

@@ -86,8 +86,9 @@ class StudyDefaults:
     def integration(self, chosen: Mapping[str, Any] | None = None) -> IntegrationOptions:
         """How runs are integrated: as a caller chooses, then as the study says, else as `IntegrationOptions` has it.
 
-        A step goes with a method: where another method is chosen the study's step is left out. So do `parameters`, in
-        the words of files and commands.
+        A step goes with a method: where another method is chosen the study's step is left out, and where the method or
+        the step chosen leaves `tolerance_per` or `control` without effect the study's as well. `parameters` of the
+        method are in the words of files and commands.
 
         Raises
         ------
@@ -100,6 +101,10 @@ class StudyDefaults:
             own["step"] = None
         options = {name: value for name, value in own.items() if value is not None} | given
         method = find_method(options.pop("method", DEFAULT_METHOD), options.pop("parameters", None))
+        if given.keys() & {"method", "step"}:
+            chosen_steps = IntegrationOptions(method=method, step=options.get("step"))
+            applies = {"tolerance_per": chosen_steps.controls_errors, "control": chosen_steps.estimates_forces}
+            options = {name: value for name, value in options.items() if name in given or applies.get(name, True)}
         return IntegrationOptions(**options, method=method)
 
 

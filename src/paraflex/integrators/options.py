@@ -142,7 +142,8 @@ class IntegrationOptions(CheckedFields):
 
     def for_system(self, system: System) -> IntegrationOptions:
         """The same options with the tolerance that they have for a system."""
-        return replace(self, tolerance=self.tolerance_for(system), tolerance_per=self.per)
+        per = self.per if self.controls_errors else None
+        return replace(self, tolerance=self.tolerance_for(system), tolerance_per=per)
 
     @property
     def per(self) -> TolerancePer:
@@ -155,6 +156,11 @@ class IntegrationOptions(CheckedFields):
         """Error allowed in forces, as a part of the largest; zero where they are not looked at as a step is solved."""
         looked_at = self.control is Control.FORCES or not system.n_flexible
         return FORCE_PART if looked_at and self.estimates_forces else 0.0
+
+    @property
+    def controls_errors(self) -> bool:
+        """Whether paraflex chooses the steps by their errors: own methods, steps not fixed."""
+        return self.method.family in (Family.ESDIRK, Family.NEWMARK) and self.step is None
 
     @property
     def estimates_forces(self) -> bool:
@@ -172,7 +178,7 @@ class IntegrationOptions(CheckedFields):
             "integration_method": self.method.name,
             "method_parameters": json.dumps(self.method.values),
             "constraints_treatment": self.treatment.value,
-            "tolerance_per": self.per.value,
+            "tolerance_per": self.per.value if self.controls_errors else "",
             "steps": "chosen by their errors" if self.step is None else f"fixed, {self.step:g} s",
             "stop_at": ", ".join(str(event) for event in self.events),
         }
@@ -186,6 +192,12 @@ class IntegrationOptions(CheckedFields):
             raise InputError(
                 "steps are not chosen by errors of forces", field="control", value=self.control.value,
                 remedy="leave it out, or choose an ESDIRK method, say esdirk5, without a fixed step",
+            )  # fmt: skip
+        if self.tolerance_per is not None and not self.controls_errors:
+            raise InputError(
+                "without effect on " + (f"{self.method}" if self.step is None else "fixed steps"),
+                field="tolerance_per", value=self.tolerance_per.value,
+                remedy="leave it out, or choose one of paraflex's own methods, say esdirk5, without a fixed step",
             )  # fmt: skip
 
     def _check_constraints(self) -> None:

@@ -238,8 +238,11 @@ class Members(CheckedFields):
         InputError
             If there is none.
         """
-        names = ", ".join(assembly.name for assembly in self.assemblies) or "none"
+        names = ", ".join(assembly.name for assembly in self.assemblies)
         for assembly in self.assemblies:
             if name is None or assembly.name == name:
                 return assembly
+        if not names:
+            remedy = "add an [assembly.NAME] table with estimates of coordinates"
+            raise InputError("the mechanism has none", field="assembly", value=name, remedy=remedy)
         raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {names}")

@@ -77,9 +77,13 @@ def last_rows(data: xr.Dataset) -> Iterator[list[str]]:
 
 
 def buckling_words(data: xr.Dataset) -> str:
-    """At which fraction it buckles, as seen from the start and from the last step; empty if nothing is known of it."""
+    """At which fraction it buckles, as seen from the start and from the last step; empty if nothing is known of it.
+
+    Of travel alone only where that is within it: a travel has no margin as a load has.
+    """
     factors = data["buckling_factor"].values
-    if not (factors.size and np.isfinite(factors[0, 0]) and (data["role"] == "loaded").any()):
+    loaded = bool((data["role"] == "loaded").any())
+    if not (factors.size and np.isfinite(factors[0, 0]) and (loaded or factors[0, 0] <= 1.0)):
         return ""
     seen = [f"{factors[0, 0]:.4g} of what is given, as seen from the start"]
     if data.sizes["step"] > 1 and np.isfinite(factors[-1, 0]):

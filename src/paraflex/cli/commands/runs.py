@@ -57,12 +57,16 @@ class RunRequest:
     tolerance: ToleranceOption = None
     tolerance_per: Annotated[
         str | None,
-        Option(metavar="cycle|run", help="Time in which errors may add up to the tolerance. Default: cycle."),
+        Option(
+            metavar="cycle|run",
+            help="Time in which errors may add up to the tolerance. Default: cycle, or run for a tolerance given.",
+        ),
     ] = None
     control: Annotated[
         str | None,
         Option(
-            metavar="positions|forces", help="Whose errors choose the steps. Default: forces, where links are rigid."
+            metavar="positions|forces",
+            help="Whose errors choose the steps: of positions, the default, or of forces as well.",
         ),
     ] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
