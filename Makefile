@@ -9,7 +9,9 @@ KERNELS := $(wildcard src/paraflex/kernel/*.py)
 run: $(VENV)/.run
 	$(BIN)/paraflex run --out results
 
-test: lint types imports tests docs
+# Two at a time: checking types takes one core for a minute.
+test:
+	$(MAKE) --jobs 2 lint types imports docs tests
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff format --check src tests benchmarks examples docs/hooks docs/notebooks

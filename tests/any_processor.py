@@ -45,13 +45,13 @@ SETTINGS: dict[str, dict[str, str]] = {
     **{f"kernels {name}": {"NUMBA_CPU_NAME": name} for name in ("generic", "haswell")},
 }
 MOST_USED, MOVED, MOST_SPREAD = 1.0 / 3.0, 0.01, 0.1
-# Files of linear algebra and time integration that take some four minutes on two cores.
+# Files of linear algebra and time integration that take some three minutes on two cores.
 NUMERICAL = (
     "andrews", "beam_frames", "body_terms", "closure", "consistency", "contacts", "dwell", "equilibrium", "events",
-    "exact_derivatives", "examples", "following", "integrator", "krylov", "laws_compared", "laws_inside",
+    "exact_derivatives", "following", "integrator", "krylov", "laws_compared", "laws_inside",
     "linear", "linear_reduced", "linear_simulated", "linearise", "loads", "loads_in_time", "margins", "methods",
     "optimisation", "reduced_along", "regulators", "rows", "segments", "sensitivities",
-    "spectra", "springs", "statics", "stress", "tangent", "tracking",
+    "spectra", "springs", "statics", "stress", "tracking",
 )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from paraflex.studies import identify, load_identification
 from paraflex.studies.optimisation.confidence import ONE_DEVIATION, student_factor
 from paraflex.studies.optimisation.noise import NOISE_POINTS, noise_of
 
-FITS = 120
+FITS = 60
 # Five standard deviations of a binomial distribution would let anything pass; two and a half, one correct code in 80.
 SIGMAS = 2.5
 KNOWN = {"x": 0.0052, "y": 0.31}

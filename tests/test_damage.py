@@ -54,7 +54,7 @@ def flip(file, place, bit=1):
 def test_no_flipped_bit_is_read_as_other_numbers(tmp_path):
     """The short form of benchmarks/bit_flips.py: of each file that numbers are read from some bits."""
     (tmp_path / "files").mkdir()
-    cases = list(bit_flips.flips(tmp_path, 100, 3, bit_flips.kinds(tmp_path / "files")))
+    cases = list(bit_flips.flips(tmp_path, 50, 3, bit_flips.kinds(tmp_path / "files")))
     assert [case for case in cases if case.outcome in ("raw", "silent")] == []
     # Files without a digest would be read as if nothing were.
     found = Counter(case.file.rpartition(".")[2] for case in cases if case.outcome == "found")

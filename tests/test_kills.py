@@ -12,7 +12,7 @@ SCRIPT = Path(__file__).parents[1] / "benchmarks" / "kills.py"
 
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")
 def test_killed_commands_leave_the_results_before_or_the_new_ones_and_do_the_rest_when_repeated():
-    given = ("--kills", 4, "--full", 2, "--only", "motion", "sensitivity", "sweep")
+    given = ("--kills", 4, "--full", 1, "--only", "motion", "sensitivity", "sweep")
     with started(sys.executable, SCRIPT, *given) as child:
         done = child.end()
     assert done.returncode == 0, done.stdout + done.stderr

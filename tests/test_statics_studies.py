@@ -211,7 +211,7 @@ def test_indices_tell_which_number_a_stiffness_depends_on(tmp_path):
     ranges = RANGES.replace("0.3 mm", "0.45 mm").replace('"1 mm"', '"0.55 mm"').replace("80 mm", "90 mm")
     ranges = ranges.replace("120 mm", "110 mm")
     file = written(tmp_path, 'metrics = ["stiffness"]\n', BASE, "[statics]\nsteps = 1\n", ranges)
-    found = pf.indices(file, tmp_path / "out", metrics=["stiffness.stage.T.x"], samples=64, workers=1)
+    found = pf.indices(file, tmp_path / "out", metrics=["stiffness.stage.T.x"], samples=32, workers=1)
     first, total = found.indices["first"].values[0], found.indices["total"].values[0]
     assert first == pytest.approx([0.5, 0.5], abs=0.15)
     assert total == pytest.approx([0.5, 0.5], abs=0.1)
