@@ -1,6 +1,7 @@
 """Forces at samples and how well runs know them: closed forms, steps that resolve what acts, estimates beside truth."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -225,6 +226,24 @@ def test_control_of_forces_resolves_a_stiff_spring(model):
         )
     assert errors[0] > 0.1
     assert errors[1] < 0.02
+
+
+@pytest.mark.parametrize(("damping", "found"), [(None, False), (1e-4, True)])
+def test_forces_of_damped_beams_that_steps_do_not_resolve_are_a_finding(damping, found):
+    """Of undamped ones tables alone say so: by default no steps resolve how those vibrate along their axes."""
+    model = pf.load("four_bar")
+    damped = damping and pf.RayleighDamping(0.0, damping)
+    bodies = tuple(
+        replace(body, damping=damped) if isinstance(body, pf.FlexibleBeam) else body for body in model.mechanism.bodies
+    )
+    mechanism = replace(model.mechanism, bodies=bodies)
+    for control in ("positions", "forces") if found else ("positions",):
+        run = pf.simulate_motion(
+            mechanism, 0.3, samples=301, warning=False, options=pf.IntegrationOptions(control=control)
+        )
+        says = [one.remedy for one in run.doubts if one.code == "forces-unresolved"]
+        assert bool(says) is (found and control == "positions")
+        assert not says or 'control = "forces"' in says[0]
 
 
 @pytest.mark.parametrize(

@@ -132,8 +132,8 @@ def doubtful_results(
         *_large_slopes(where, system, solution),
         *_overstressed(where, system, solution),
         *_unbalanced(where, system, solution),
-        # Where beams vibrate faster than the steps follow, tables have the errors beside the numbers.
-        *(() if system.n_flexible else unresolved_loads(system, solution, where.place)),
+        # No default resolves vibrations of undamped beams along their axes: tables have the errors beside the numbers.
+        *(() if _undamped(system) else unresolved_loads(system, solution, where.place)),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
         *shared_loads(system, solution),
@@ -244,6 +244,11 @@ def _turned_over(system: System, solution: Solution) -> float:
     rates = [joint_coordinate(system, one.joint, solution.q, solution.v).rate for one in system.mechanism.prescribed]
     power = sum(np.abs(torque * rate) for torque, rate in zip(torques.T, rates, strict=True))
     return float(np.trapezoid(power, solution.t)) if rates else 0.0
+
+
+def _undamped(system: System) -> bool:
+    """Whether the material of some beam has no damping."""
+    return any(body.damping.size > 0 and not body.damping.any() for body in system.bodies)
 
 
 def unresolved_loads(system: System, solution: Solution, place: str = "") -> Iterator[Finding]:
