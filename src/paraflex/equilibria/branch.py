@@ -135,7 +135,7 @@ class Branch:
                 break
             # Displacements count by the largest so far: near the limit of a load steps grow with how links bend.
             moved = min(_WHOLE, self._size(there.at.plus(first.at, -1.0)._replace(s=0.0)))
-            if moved > move:
+            if moved > move > 0.0:
                 move, branch = moved, replace(self, weight=self.weight / moved**2)
                 unit = 1.0 / branch._size(there.tangent)
                 there = there._replace(tangent=there.tangent.plus(there.tangent, unit - 1.0))

@@ -164,8 +164,8 @@ def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> 
             lost = there.at.s
             break
         reached = there.at.s
-    first, held = own.factors[0] if count else np.nan, reached == point.at.s
-    if np.isfinite(first) and (not (held or first > reached) or first > lost):
+    first = own.factors[0] if count else np.nan
+    if first > lost or (first <= reached and reached > point.at.s):
         return Buckling(
             np.full(count, np.nan), np.full_like(own.shapes[:, :count], np.nan),
             f"the branch contradicts the linear estimate: stable up to {reached:.4g} of what is given",
