@@ -30,6 +30,8 @@ _MAX_ITERATIONS = 50
 CLOSED = 1e-12
 # Projections of rates: the second removes the rounding error of the first.
 _PROJECTIONS = 2
+# Masses count as no less than this part of the whole.
+_LEAST_MASS = 1e-7
 # Joints named in an error.
 NAMED = 6
 _GAP_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
@@ -97,8 +99,18 @@ def shortened(step: Array, longest: float) -> float:
 
 
 def link_metric(system: System, q: Array, stiffness: float, *, every_spring: bool = False) -> Sparse:
-    """M + stiffness K: with the stiffness [s^2] links keep their shape; `every_spring` adds those at joints."""
+    """M + stiffness K: with the stiffness [s^2] links keep their shape; `every_spring` adds those at joints.
+
+    Bodies weigh no less than a part of the whole: what light ones carry from one heavy body to another would be lost.
+    """
     mass = sparse_mass(system, q)
+    held, least = mass.diagonal(), _LEAST_MASS * system.total_mass
+    light = [body for body in system.bodies if held[body.position.start] < least]
+    if light:
+        more = np.zeros(system.n)
+        for body in light:
+            more[body.position], more[body.angle] = least, least * system.size**2
+        mass = Sparse(mass + scipy.sparse.diags(more))
     if not stiffness:
         return mass
     return Sparse(mass + stiffness * elastic_stiffness(system, q, every_spring=every_spring))
