@@ -298,7 +298,7 @@ def test_a_change_point_is_named_with_both_rates(speed):
     with pytest.raises(InconsistentConstraintsError, match="a change point, at which two branches meet") as caught:
         consistent_state(build_system(mechanism), None)
     rates = sorted(f"{speed * each:.6g}" for each in RATES)
-    assert sorted(re.search(r"D at (\S+) or (\S+) rad/s", str(caught.value)).groups()) == rates
+    assert sorted(re.search(r"rocker at (\S+) or (\S+) rad/s", str(caught.value)).groups()) == rates
     (finding,) = [one for one in pf.check(mechanism).findings if one.code == "assembly-open"]
     assert "start.velocity.angular" in finding.remedy
 
@@ -314,7 +314,7 @@ def test_a_rate_given_at_a_change_point_chooses_the_branch(rate):
 
 
 def test_an_undriven_change_point_asks_for_a_rate():
-    with pytest.raises(InputError, match=r"change point.* D at 0\.689898 or -0\.289898 rad/s"):
+    with pytest.raises(InputError, match=r"change point.* rocker at 0\.689898 or -0\.289898 rad/s"):
         pf.simulate_motion(folded(None), 0.1, start=Start(angular={"crank": 1.0}))
     assert pf.simulate_motion(folded(None), 0.1, samples=2).solution.status == "complete"
 
@@ -324,7 +324,7 @@ def test_a_drive_that_leaves_a_dead_centre_from_rest_has_two_rates():
     with pytest.raises(InconsistentConstraintsError, match=r"a dead centre, with push at 1\.1 m") as caught:
         consistent_state(build_system(slider_crank(polynomial(1.1, 0.0, -0.1), 0.0)), None)
     rate = np.sqrt(0.2 / (0.3 + 0.3**2 / 0.8))
-    assert re.search(r"O at (\S+) or", str(caught.value)).group(1).lstrip("-") == f"{rate:.6g}"
+    assert re.search(r"crank at (\S+) or", str(caught.value)).group(1).lstrip("-") == f"{rate:.6g}"
 
 
 @pytest.mark.parametrize("law", [(1.1, 0.1), (1.1, -0.1), (1.1, 0.0, 0.1)])
@@ -368,7 +368,7 @@ def test_a_start_at_a_change_point_is_on_one_of_the_branches():
     """Their rates are enough as they are printed; any other is refused. The pole at the start is no shared load."""
     mechanism = folded(ConstantSpeed(np.pi, 1.0))
     with pytest.raises(
-        InputError, match=r"on neither branch of a change point.* D at 0\.689898 or -0\.289898 rad/s"
+        InputError, match=r"on neither branch of a change point.* rocker at 0\.689898 or -0\.289898 rad/s"
     ) as caught:
         pf.simulate_motion(mechanism, 0.1, start=Start(angular={"rocker": 0.5}))
     assert caught.value.field == "start.velocity.angular.rocker"
@@ -379,3 +379,25 @@ def test_a_start_at_a_change_point_is_on_one_of_the_branches():
     assert not {"loads-undetermined", "samples-coarse"} & {one.code for one in run.doubts}
     model = pf.Model(mechanism, start=Start(angular={"rocker": 0.689898}))
     assert not [one for one in pf.check(model).findings if one.code == "assembly-open"]
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_rates_of_a_branch_are_those_of_bodies_as_the_start_wants_them(swapped):
+    """A parallelogram folded flat goes on as one, or crosses with -65/7: six digits of it choose the branch."""
+    crank, rocker = (body(name, 0.3, *ends, 1.0) for name, ends in (("crank", ("O", "A")), ("rocker", ("Q", "B"))))
+    pins = PointRef("ground", "Q"), PointRef("rocker", "Q")
+    mechanism = pf.Mechanism(
+        name="kite", ground={"O": (0.0, 0.0), "Q": (1.0, 0.0)}, bodies=(crank, rocker),
+        joints=(
+            RevoluteJoint("O", PointRef("ground", "O"), PointRef("crank", "O")),
+            RevoluteJoint("Q", *(reversed(pins) if swapped else pins)),
+            pf.DistanceJoint("rod", PointRef("crank", "A"), PointRef("rocker", "B"), 1.0),
+        ),
+        assemblies=(Assembly("flat", {"crank": 0.0, "rocker": 0.0}),), gravity=(0.0, 0.0),
+        prescribed=(PrescribedAngle("drive", "O", ConstantSpeed(0.0, 5.0)),),
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"two branches meet: rocker at -9\.28571 or 5 rad/s"):
+        pf.simulate_motion(mechanism, 0.1, start=Start(angular={"rocker": 1.0}))
+    for given, exact in ((-9.28571, -65.0 / 7.0), (5.0, 5.0)):
+        run = pf.simulate_motion(mechanism, 0.02, samples=3, start=Start(angular={"rocker": given}), warning=False)
+        assert run.solution.v[0, run.system.body("rocker").angle] == pytest.approx(exact, abs=1e-8)

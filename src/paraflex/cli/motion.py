@@ -89,8 +89,10 @@ def _run_held(
     # What did not get to its end has nothing to be compared with.
     if kept is not None and full.solution.status in DONE_STATUSES:
         few = asked_reduction(request, full, kept)
-        start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
-        run = _simulate(console, model, few, options, controllers, start=start)
+        start = None
+        if not request.balanced:
+            start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
+        run = _simulate(console, model, few, options, controllers, balanced=request.balanced, start=start)
     asked = {
         "duration": study.duration,
         "samples": study.samples,

@@ -139,7 +139,12 @@ def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
     """
     if dt is None or (dt is not True and not dt > 0.0):
         raise InputError("is a continuous model", field=field, value=given,
-                         remedy=f"discretise it, say {name}.sample(1e-3)")  # fmt: skip
+                         remedy=f"discretise it, say {name}.{_sampling(given)}(1e-3)")  # fmt: skip
+
+
+def _sampling(given: Any) -> str:
+    """What discretises a continuous model: of python-control `sample`, of SciPy `to_discrete`."""
+    return "to_discrete" if hasattr(given, "to_discrete") else "sample"
 
 
 def matrices_of(model: Any) -> StateSpace:

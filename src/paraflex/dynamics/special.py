@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 
 from paraflex.arrays import Array
 from paraflex.dynamics.following import drives_at
-from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.projection import NAMED, second_rates
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence
 from paraflex.dynamics.system import System
@@ -23,8 +22,19 @@ _BESIDE = "start prescribed motions beside this pose and within the mechanism's 
 _TWO_BRANCHES = "give one of these rates in [start.velocity.angular], or start beside this pose"
 
 
-def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, wanted: Array) -> tuple[str, str]:
-    """Description of a pose at which the branches of a motion meet, and the remedy; both empty for any other pose.
+class Special(NamedTuple):
+    """A pose at which the branches of a motion meet: what it is, the remedy, and the velocities (n,) of the branches.
+
+    All are empty for any other pose, and velocities where there are none.
+    """
+
+    cause: str = ""
+    remedy: str = ""
+    velocities: tuple[Array, ...] = ()
+
+
+def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, wanted: Array) -> Special:
+    """Whether the branches of a motion meet at a pose.
 
     Velocities v0 + x n, n the null vector of the rows, have accelerations if w Phi''(v0 + x n) = 0, a quadratic
     equation in x; w is the combination of the rows of Phi_q that vanishes.
@@ -38,11 +48,11 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
     """
     found = dependence(system, q) if 0 < system.m <= DENSE_ROWS else None
     if found is None or not found.dropped.size:
-        return "", ""
+        return Special()
     scaled = (rows.toarray() if scipy.sparse.issparse(rows) else rows) * system.units
     null = scipy.linalg.null_space(scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-300), 1e-9)
     if null.shape[1] != 1:
-        return "", ""
+        return Special()
     v, along = system.units * np.linalg.lstsq(scaled, wanted, rcond=1e-9)[0], system.units * null[:, 0]
 
     def missing(x: float, v: Array = v) -> Array:
@@ -51,24 +61,32 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
     curvature = 0.5 * (missing(1.0, 0.0 * v) + missing(-1.0, 0.0 * v)) - missing(0.0, 0.0 * v)
     k = int(np.argmax(np.abs(curvature)))
     if abs(curvature[k]) <= _ROUNDING * system.row_units[found.dropped[k]]:
-        return "", ""
+        return Special()
     drives = barred_drives(system, q, found)
     barred = found.conflict(-wanted[: system.m])[k]
     if abs(barred) > _ROUNDING * np.max(np.abs(wanted)):
-        return f"a dead centre, the limit of reach, with {drives}, where prescribed motions are not at rest,", _BESIDE
+        return Special(
+            f"a dead centre, the limit of reach, with {drives}, where prescribed motions are not at rest", _BESIDE
+        )
     roots = np.roots([curvature[k], 0.5 * (missing(1.0) - missing(-1.0))[k], missing(0.0)[k]])
     if np.iscomplexobj(roots):
-        return f"a dead centre, the limit of reach, with {drives}, beyond which prescribed motions lead,", _BESIDE
+        return Special(
+            f"a dead centre, the limit of reach, with {drives}, beyond which prescribed motions lead", _BESIDE
+        )
     if abs(roots[0] - roots[1]) <= _ROUNDING:
-        return "", ""
-    rates = []
-    for joint in system.mechanism.joints:
-        row = joint_coordinate(system, joint.name, q[None]).rows[0]
-        if abs(row @ along) > _ROUNDING:
-            unit = "m/s" if joint.slides else "rad/s"
-            rates.append(f"{joint.name} at " + " or ".join(f"{row @ (v + x * along):.6g}" for x in roots) + f" {unit}")
+        return Special()
     what = f"a dead centre, with {drives}" if drives else "a change point"
-    return f"{what}, at which two branches meet: joints move, {', '.join(rates[:NAMED])},", _TWO_BRANCHES
+    velocities = tuple(v + x * along for x in roots)
+    largest = max(float(np.max(np.abs(each[[body.angle for body in system.bodies]]))) for each in velocities)
+    rates = []
+    for body in system.bodies:
+        if abs(along[body.angle]) * abs(roots[0] - roots[1]) > _ROUNDING * largest:
+            each = (
+                f"{0.0 if abs(one[body.angle]) < _ROUNDING * largest else one[body.angle]:.6g}" for one in velocities
+            )
+            rates.append(f"{body.name} at {' or '.join(each)} rad/s")
+    turns = f": {', '.join(rates[:NAMED])}" if rates else ""
+    return Special(f"{what}, at which two branches meet{turns}", _TWO_BRANCHES if rates else _BESIDE, velocities)
 
 
 def barred_drives(system: System, q: Array, found: Dependence) -> str:

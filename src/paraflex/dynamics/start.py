@@ -47,6 +47,8 @@ from paraflex.mechanism import (
 # of them.
 _GAP = 1e-6
 _SLIP = 1e-6
+# A velocity within this part of the largest from a branch's is that one: messages have six digits.
+_PRINTED = 1e-5
 # Terms of a row that are a smaller part of the largest of all rows are rounding of the projection.
 _SMALL_TERMS = 1e-4
 # Given deflections of one beam may contradict each other by this fraction of them.
@@ -256,20 +258,22 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     if np.any(bad):
         _refuse_velocities(system, given, slip, bad)
     fields = [entry.field for entry in given]
-    cause, remedy = special_start(system, signals, time, q, C, wanted)
-    if cause:
-        raise InputError(cause.rstrip(","), field=fields[0] if fields else "start", remedy=remedy)
+    found = special_start(system, signals, time, q, C, wanted)
+    if found.cause:
+        raise InputError(found.cause, field=fields[0] if fields else "start", remedy=found.remedy)
     try:
         check_accelerations(system, signals, time, q, v)
     except InconsistentConstraintsError as error:
         # Without the velocity that contradicts the branches they are known.
         for k, one in enumerate(fields):
             others = np.arange(len(wanted)) != system.m + k
-            cause, remedy = special_start(system, signals, time, q, C[others], wanted[others])
-            if cause:
-                raise InputError(
-                    f"on neither branch of {cause.rstrip(',')}", field=one, value=given[k].value, remedy=remedy
-                ) from None
+            found = special_start(system, signals, time, q, C[others], wanted[others])
+            for branch in found.velocities:
+                if np.all(np.abs(C @ branch - wanted) < _PRINTED * units * np.max(np.abs(wanted))):
+                    return branch
+            if found.cause:
+                problem = f"on neither branch of {found.cause}"
+                raise InputError(problem, field=one, value=given[k].value, remedy=found.remedy) from None
         raise InputError(error.cause.rstrip(","), field="start", remedy=error.remedy) from None
     return v
 

@@ -322,8 +322,10 @@ def consistent_state(
         check_accelerations(system, signals, time, q, v)
     except InconsistentConstraintsError as error:
         wanted = -system.constraints(signals, time, q)[1]
-        cause, remedy = special_start(system, signals, time, q, system.jacobian(q), wanted)
-        raise InconsistentConstraintsError(cause, error.moment, remedy=remedy) if cause else error from None
+        found = special_start(system, signals, time, q, system.jacobian(q), wanted)
+        if not found.cause:
+            raise
+        raise InconsistentConstraintsError(f"{found.cause},", error.moment, remedy=found.remedy) from None
     return State(time, q, v)
 
 
