@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+import paraflex as pf
 import paraflex.dynamics.equilibrium as equilibria
 from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.inspect import describe
@@ -326,3 +327,22 @@ def test_a_moving_balanced_start_takes_a_load_table_that_begins_with_the_run(int
     assert found.v == pytest.approx(same.v, rel=1e-6, abs=1e-9)
     unloaded = start_of(turning_crank(4.0))[2]
     assert np.max(np.abs(found.q - unloaded.q)) > 1e-4
+
+
+def test_a_reduced_run_from_equilibrium_begins_from_its_own(tmp_path):
+    """A level arm under its weight, held by a drive that stands still: nothing moves."""
+    material, section = pf.Material(70e9, 2700.0), pf.Section.rectangle(0.02, 0.004)
+    arm = pf.FlexibleBeam("arm", 0.5, section, material, {"A": 0.0, "B": 0.5}, elements=3)
+    held = pf.Mechanism(
+        name="held", ground={"O": (0.0, 0.0)}, bodies=(arm,), gravity=(0.0, -9.81),
+        joints=(pf.RevoluteJoint("hub", PointRef("ground", "O"), PointRef("arm", "A")),),
+        prescribed=(pf.PrescribedAngle("drive", "hub", pf.ConstantSpeed(0.0, 0.0)),),
+        assemblies=(pf.Assembly("level", {"arm": 0.0}),),
+    )  # fmt: skip
+    held.save(tmp_path / "held.toml")
+    more = ("--duration", "0.05", "--samples", "26", "--no-report", "--out", str(tmp_path / "out"))
+    done = paraflex("run", str(tmp_path / "held.toml"), "--balanced", "--reduced", "1", *more)
+    assert done.returncode == 0, done.stderr
+    with pf.open_results(tmp_path / "out") as data:
+        torque = data["drive_torque"].values.ravel()
+    assert torque == pytest.approx(np.full(26, 2700.0 * 0.02 * 0.004 * 0.5 * 9.81 * 0.25), rel=1e-4)

@@ -133,7 +133,7 @@ def doubtful_results(
         *_overstressed(where, system, solution),
         *_unbalanced(where, system, solution),
         # No default resolves vibrations of undamped beams along their axes: tables have the errors beside the numbers.
-        *(() if _undamped(system) else unresolved_loads(system, solution, where.place)),
+        *(_begun_singular if _undamped(system) else unresolved_loads)(system, solution, where.place),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
         *shared_loads(system, solution),
@@ -251,8 +251,16 @@ def _undamped(system: System) -> bool:
     return any(body.damping.size > 0 and not body.damping.any() for body in system.bodies)
 
 
+def _begun_singular(_: System, solution: Solution, place: str) -> Iterator[Finding]:
+    """Runs from where branches meet: there accelerations do not follow from forces, and what they are off by decays."""
+    if solution.t.size and solution.t[0] in solution.singular_positions:
+        text = "the run begins at a singular position: forces near it may be off by several times their size"
+        yield Finding("forces-unresolved", place, text, "start beside this pose")
+
+
 def unresolved_loads(system: System, solution: Solution, place: str = "") -> Iterator[Finding]:
     """Findings about forces that errors of integration leave uncertain, as of vibrations faster than the steps."""
+    yield from _begun_singular(system, solution, place)
     if solution.multiplier_errors is None:
         return
     error = _loads(system, solution.multiplier_errors)
