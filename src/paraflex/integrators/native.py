@@ -15,6 +15,7 @@ from paraflex.integrators.method import NativeMethod, Treatment
 from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.integrators.options import Control, IntegrationOptions, TolerancePer
 from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, Figures, Instant, Problem, Run, empty_samples
+from paraflex.integrators.singular_start import Beside, begin_on_branch, beside_singular
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Workspace
@@ -94,6 +95,7 @@ class NativeRun:
     # For first stages after a jump, so that the factor in the workspace stays.
     aside: Workspace
     law: SampledLaw
+    beside: Beside | None
 
     @property
     def dependent_rows(self) -> int:
@@ -123,6 +125,9 @@ class NativeRun:
         """See `Run`."""
         arguments = (self.problem.system.packed, self.problem.signals, self.controls)
         start(*arguments, self.state, self.workspace, self.samples)
+        if self.beside is not None:
+            begin_on_branch(self.problem, self.beside, self.state, self.slow)
+            self.samples.a[: self.reached] = self.state.stage_a[1, 0]
 
     def march(self, attempts: int) -> int:
         """See `Run`."""
@@ -222,7 +227,7 @@ def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
     packed = system.packed
     count = int(factor_system(packed, 0.0, q, workspace))
     dependent = workspace.schur[packed.rows["start"] + np.arange(system.m) - packed.rows["first"]] == 0.0
-    workspace.redundant[dependent] = DEPENDENT_PART
+    workspace.redundant[:] = np.where(dependent, DEPENDENT_PART, 0.0)
     return count
 
 
@@ -256,10 +261,16 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     treatment = POSITION if isinstance(method, NewmarkMethod) else _TREATMENTS[options.treatment]
     state = make_march(system.n, system.m, scheme.c.size, inputs_of(system.mechanism).acting, treatment)
     state.q[:], state.v[:] = initial.q, initial.v
-    state.clock[TIME], state.clock[STEP] = initial.time, min(FIRST_STEP * span, options.max_step)
+    workspace = system.workspace()
+    dependent = _mark_redundant(system, initial.q, workspace)
+    beside = beside_singular(problem) if dependent else None
+    if beside is not None:
+        dependent = _mark_redundant(system, beside.q, workspace)
+    # In shorter ones than the second rows near dependence are next to nothing.
+    first = FIRST_STEP * span if beside is None else 0.1 * beside.later
+    state.clock[TIME], state.clock[STEP] = initial.time, min(first, options.max_step)
     state.clock[CYCLE] = span
     tolerance, phase = options.tolerance_for(system), _PHASES[min(method.order, 4)]
-    workspace = system.workspace()
     controls = Controls(
         tolerance=tolerance,
         span=span,
@@ -281,7 +292,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         limit_h=phase * problem.limits.steps,
         turn_in_step=phase,
         dependent_part=ROUNDING_PART,
-        dependent_rows=_mark_redundant(system, initial.q, workspace),
+        dependent_rows=dependent,
     )
     return NativeRun(
         problem=problem,
@@ -293,4 +304,5 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         samples=empty_samples(problem.times, system, problem.asked),
         aside=system.workspace(),
         law=no_law(),
+        beside=beside,
     )

@@ -16,7 +16,8 @@ from paraflex.dynamics.joint_loads import drive_torques, load_errors, undetermin
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import RESOLVED, Finding
-from paraflex.integrators import Solution
+from paraflex.integrators import METHODS, Solution
+from paraflex.integrators.method import Family
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_poses, grouped
 from paraflex.units import STRESS, speed_text
@@ -252,10 +253,14 @@ def _undamped(system: System) -> bool:
 
 
 def _begun_singular(_: System, solution: Solution, place: str) -> Iterator[Finding]:
-    """Runs from where branches meet: there accelerations do not follow from forces, and what they are off by decays."""
-    if solution.t.size and solution.t[0] in solution.singular_positions:
-        text = "the run begins at a singular position: forces near it may be off by several times their size"
-        yield Finding("forces-unresolved", place, text, "start beside this pose")
+    """Runs of other programs' solvers from where branches meet: accelerations there do not follow from forces."""
+    if not (solution.t.size and solution.t[0] in solution.singular_positions):
+        return
+    if METHODS[solution.method].family in (Family.SCIPY, Family.SUNDIALS):
+        text = f"{solution.method} begins at a singular position: forces near it may be off by several times their size"
+        yield Finding(
+            "forces-unresolved", place, text, "choose one of paraflex's own methods, or start beside this pose"
+        )
 
 
 def unresolved_loads(system: System, solution: Solution, place: str = "") -> Iterator[Finding]:

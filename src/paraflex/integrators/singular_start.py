@@ -1,0 +1,80 @@
+"""Runs that begin at a singular position, from where branches meet, on the branch of their velocities.
+
+There rows of constraints depend on others, though not beside it, and forces leave accelerations along the direction
+that opens undetermined: the branch has them. With w Phi_q = 0 and Phi = 0 along q + v t + a t^2 / 2 + j t^3 / 6, the
+terms of third order, w (Phi''' + 3 Phi'' a) with Phi'' and Phi''' along v, are zero, whatever the jerk j.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from paraflex.arrays import Array
+from paraflex.dynamics import dependence
+from paraflex.dynamics.projection import assemble, closed, constraint_change
+from paraflex.dynamics.rank import DENSE_ROWS
+from paraflex.dynamics.signals import moment_signals
+from paraflex.dynamics.sparse import sparse_mass
+from paraflex.integrators.run import Problem
+from paraflex.kernel.linear import factor_system
+from paraflex.kernel.packed import Workspace
+from paraflex.kernel.run_state import PREPARED, ROOT, ROOT_RATE, ROOT_STEP, WIDEST, March
+
+# The motion is looked at this far beside the start [rad, sizes of the mechanism].
+_BESIDE = 1e-2
+
+
+class Beside(NamedTuple):
+    """A pose beside a singular start: coordinates (n,), and how much later they are [s]."""
+
+    q: Array
+    later: float
+
+
+def beside_singular(problem: Problem) -> Beside | None:
+    """A pose on the branch with fewer dependent rows than the start; None where the start is as any other pose."""
+    system, start = problem.system, problem.initial
+    pace = float(np.max(np.abs(start.v / system.units), initial=0.0))
+    if not 0 < system.m <= DENSE_ROWS or pace == 0.0 or not (dropped := dependence(system, start.q).dropped.size):
+        return None
+    later = _BESIDE / pace
+    t, change_at = start.time + later, partial(constraint_change, system)
+    q, phi = assemble(system, moment_signals(system.mechanism, t), t, start.q + later * start.v, change_at)
+    if closed(system, q, phi) and dependence(system, q).dropped.size < dropped:
+        return Beside(q, later)
+    return None
+
+
+def begin_on_branch(problem: Problem, beside: Beside, march: March, aside: Workspace) -> None:
+    """Give a run that has made its first stage the accelerations of its branch, near a singular position as it is."""
+    a = march.stage_a[1, 0]
+    a += _missing(problem, beside.later, a)
+    march.algorithmic[0] = a
+    factor_system(problem.system.packed, 0.0, beside.q, aside)
+    march.clock[ROOT], march.clock[ROOT_RATE] = 0.0, sqrt(max(aside.least[0], 0.0)) / beside.later
+    march.clock[WIDEST] = 1.0
+    march.counts[ROOT_STEP], march.counts[PREPARED] = 0, 1
+
+
+def _missing(problem: Problem, later: float, a: Array) -> Array:
+    """What accelerations (n,) that forces and constraints leave lack of those of the branch, by central differences."""
+    system, t, q, v = problem.system, problem.initial.time, problem.initial.q, problem.initial.v
+    J, moved = system.jacobian(q), later * v
+    W = dependence(system, q).conflict(np.eye(system.m)).reshape(-1, system.m)
+    opening = W @ (system.jacobian(q + moved) - system.jacobian(q - moved)) / (2.0 * later)
+    size, units = system.units, system.row_units[:, None]
+    mass, rows = size[:, None] * sparse_mass(system, q).toarray() * size, J * size / units
+    matrix = np.block([[mass, rows.T], [rows, np.zeros((system.m, system.m))]])
+    right = np.vstack([size[:, None] * opening.T, np.zeros((system.m, len(W)))])
+    along = size[:, None] * scipy.linalg.lstsq(matrix, right, cond=1e-10)[0][: system.n]
+    ahead, behind = (
+        system.constraints(moment_signals(system.mechanism, t + h), t + h, q + h * v + 0.5 * h * h * a)[0]
+        for h in (later, -later)
+    )
+    missing = W @ (ahead - behind) / 2.0 / (later**3 / 6.0)
+    return -along @ scipy.linalg.lstsq(3.0 * opening @ along, missing, cond=1e-10)[0]
