@@ -42,7 +42,7 @@ def beside_singular(problem: Problem) -> Beside | None:
     pace = float(np.max(np.abs(start.v / system.units), initial=0.0))
     if not 0 < system.m <= DENSE_ROWS or pace == 0.0 or not (dropped := dependence(system, start.q).dropped.size):
         return None
-    later = _BESIDE / pace
+    later = min(_BESIDE / pace, 0.25 * problem.span)
     t, change_at = start.time + later, partial(constraint_change, system)
     q, phi = assemble(system, moment_signals(system.mechanism, t), t, start.q + later * start.v, change_at)
     if closed(system, q, phi) and dependence(system, q).dropped.size < dropped:
@@ -62,7 +62,7 @@ def begin_on_branch(problem: Problem, beside: Beside, march: March, aside: Works
 
 
 def _missing(problem: Problem, later: float, a: Array) -> Array:
-    """What accelerations (n,) that forces and constraints leave lack of those of the branch, by central differences."""
+    """What accelerations (n,) that forces and constraints leave lack of those of the branch, by differences."""
     system, t, q, v = problem.system, problem.initial.time, problem.initial.q, problem.initial.v
     J, moved = system.jacobian(q), later * v
     W = dependence(system, q).conflict(np.eye(system.m)).reshape(-1, system.m)
@@ -72,9 +72,11 @@ def _missing(problem: Problem, later: float, a: Array) -> Array:
     matrix = np.block([[mass, rows.T], [rows, np.zeros((system.m, system.m))]])
     right = np.vstack([size[:, None] * opening.T, np.zeros((system.m, len(W)))])
     along = size[:, None] * scipy.linalg.lstsq(matrix, right, cond=1e-10)[0][: system.n]
-    ahead, behind = (
+    # What is given may begin with the run: from its start on, and extrapolated to it.
+    once, twice = (
         system.constraints(moment_signals(system.mechanism, t + h), t + h, q + h * v + 0.5 * h * h * a)[0]
-        for h in (later, -later)
+        / (h**3 / 6.0)
+        for h in (later, 2.0 * later)
     )
-    missing = W @ (ahead - behind) / 2.0 / (later**3 / 6.0)
+    missing = W @ (2.0 * once - twice)
     return -along @ scipy.linalg.lstsq(3.0 * opening @ along, missing, cond=1e-10)[0]
