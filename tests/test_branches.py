@@ -381,6 +381,13 @@ def test_a_start_at_a_change_point_is_on_one_of_the_branches():
     assert not [one for one in pf.check(model).findings if one.code == "assembly-open"]
 
 
+def test_a_start_from_rest_at_a_change_point_is_a_singular_position_too():
+    run = pf.simulate_motion(replace(folded(None), gravity=(0.0, -9.81)), 0.2, samples=11, warning=False)
+    assert run.solution.singular_positions == (0.0,)
+    assert np.isnan(run.solution.multipliers).any(axis=1).tolist() == [True, *[False] * 10]
+    assert not run.doubts
+
+
 @pytest.mark.parametrize("swapped", [False, True])
 def test_rates_of_a_branch_are_those_of_bodies_as_the_start_wants_them(swapped):
     """A parallelogram folded flat goes on as one, or crosses with -65/7: six digits of it choose the branch."""

@@ -360,11 +360,9 @@ def _before_singular(method: str, time: float) -> str:
 def _singular_start(run: Run, times: Array, q: Array) -> Array:
     """The start as a passage (2, 1) if more rows are dependent there than at the next sample, else none (2, 0)."""
     initial, system = run.problem.initial.time, run.problem.system
-    if isinstance(run, native.NativeRun):
-        return np.full((2, int(run.beside is not None and np.any(times[:1] == initial))), initial)
-    if run.dependent_rows and times.size > 1 and times[0] == initial and system.m <= DENSE_ROWS:
+    if run.dependent_at_start and times.size > 1 and times[0] == initial and system.m <= DENSE_ROWS:
         lasting = dependence(system, q[1]).dropped.size
-        return np.full((2, int(lasting < run.dependent_rows)), initial)
+        return np.full((2, int(lasting < run.dependent_at_start)), initial)
     return np.zeros((2, 0))
 
 

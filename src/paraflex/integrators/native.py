@@ -95,6 +95,7 @@ class NativeRun:
     # For first stages after a jump, so that the factor in the workspace stays.
     aside: Workspace
     law: SampledLaw
+    dependent_at_start: int
     beside: Beside | None
 
     @property
@@ -262,10 +263,10 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     state = make_march(system.n, system.m, scheme.c.size, inputs_of(system.mechanism).acting, treatment)
     state.q[:], state.v[:] = initial.q, initial.v
     workspace = system.workspace()
-    dependent = _mark_redundant(system, initial.q, workspace)
-    beside = beside_singular(problem) if dependent else None
+    at_start = lasting = _mark_redundant(system, initial.q, workspace)
+    beside = beside_singular(problem) if at_start else None
     if beside is not None:
-        dependent = _mark_redundant(system, beside.q, workspace)
+        lasting = _mark_redundant(system, beside.q, workspace)
     # In shorter ones than the second rows near dependence are next to nothing.
     first = FIRST_STEP * span if beside is None else 0.1 * beside.later
     state.clock[TIME], state.clock[STEP] = initial.time, min(first, options.max_step)
@@ -292,7 +293,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         limit_h=phase * problem.limits.steps,
         turn_in_step=phase,
         dependent_part=ROUNDING_PART,
-        dependent_rows=dependent,
+        dependent_rows=lasting,
     )
     return NativeRun(
         problem=problem,
@@ -304,5 +305,6 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         samples=empty_samples(problem.times, system, problem.asked),
         aside=system.workspace(),
         law=no_law(),
+        dependent_at_start=at_start,
         beside=beside,
     )

@@ -15,7 +15,7 @@ from paraflex.dynamics import System
 from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators.events import Event
-from paraflex.integrators.method import Family
+from paraflex.integrators.method import Family, NativeMethod
 from paraflex.integrators.methods import Method, MethodField, Treatment
 from paraflex.limits import SAMPLES, SHORTEST, at_most
 
@@ -160,7 +160,7 @@ class IntegrationOptions(CheckedFields):
     @property
     def controls_errors(self) -> bool:
         """Whether paraflex chooses the steps by their errors: own methods, steps not fixed."""
-        return self.method.family in (Family.ESDIRK, Family.NEWMARK) and self.step is None
+        return isinstance(self.method, NativeMethod) and self.step is None
 
     @property
     def estimates_forces(self) -> bool:

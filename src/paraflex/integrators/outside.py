@@ -37,7 +37,11 @@ class OutsideRun:
         self.samples: Samples = empty_samples(problem.times, problem.system)
         self._stepper, self._options, self._scratch = stepper, options, make_scratch(problem.system.packed)
         packed, initial = problem.system.packed, problem.initial
-        self.dependent_rows: int = int(factor_system(packed, 0.0, initial.q, problem.system.workspace()))
+        self.dependent_rows: int
+        self.dependent_at_start: int
+        self.dependent_rows = self.dependent_at_start = int(
+            factor_system(packed, 0.0, initial.q, problem.system.workspace())
+        )
         self.reached: int = 0
         self._steps, self._balance, self._violation, self._energy = 0, 0.0, np.zeros(2), np.zeros(3)
         self._passages: list[tuple[float, float]] = []

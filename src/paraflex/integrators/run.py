@@ -108,7 +108,12 @@ class Run(Protocol):
 
     @property
     def dependent_rows(self) -> int:
-        """Number of redundant constraint rows at the start."""
+        """Number of redundant constraint rows, beside the start where that is a singular position."""
+        ...
+
+    @property
+    def dependent_at_start(self) -> int:
+        """Number of dependent constraint rows at the start."""
         ...
 
     def start(self) -> None:

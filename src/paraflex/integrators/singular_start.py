@@ -1,8 +1,8 @@
 """Runs that begin at a singular position, from where branches meet, on the branch of their velocities.
 
 There rows of constraints depend on others, though not beside it, and forces leave accelerations along the direction
-that opens undetermined: the branch has them. With w Phi_q = 0 and Phi = 0 along q + v t + a t^2 / 2 + j t^3 / 6, the
-terms of third order, w (Phi''' + 3 Phi'' a) with Phi'' and Phi''' along v, are zero, whatever the jerk j.
+that opens undetermined: the branch determines them. With w Phi_q = 0 and Phi = 0 along q + v t + a t^2 / 2 +
+j t^3 / 6, the terms of third order, w (Phi''' + 3 Phi'' a) with Phi'' and Phi''' along v, are zero for any jerk j.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ import scipy
 
 from paraflex.arrays import Array
 from paraflex.dynamics import dependence
-from paraflex.dynamics.projection import assemble, closed, constraint_change
+from paraflex.dynamics.projection import assemble, closed, constraint_change, link_metric, project
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import sparse_mass
 from paraflex.integrators.run import Problem
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.packed import Workspace
@@ -30,14 +29,14 @@ _BESIDE = 1e-2
 
 
 class Beside(NamedTuple):
-    """A pose beside a singular start: coordinates (n,), and how much later they are [s]."""
+    """Pose beside a singular start: coordinates (n,), and the time from the start to it [s]."""
 
     q: Array
     later: float
 
 
 def beside_singular(problem: Problem) -> Beside | None:
-    """A pose on the branch with fewer dependent rows than the start; None where the start is as any other pose."""
+    """Find a pose on the branch with fewer dependent rows than the start; None if the start is no singular position."""
     system, start = problem.system, problem.initial
     pace = float(np.max(np.abs(start.v / system.units), initial=0.0))
     if not 0 < system.m <= DENSE_ROWS or pace == 0.0 or not (dropped := dependence(system, start.q).dropped.size):
@@ -51,7 +50,7 @@ def beside_singular(problem: Problem) -> Beside | None:
 
 
 def begin_on_branch(problem: Problem, beside: Beside, march: March, aside: Workspace) -> None:
-    """Give a run that has made its first stage the accelerations of its branch, near a singular position as it is."""
+    """Set the accelerations of the branch after the first stage of a run, and that it is near a singular position."""
     a = march.stage_a[1, 0]
     a += _missing(problem, beside.later, a)
     march.algorithmic[0] = a
@@ -62,16 +61,14 @@ def begin_on_branch(problem: Problem, beside: Beside, march: March, aside: Works
 
 
 def _missing(problem: Problem, later: float, a: Array) -> Array:
-    """What accelerations (n,) that forces and constraints leave lack of those of the branch, by differences."""
+    """Difference (n,) of the accelerations of the branch from those that forces give, by differences in time."""
     system, t, q, v = problem.system, problem.initial.time, problem.initial.q, problem.initial.v
     J, moved = system.jacobian(q), later * v
     W = dependence(system, q).conflict(np.eye(system.m)).reshape(-1, system.m)
     opening = W @ (system.jacobian(q + moved) - system.jacobian(q - moved)) / (2.0 * later)
-    size, units = system.units, system.row_units[:, None]
-    mass, rows = size[:, None] * sparse_mass(system, q).toarray() * size, J * size / units
-    matrix = np.block([[mass, rows.T], [rows, np.zeros((system.m, system.m))]])
-    right = np.vstack([size[:, None] * opening.T, np.zeros((system.m, len(W)))])
-    along = size[:, None] * scipy.linalg.lstsq(matrix, right, cond=1e-10)[0][: system.n]
+    change, left = constraint_change(system, q), partial(np.matmul, J)
+    pushed = scipy.sparse.linalg.splu(link_metric(system, q, 0.0).tocsc()).solve(opening.T)
+    along = np.column_stack([project(change, each, left) for each in pushed.T])
     # What is given may begin with the run: from its start on, and extrapolated to it.
     once, twice = (
         system.constraints(moment_signals(system.mechanism, t + h), t + h, q + h * v + 0.5 * h * h * a)[0]

@@ -17,7 +17,7 @@ from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import RESOLVED, Finding
 from paraflex.integrators import METHODS, Solution
-from paraflex.integrators.method import Family
+from paraflex.integrators.method import NativeMethod
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_poses, grouped
 from paraflex.units import STRESS, speed_text
@@ -134,7 +134,11 @@ def doubtful_results(
         *_overstressed(where, system, solution),
         *_unbalanced(where, system, solution),
         # No default resolves vibrations of undamped beams along their axes: tables have the errors beside the numbers.
-        *(_begun_singular if _undamped(system) else unresolved_loads)(system, solution, where.place),
+        *(
+            _begun_singular(solution, where.place)
+            if _undamped(system)
+            else unresolved_loads(system, solution, where.place)
+        ),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
         *shared_loads(system, solution),
@@ -252,11 +256,11 @@ def _undamped(system: System) -> bool:
     return any(body.damping.size > 0 and not body.damping.any() for body in system.bodies)
 
 
-def _begun_singular(_: System, solution: Solution, place: str) -> Iterator[Finding]:
-    """Runs of other programs' solvers from where branches meet: accelerations there do not follow from forces."""
+def _begun_singular(solution: Solution, place: str) -> Iterator[Finding]:
+    """Findings about runs of other programs' solvers that begin at a singular position."""
     if not (solution.t.size and solution.t[0] in solution.singular_positions):
         return
-    if METHODS[solution.method].family in (Family.SCIPY, Family.SUNDIALS):
+    if not isinstance(METHODS[solution.method], NativeMethod):
         text = f"{solution.method} begins at a singular position: forces near it may be off by several times their size"
         yield Finding(
             "forces-unresolved", place, text, "choose one of paraflex's own methods, or start beside this pose"
@@ -265,7 +269,7 @@ def _begun_singular(_: System, solution: Solution, place: str) -> Iterator[Findi
 
 def unresolved_loads(system: System, solution: Solution, place: str = "") -> Iterator[Finding]:
     """Findings about forces that errors of integration leave uncertain, as of vibrations faster than the steps."""
-    yield from _begun_singular(system, solution, place)
+    yield from _begun_singular(solution, place)
     if solution.multiplier_errors is None:
         return
     error = _loads(system, solution.multiplier_errors)
