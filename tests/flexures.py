@@ -31,6 +31,16 @@ def chain(name: str, beams: int, elements: int = 1) -> tuple[list[pf.FlexibleBea
     return parts, welds
 
 
+def cantilever(beams: int) -> pf.Mechanism:
+    """A leaf of so many beams along x, its root leaf1.A clamped to ground."""
+    parts, welds = chain("leaf", beams)
+    root = pf.WeldJoint("root", pf.PointRef("ground", "O"), pf.PointRef("leaf1", "A"))
+    return pf.Mechanism(
+        name="cantilever", ground={"O": (0.0, 0.0)}, bodies=tuple(parts), joints=(root, *welds),
+        assemblies=(pf.Assembly("flat", {beam.name: 0.0 for beam in parts}),), gravity=(0.0, 0.0),
+    )  # fmt: skip
+
+
 def column(lower: str, upper: str, elements: int = 4) -> pf.Mechanism:
     """A leaf upright between "clamped", "pinned", "guided" or "free" ends; a heavy load comes to its top B."""
     beam = leaf("column", elements=elements)

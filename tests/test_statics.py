@@ -18,6 +18,7 @@ from flexures import (
     THICKNESS,
     WIDTH,
     E,
+    cantilever,
     chain,
     column,
     cranks,
@@ -62,14 +63,8 @@ def test_a_column_pushed_across_its_load_bends_as_the_elastica(tip: float, steps
     modulus = math.sin(math.radians(tip / 2.0)) ** 2
     K, whole = ellipk(modulus), ellipe(modulus)
     load = K**2 * EI / LENGTH**2
-    beams, welds = chain("leaf", 16)
-    root = pf.WeldJoint("root", pf.PointRef("ground", "O"), pf.PointRef("leaf1", "A"))
-    bar = pf.Mechanism(
-        name="column", ground={"O": (0.0, 0.0)}, bodies=tuple(beams), joints=(root, *welds),
-        assemblies=(pf.Assembly("flat", {beam.name: 0.0 for beam in beams}),), gravity=(0.0, 0.0),
-    )  # fmt: skip
     loads = {"leaf16.B.x": -load, "leaf16.B.y": 1e-4 * load}
-    found = pf.statics(bar, loads=loads, steps=steps, warning=False)
+    found = pf.statics(cantilever(16), loads=loads, steps=steps, warning=False)
     assert found.stable.all()
     place = [found.place(name)[-1] / LENGTH for name in ("leaf16.B.x", "leaf16.B.y")]
     assert place == pytest.approx([2.0 * whole / K - 1.0, 2.0 * math.sqrt(modulus) / K], abs=1e-3)
@@ -109,13 +104,8 @@ def test_a_guide_pushed_sideways_buckles_in_a_leaf_whatever_the_frames() -> None
 
 @pytest.mark.parametrize("frames", [1, 4, 16])
 def test_a_cantilever_under_a_load_across_does_not_buckle(frames: int) -> None:
-    beams, welds = chain("bar", frames)
-    root = pf.WeldJoint("root", pf.PointRef("ground", "O"), pf.PointRef("bar1", "A"))
-    bar = pf.Mechanism(
-        name="cantilever", ground={"O": (0.0, 0.0)}, bodies=tuple(beams), joints=(root, *welds),
-        assemblies=(pf.Assembly("flat", {beam.name: 0.0 for beam in beams}),), gravity=(0.0, 0.0),
-    )  # fmt: skip
-    found = pf.statics(bar, loads={f"bar{frames}.B.y": 2.0 * EI / LENGTH**2}, steps=4, warning=False)
+    loads = {f"leaf{frames}.B.y": 2.0 * EI / LENGTH**2}
+    found = pf.statics(cantilever(frames), loads=loads, steps=4, warning=False)
     assert np.isnan(found.buckling).all()
     assert "full turn" in found.equilibria[0].buckling.reason
 
@@ -147,13 +137,7 @@ def test_factors_and_frequencies_do_not_depend_on_the_size(scale: float) -> None
 
 def test_many_frames_and_several_factors_of_a_column() -> None:
     """More coordinates than have all their vibrations computed."""
-    beams, welds = chain("column", 100)
-    root = pf.WeldJoint("root", pf.PointRef("ground", "O"), pf.PointRef("column1", "A"))
-    column = pf.Mechanism(
-        name="column", ground={"O": (0.0, 0.0)}, bodies=tuple(beams), joints=(root, *welds),
-        assemblies=(pf.Assembly("flat", {beam.name: 0.0 for beam in beams}),), gravity=(0.0, 0.0),
-    )  # fmt: skip
-    found = pf.statics(column, loads={"column100.B.x": -0.1}, steps=1, buckling=2)
+    found = pf.statics(cantilever(100), loads={"leaf100.B.x": -0.1}, steps=1, buckling=2)
     assert not found.equilibria[0].vibrations.complete
     euler = 0.25 * math.pi**2 * EI / LENGTH**2 / 0.1
     assert found.buckling == pytest.approx(np.array([[euler, 9.0 * euler]] * 2), rel=1e-3)

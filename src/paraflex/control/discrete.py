@@ -143,7 +143,7 @@ def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
 
 
 def _sampling(given: Any) -> str:
-    """What discretises a continuous model: of python-control `sample`, of SciPy `to_discrete`."""
+    """Name of the method that discretises a continuous model: `sample` in python-control, `to_discrete` in SciPy."""
     return "to_discrete" if hasattr(given, "to_discrete") else "sample"
 
 

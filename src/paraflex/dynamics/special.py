@@ -25,7 +25,7 @@ _TWO_BRANCHES = "give one of these rates in [start.velocity.angular], or start b
 class Special(NamedTuple):
     """A pose at which the branches of a motion meet: what it is, the remedy, and the velocities (n,) of the branches.
 
-    All are empty for any other pose, and velocities where there are none.
+    All three are empty for any other pose; velocities are empty where no branch leads on.
     """
 
     cause: str = ""
@@ -77,14 +77,14 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
         return Special()
     what = f"a dead centre, with {drives}" if drives else "a change point"
     velocities = tuple(v + x * along for x in roots)
-    largest = max(float(np.max(np.abs(each[[body.angle for body in system.bodies]]))) for each in velocities)
-    rates = []
-    for body in system.bodies:
-        if abs(along[body.angle]) * abs(roots[0] - roots[1]) > _ROUNDING * largest:
-            each = (
-                f"{0.0 if abs(one[body.angle]) < _ROUNDING * largest else one[body.angle]:.6g}" for one in velocities
-            )
-            rates.append(f"{body.name} at {' or '.join(each)} rad/s")
+    turning = np.array([[one[body.angle] for one in velocities] for body in system.bodies])
+    rounding = _ROUNDING * np.max(np.abs(turning))
+    turning[np.abs(turning) < rounding] = 0.0
+    rates = [
+        f"{body.name} at {first:.6g} or {second:.6g} rad/s"
+        for body, (first, second) in zip(system.bodies, turning, strict=True)
+        if abs(first - second) > rounding
+    ]
     turns = f": {', '.join(rates[:NAMED])}" if rates else ""
     return Special(f"{what}, at which two branches meet{turns}", _TWO_BRANCHES if rates else _BESIDE, velocities)
 

@@ -47,7 +47,7 @@ from paraflex.mechanism import (
 # of them.
 _GAP = 1e-6
 _SLIP = 1e-6
-# A velocity within this part of the largest from a branch's is that one: messages have six digits.
+# Velocities given within this part of the largest are those of a branch: messages show six digits.
 _PRINTED = 1e-5
 # Terms of a row that are a smaller part of the largest of all rows are rounding of the projection.
 _SMALL_TERMS = 1e-4

@@ -137,8 +137,7 @@ class Branch:
             moved = min(_WHOLE, self._size(there.at.plus(first.at, -1.0)._replace(s=0.0)))
             if moved > move > 0.0:
                 move, branch = moved, replace(self, weight=self.weight / moved**2)
-                unit = 1.0 / branch._size(there.tangent)
-                there = there._replace(tangent=there.tangent.plus(there.tangent, unit - 1.0))
+                there = there._replace(tangent=branch._of_length_one(there.tangent))
             here = there
         raise self._ended(turned, furthest)
 
@@ -301,9 +300,11 @@ class Branch:
 
     def _tangent(self, at: Unknowns, along: Unknowns) -> Unknowns:
         """The tangent of length one at a point, in the direction of another."""
-        found = self._change(at, along, np.zeros_like(at.q), np.zeros_like(at.mu), 1.0)
-        size = self._size(found)
-        return Unknowns(found.q / size, found.mu / size, found.s / size)
+        return self._of_length_one(self._change(at, along, np.zeros_like(at.q), np.zeros_like(at.mu), 1.0))
+
+    def _of_length_one(self, change: Unknowns) -> Unknowns:
+        size = self._size(change)
+        return Unknowns(change.q / size, change.mu / size, change.s / size)
 
     def _solve(
         self,

@@ -79,7 +79,7 @@ def last_rows(data: xr.Dataset) -> Iterator[list[str]]:
 def buckling_words(data: xr.Dataset) -> str:
     """At which fraction it buckles, as seen from the start and from the last step; empty if nothing is known of it.
 
-    Of travel alone only where that is within it: a travel has no margin as a load has.
+    A factor of travel alone is given only if the travel reaches it: a travel has no margin as a load has.
     """
     factors = data["buckling_factor"].values
     loaded = bool((data["role"] == "loaded").any())
