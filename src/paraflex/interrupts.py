@@ -11,8 +11,11 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
+from typing import Any
 
 # Windows has no SIGHUP, and SIGBREAK for Ctrl-Break.
 ENDING = tuple(
@@ -36,10 +39,47 @@ def uninterrupted() -> Iterator[list[int]]:
             signal.signal(number, lambda number, _: arrived.append(number))
         yield arrived
     finally:
-        for number, answer in answered.items():
-            signal.signal(number, answer)
+        try:
+            _answer(answered)
+        except BaseException:
+            # One came when it was answered again, and others were not yet.
+            _answer(answered)
+            raise
         for number in arrived[:1]:
             signal.raise_signal(number)
+
+
+def _answer(how: dict[signal.Signals, Any]) -> None:
+    for number, answer in how.items():
+        signal.signal(number, answer)
+
+
+class Calls:
+    """Calls handed to a pool of threads or processes by a thread that signals may interrupt at any moment.
+
+    Pools and futures take their locks in Python: what is raised between leaves one taken, and a worker that ends, and
+    whoever waits for it, wait for ever. So signals are put off while a call is handed over, and the wait is for a
+    queue, whose lock is not left behind.
+    """
+
+    def __init__(self) -> None:
+        self._done: SimpleQueue[Future[Any]] = SimpleQueue()
+
+    def hand(self, submit: Callable[..., Future[Any]], *arguments: Any) -> Future[Any]:
+        """What `submit` gives of the arguments."""
+        with uninterrupted():
+            future = submit(*arguments)
+            future.add_done_callback(self._done.put)
+        return future
+
+    def done(self) -> set[Future[Any]]:
+        """Those that ended since the last call, waited for; none at times, for Ctrl-C to be heard everywhere."""
+        ended = set()
+        with suppress(Empty):
+            ended.add(self._done.get(timeout=1.0))
+            while True:
+                ended.add(self._done.get_nowait())
+        return ended
 
 
 @contextmanager

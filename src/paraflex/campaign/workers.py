@@ -14,20 +14,18 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import (
-    FIRST_COMPLETED,
     BrokenExecutor,
     CancelledError,
     Future,
     ProcessPoolExecutor,
     ThreadPoolExecutor,
-    wait,
 )
 from importlib import import_module
 from itertools import islice
 from typing import Any, TypeVar
 
 from paraflex.errors import InputError, ParaflexError, suggestion
-from paraflex.interrupts import end_with_parent, starting_processes
+from paraflex.interrupts import Calls, end_with_parent, starting_processes, uninterrupted
 
 THREADS = "threads"
 PROCESSES = "processes"
@@ -107,7 +105,9 @@ class Threads(Engine):
         """See `Engine`."""
         if abandon:
             self._stop.set()
-        super().close()
+        with uninterrupted():
+            self._pool.shutdown(wait=False, cancel_futures=True)
+        self._pool.shutdown()
         sys.setswitchinterval(self._switching)
 
     def _watch(self, _: float) -> None:
@@ -255,14 +255,13 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
     task, result
         The result is a LostWorker where every worker that took the task died.
     """
-    waiting, running = iter(tasks), {}
+    waiting, running, calls = iter(tasks), {}, Calls()
     while True:
         more = islice(waiting, max(0, _AHEAD * engine.workers - len(running)))
-        running |= {_submit(engine, function, task): task for task in more}
+        running |= {calls.hand(_submit, engine, function, task): task for task in more}
         if not running:
             return
-        # Short waits, for Ctrl-C to be heard everywhere.
-        done, _ = wait(running, timeout=1.0, return_when=FIRST_COMPLETED)
+        done = calls.done()
         suspects = []
         # In the order they were given out, which a set has not.
         for future in [each for each in running if each in done]:
@@ -287,11 +286,15 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
 
 def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> Iterator[tuple[T, R | LostWorker]]:
     """Results of tasks of which one killed a worker: each alone, so that only that one is given up."""
+    calls = Calls()
     for task in tasks:
         result: R | LostWorker = LostWorker(f"{_DEATHS + 1} workers died of it: out of memory, or killed")
         for _ in range(_DEATHS):
+            future = calls.hand(_submit, engine, function, task)
+            while future not in calls.done():
+                pass
             try:
-                result = _submit(engine, function, task).result()
+                result = future.result()
                 break
             except (BrokenExecutor, CancelledError):
                 engine.restart()

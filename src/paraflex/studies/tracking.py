@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, Protocol
@@ -20,6 +20,7 @@ from paraflex.errors import ControllerError, InputError, IntegrationError, Numer
 from paraflex.findings import Finding
 from paraflex.folders import RUN
 from paraflex.integrators import IntegrationOptions
+from paraflex.interrupts import Calls
 from paraflex.mechanism import ActuationMode
 from paraflex.reduction import size_of
 from paraflex.results import summary, tracking_dataset
@@ -149,12 +150,16 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
         with ThreadPoolExecutor(workers.number or os.cpu_count()) as pool:
             futures: dict[str, Future[TrackingRun | str | None]] = {}
             whole: dict[str, Future[TrackingRun | str | None]] = {}
+            calls = Calls()
             try:
                 for mode in chosen:
-                    futures[mode.name] = pool.submit(self._mode, self.task, mode, stop, on_progress)
+                    futures[mode.name] = calls.hand(pool.submit, self._mode, self.task, mode, stop, on_progress)
                 if self.full is not None:
-                    whole = {mode.name: pool.submit(self._mode, self.full, mode, stop, None) for mode in chosen}
-                wait([*futures.values(), *whole.values()])
+                    for mode in chosen:
+                        whole[mode.name] = calls.hand(pool.submit, self._mode, self.full, mode, stop, None)
+                left = {*futures.values(), *whole.values()}
+                while left:
+                    left -= calls.done()
             except KeyboardInterrupt:
                 # Ctrl-C reaches the main thread only; runs stop at their next progress report and keep their samples.
                 stop.set()
