@@ -757,7 +757,7 @@ class StudyDefaultsTable(_Table):
         'the time in which errors may add up to it: a "cycle" of the motion or the "run"; own methods only'
     )
     control: Literal["positions", "forces"] | None = _optional(
-        'whose errors choose the steps: "positions", the default, or "forces" as well, with ESDIRK methods'
+        'whose errors choose the steps: "positions" or "forces" as well, the default of damped beams and ESDIRK methods'
     )
     step: Number | None = _optional("a fixed step in s, with methods that take one")
     after: Literal["free", "hold"] = _optional(

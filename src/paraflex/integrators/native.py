@@ -277,7 +277,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         span=span,
         by_cycle=int(options.step is None and options.per is TolerancePer.CYCLE),
         force_part=options.force_part(system),
-        force_control=int(options.control is Control.FORCES),
+        force_control=int(options.control_for(system) is Control.FORCES),
         solved_samples=int(not system.n_flexible),
         newton_fraction=options.newton_fraction or method.newton_fraction,
         alpha=options.alpha,

@@ -67,9 +67,10 @@ class IntegrationOptions(CheckedFields):
         of undamped ones grow with the number of cycles; the cost grows with the duration alone. "run": the whole run.
         By default "cycle" with the default tolerance, and "run" with one that is given.
     control : Control, optional
-        "positions", the default: their errors choose the steps. "forces": local errors within a cycle change no force
-        of a joint or drive by more than 0.25 % of its largest value either (ESDIRK methods, steps not fixed).
-        Vibrations of undamped beams and stiff springs are then resolved, down to the fastest that bears on a force.
+        "positions": their errors choose the steps. "forces": local errors within a cycle change no force of a joint or
+        drive by more than 0.25 % of its largest value either (ESDIRK methods, steps not fixed). Vibrations of undamped
+        beams and stiff springs are then resolved, down to the fastest that bears on a force. By default "forces"
+        where all flexible bodies are damped (`System.vibrations_die_out`), else "positions".
     method : Method or str
         An object such as `paraflex.methods.GeneralisedAlpha(spectral_radius=0.8)`, or a name in `paraflex.METHODS`,
         which stands for the method with its default parameters.
@@ -152,9 +153,16 @@ class IntegrationOptions(CheckedFields):
             return self.tolerance_per
         return TolerancePer.CYCLE if self.tolerance is None else TolerancePer.RUN
 
+    def control_for(self, system: System) -> Control:
+        """Whose errors choose the steps of a system: see the class."""
+        if self.control is not None:
+            return self.control
+        damped = system.n_flexible > 0 and system.vibrations_die_out
+        return Control.FORCES if damped and self.estimates_forces else Control.POSITIONS
+
     def force_part(self, system: System) -> float:
         """Error allowed in forces, as a part of the largest; zero where they are not looked at as a step is solved."""
-        looked_at = self.control is Control.FORCES or not system.n_flexible
+        looked_at = self.control_for(system) is Control.FORCES or not system.n_flexible
         return FORCE_PART if looked_at and self.estimates_forces else 0.0
 
     @property

@@ -66,7 +66,7 @@ class RunRequest:
         str | None,
         Option(
             metavar="positions|forces",
-            help="Whose errors choose the steps: of positions, the default, or of forces as well.",
+            help="Whose errors choose the steps: of positions, or of forces as well, the default of damped beams.",
         ),
     ] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
