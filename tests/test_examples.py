@@ -103,7 +103,7 @@ def test_choosing_modes(run):
     assert order[0] == "++++"
     robot = pf.load("4rrr")
     task = pf.plan(robot.mechanism.with_geometry("second-order"), robot.paths["circle"], samples=301)
-    options = pf.IntegrationOptions(method="esdirk4", tolerance=1e-6)
+    options = pf.IntegrationOptions(method="esdirk4", tolerance=1e-7)
     converged = pf.tracking_dataset([task.simulate("+++-", options=options)])
     assert errors["+++-"] == pytest.approx(float(converged["tracking_rms_motion"][0]), rel=0.01)
     assert f"{1e6 * errors['+++-']:.1f} um" in printed

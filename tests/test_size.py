@@ -5,12 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paraflex.dynamics import build_system, closure_of, mobility, static_equilibrium
+from paraflex.dynamics import State, build_system, closure_of, mobility, natural_frequencies, static_equilibrium
+from paraflex.dynamics.joint_loads import undetermined_loads
+from paraflex.dynamics.rank import dependence
 from paraflex.errors import AssemblyError
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Polygon, follow_path
-from paraflex.mechanism import Assembly, PrismaticJoint, RigidBody, Section
+from paraflex.mechanism import (
+    Assembly,
+    FlexibleBeam,
+    Material,
+    Mechanism,
+    PointRef,
+    PrismaticJoint,
+    RigidBody,
+    Section,
+    WeldJoint,
+)  # fmt: skip
 from paraflex.motion import simulate_motion
 from paraflex.tracking import plan_tracking
 
@@ -132,3 +144,22 @@ def test_a_pendulum_hangs_at_every_size(s):
     start = closure_of(system, mechanism.assemblies[0]).state
     rest = static_equilibrium(system, start)
     np.testing.assert_allclose(np.sin(rest.q[system.bodies[0].angle]), -1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("L", "thickness", "elements"), [(1e-3, 1e-5, 2), (1e-3, 1e-5, 1), (1e-4, 3.3e-7, 2), (100.0, 1.0, 2)]
+)
+def test_a_welded_beam_of_any_size(L, thickness, elements):
+    """Its lowest frequency is right, and its clamp determined: of a small one modes are large beside places."""
+    beam = FlexibleBeam("arm", L, Section.rectangle(2.0 * thickness, thickness), Material(2.1e11, 7850.0),
+                        {"O": 0.0, "tip": L}, elements)  # fmt: skip
+    mechanism = Mechanism(
+        name="arm", ground={"O": (0.0, 0.0)}, bodies=(beam,), assemblies=(Assembly("a", {"arm": 0.0}),),
+        joints=(WeldJoint("O", PointRef("ground", "O"), PointRef("arm", "O")),),
+    )  # fmt: skip
+    system = build_system(mechanism)
+    start = State(0.0, np.zeros(system.n), np.zeros(system.n))
+    lowest = natural_frequencies(system, start).frequencies[0]
+    assert lowest == pytest.approx(1.875104**2 * np.sqrt(2.1e11 / 12.0 / 7850.0) * thickness / L**2, rel=1e-3)
+    assert dependence(system, start.q).rank == 3
+    assert not undetermined_loads(system, ["O"], start.q[None]).force.any()

@@ -177,16 +177,19 @@ def _all(K: Sparse, M: Sparse, C: Sparse, elastic: Array, typical: float) -> tup
     Stiff coordinates are scaled down, and 1 / (square + shift) is sought: low frequencies keep all their digits beside
     high ones.
     """
-    basis = admissible(C, elastic, typical)
+    basis = admissible(C, M, elastic, typical)
     if basis.shape[1] == 0:
         return np.zeros(0), np.zeros((elastic.size, 0))
     squares, shapes = undamped_modes(basis.T @ (M @ basis), basis.T @ (K @ basis), typical)
     return squares, basis @ shapes
 
 
-def admissible(C: Sparse, elastic: Array, typical: float) -> Array:
-    """Displacements (n, f) that span those which rows C (m, n) allow, stiff coordinates scaled down."""
-    scale = 1.0 / np.sqrt(1.0 + elastic / typical)
+def admissible(C: Sparse, M: Sparse, elastic: Array, typical: float) -> Array:
+    """Displacements (n, f) that span those which rows C (m, n) allow, stiff coordinates scaled down.
+
+    Places and turns are scaled by the root of their mass, as elastic coordinates are, whatever the mechanism's size.
+    """
+    scale = 1.0 / np.sqrt(np.asarray(M.diagonal()) + elastic / typical)
     rows = C.toarray() * scale
     size = np.linalg.norm(rows, axis=1)
     rows = rows[size > 0.0] / size[size > 0.0, None]

@@ -83,9 +83,7 @@ def vibrations(equations: Equations, found: Matrices) -> Vibrations:
         freedoms = equations.system.n - equations.independent(C)[0].size
         low = slowest(symmetric, M, C, typical, min(LOWEST, freedoms), freedoms)
         return Vibrations(low.squares, low.shapes, False)
-    # Places and turns by the root of their mass, as elastic coordinates are, whatever the size of the mechanism.
-    sizes = scipy.sparse.diags(1.0 / np.sqrt(np.asarray(M.diagonal())))
-    basis = sizes @ admissible(csr_matrix(C @ sizes), elastic, typical)
+    basis = admissible(C, M, elastic, typical)
     if not basis.shape[1]:
         return Vibrations(np.zeros(0), np.zeros((elastic.size, 0)), True)
     squares, shapes = undamped_modes(basis.T @ (M @ basis), basis.T @ (symmetric @ basis), typical)
@@ -111,7 +109,7 @@ def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vib
         return Buckling(factors, shapes, reason)
     basis, stiffness = vibration.shapes, np.diag(squares)
     if not vibration.complete:
-        basis = admissible(found.rows, equations.elastic, squares[0])
+        basis = admissible(found.rows, found.mass, equations.elastic, squares[0])
         stiffness = basis.T @ (found.stiffness @ basis)
     slow = vibration.shapes[:, :_SLOWEST] / equations.scale[:, None]
     typical = float(np.median(squares[:_SLOWEST] / np.sum(slow**2, axis=0)))
