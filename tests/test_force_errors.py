@@ -306,3 +306,24 @@ def test_what_a_method_or_step_that_is_chosen_leaves_without_effect_goes_with_th
         study.integration({"method": "bdf", "control": "forces"})
     with pytest.raises(pf.InputError, match=r"study\.control: .*choose an ESDIRK method"):
         model(ARM + '[study]\nduration = 0.1\ncontrol = "forces"\nmethod = "newmark"\n')
+
+
+@pytest.mark.parametrize("method", ["esdirk5", "esdirk4", "tr-bdf2"])
+def test_deflections_follow_a_slow_load(method):
+    """At samples within long steps, where velocities at the ends of steps are up to half off: F L^3 / 3 EI."""
+    L, h = 0.1, 0.01
+    section = pf.Section.rectangle(2.0 * h, h)
+    beam = pf.FlexibleBeam("arm", L, section, pf.Material(2.1e11, 7850.0), {"O": 0.0, "tip": L}, 1,
+                           damping=pf.ModalDamping((0.02,)))  # fmt: skip
+    mechanism = pf.Mechanism(
+        name="arm", ground={"O": (0.0, 0.0)}, bodies=(beam,), assemblies=(pf.Assembly("a", {"arm": 0.0}),),
+        joints=(pf.WeldJoint("O", pf.PointRef("ground", "O"), pf.PointRef("arm", "O")),),
+        loads=(pf.PointForce("p", "arm.tip", (ExpressionLaw("0"), ExpressionLaw("500*sin(2*pi*t)"))),),
+        gravity=(0.0, 0.0),
+    )  # fmt: skip
+    run = pf.simulate_motion(mechanism, 1.5, samples=301, warning=False, options=pf.IntegrationOptions(method=method))
+    data, EI = pf.motion_dataset(run), 2.1e11 * section.second_moment
+    force = 500.0 * np.sin(2.0 * np.pi * run.solution.t)
+    tip = data["point_position"].sel(point="arm.tip", axis="y").to_numpy()
+    # It starts at rest, which leaves a vibration of 0.1 %.
+    assert np.max(np.abs(tip - force * L**3 / (3.0 * EI))) < 0.003 * 500.0 * L**3 / (3.0 * EI)

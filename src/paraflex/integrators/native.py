@@ -61,6 +61,8 @@ NEAR_ERROR = 0.01
 LEAST_NEAR_ERROR = 8e-11
 # A singular position is near that could be reached in this fraction of the time since the start.
 _NEAR_AHEAD = 0.2
+# Steps are long beside vibrations from so many radians of the slowest one of each free body on.
+_FOLLOWS = 20.0
 # The smallest step, as a fraction of the run, and in units of the clock's last digit: by so little a step may differ
 # from what the clock moves by.
 _LEAST, _DIGITS = 1e-12, 64.0
@@ -247,6 +249,16 @@ def _turning(system: System) -> NDArray[np.int64]:
     return np.array([body.angle for body, one in zip(system.bodies, matters, strict=True) if one], dtype=np.int64)
 
 
+def _solved_from(system: System) -> float:
+    """Steps from which on samples are solved: all of rigid mechanisms, of flexible ones those long beside vibrations.
+
+    Accelerations of deflections that follow loads are inaccurate there, and velocities with them. Shorter steps are as
+    right between stages as at them.
+    """
+    fastest = max((float(np.min(body.modes.omega)) for body in system.bodies if body.nf), default=np.inf)
+    return _FOLLOWS / fastest
+
+
 def _least_step(problem: Problem) -> float:
     """The smallest step of a run, however large its times [s]."""
     latest = max(abs(problem.initial.time), abs(float(problem.stops[-1])))
@@ -278,7 +290,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         by_cycle=int(options.step is None and options.per is TolerancePer.CYCLE),
         force_part=options.force_part(system),
         force_control=int(options.control_for(system) is Control.FORCES),
-        solved_samples=int(not system.n_flexible),
+        solved_from=_solved_from(system),
         newton_fraction=options.newton_fraction or method.newton_fraction,
         alpha=options.alpha,
         beta=options.beta,

@@ -55,7 +55,7 @@ from paraflex.kernel.run_state import (
     WORK,
 )
 from paraflex.kernel.sampled import CHANGED, FAILED, SLACK, control, next_instant
-from paraflex.kernel.samples import place_samples, solve_samples, step_work, write_energies
+from paraflex.kernel.samples import is_long, place_samples, solve_samples, step_work, write_energies
 from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
@@ -223,9 +223,9 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
         note_crossing(system, t, h, march, work)
     if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
-    first = place_samples(tableau, t, h, march, out)
+    first = place_samples(tableau, t, h, is_long(system, tableau, controls, h), march, out)
     # Near a singular position forces have poles.
-    if controls.solved_samples == 1 and march.counts[NEAR] == 0:
+    if h >= controls.solved_from and march.counts[NEAR] == 0:
         solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
     write_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)

@@ -17,7 +17,7 @@ from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import SAMPLE, WORK
-from paraflex.kernel.samples import begin_sample, place_samples, step_work, write_energies
+from paraflex.kernel.samples import begin_sample, is_long, place_samples, step_work, write_energies
 from paraflex.kernel.stage import equations, note_torques, place
 from paraflex.kernel.step import input_power, stage_start
 from paraflex.kernel.tangent import note_slopes
@@ -190,7 +190,10 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             copy(march.stage_a[1, i], history.a[k, i])
             copy(march.stage_lam[i], history.lam[k, i])
             history.power[k, i] = march.power[i]
-        first, g = place_samples(tableau, t, h, march, out), tableau.A[last, last] * h
+        first, g = (
+            place_samples(tableau, t, h, is_long(system, tableau, controls, h), march, out),
+            tableau.A[last, last] * h,
+        )
         for i in range(first, march.counts[SAMPLE]):
             if out.solved[i]:
                 begin_sample(out.q[i], out.v[i], out.a[i], g, g * g, march)

@@ -49,9 +49,18 @@ def interpolate(q0, v0, a0, q1, v1, a1, h, x):
     return q, v, a
 
 
+@inlined
+def is_long(system, tableau, controls, h):
+    """Whether a step is long beside all vibrations of flexible bodies, and has stages for a curve through them."""
+    return system.modal.shape[1] > 0 and h >= controls.solved_from and tableau.nodes.size > 2
+
+
 @routine
-def place_samples(tableau, t, h, march, out):
-    """Interpolate the state, accelerations and multipliers at every sample time in the step; the first of them."""
+def place_samples(tableau, t, h, long, march, out):
+    """Interpolate the state, accelerations and multipliers at every sample time in the step; the first of them.
+
+    In a step that is long beside vibrations deflections follow loads, and velocities at its ends say little of them.
+    """
     piece, first = 0, march.counts[SAMPLE]
     i = first
     while i < out.times.size and out.times[i] <= t + h * (1.0 + 1e-12):
@@ -66,7 +75,9 @@ def place_samples(tableau, t, h, march, out):
                 march.stage_q[s0, j], march.stage_v[s0, j], march.stage_a[1, s0, j],
                 march.stage_q[s1, j], march.stage_v[s1, j], march.stage_a[1, s1, j], width, x,
             )  # fmt: skip
-        interpolate_multipliers(tableau, (time - t) / h, march, out.lam[i])
+        interpolate_nodes(tableau, (time - t) / h, march.stage_lam, out.lam[i])
+        if long:
+            interpolate_nodes(tableau, (time - t) / h, march.stage_q, out.q[i])
         i += 1
     march.counts[SAMPLE] = i
     return first
@@ -78,7 +89,8 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
 
     Of samples that only serve to find the largest loads those are left that the last one solved lets expect to be near.
     Each is a stage of its own, with the g and b of the last one and such explicit parts that q and v are those between
-    the stages where the acceleration is.
+    the stages where the acceleration is. Deflections of flexible bodies are not between stages where forces are: all
+    samples are solved.
     """
     for i in range(first, march.counts[SAMPLE]):
         needed = out.asked[i] or march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN
@@ -111,7 +123,8 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
         solved = solve_at(system, signals, out.times[i], weights, g, b, march, aside, a, lam, march.torques)
     for r in range(lam.size):
         work.mu[r] = lam[r] - march.guess_lam[r] if solved else 0.0
-    march.clock[SAMPLE_CHANGE] = largest_part(work.mu, march.forces[PEAK]) if largest(march.forces[PEAK]) > 0.0 else 1.0
+    known = system.modal.shape[1] == 0 and largest(march.forces[PEAK]) > 0.0
+    march.clock[SAMPLE_CHANGE] = largest_part(work.mu, march.forces[PEAK]) if known else 1.0
     if not solved or march.clock[SAMPLE_CHANGE] <= NO_CHANGE:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
@@ -180,13 +193,13 @@ def step_work(tableau, h, march):
 
 
 @routine
-def interpolate_multipliers(tableau, x, march, lam):
-    """Multipliers at fraction x of the step: the polynomial through those at the nodes."""
-    fill(lam, 0.0)
+def interpolate_nodes(tableau, x, stages, out):
+    """Values at fraction x of the step: the polynomial through those of the stages (stages, k) at the nodes."""
+    fill(out, 0.0)
     for k in tableau.nodes:
         weight = 1.0
         for l in tableau.nodes:
             if l != k:
                 weight *= (x - tableau.c[l]) / (tableau.c[k] - tableau.c[l])
-        for r in range(lam.size):
-            lam[r] += weight * march.stage_lam[k, r]
+        for r in range(out.size):
+            out[r] += weight * stages[k, r]

@@ -31,6 +31,7 @@ from paraflex.kernel.rounding import (
     prepare_matrix,
     relative,
 )
+from paraflex.kernel.samples import is_long
 from paraflex.kernel.sensitivity_samples import (
     DIFFERENCE_STEP,
     PLACES,
@@ -246,7 +247,7 @@ def sensitivity_steps(
         g, dg, sample = tableau.A[last, last] * h, tableau.A[last, last] * dh, last + 1
         i = sensitivity.taken[0]
         while i < sensitivity.times.size and sensitivity.times[i] <= history.t[k] + h * (1.0 + 1e-12):
-            sensitivity_at_sample(tableau, k, i, history, sensitivity)
+            sensitivity_at_sample(tableau, k, i, is_long(system, tableau, controls, h), history, sensitivity)
             if out.solved[i]:
                 for j in range(sensitivity.f.size):
                     da, jump = sensitivity.sample_a[i, j], out.a[i, j] - sensitivity.moved_v[j]

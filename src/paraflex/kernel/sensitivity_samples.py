@@ -88,8 +88,8 @@ def work_sensitivity(tableau, k, history, sensitivity):
 
 
 @routine
-def multiplier_sensitivity(tableau, k, fraction, d_fraction, history, sensitivity, out):
-    """Derivative of the multipliers at a fraction of step k that moves itself, as by `interpolate_multipliers`."""
+def node_sensitivity(tableau, fraction, d_fraction, stages, derivatives, out):
+    """Derivative of values of stages at a fraction of a step that moves itself, as by `interpolate_nodes`."""
     fill(out, 0.0)
     for s in tableau.nodes:
         weight = 1.0
@@ -105,11 +105,11 @@ def multiplier_sensitivity(tableau, k, fraction, d_fraction, history, sensitivit
                         product *= (fraction - tableau.c[l]) / (tableau.c[s] - tableau.c[l])
                 slope += product
         for r in range(out.size):
-            out[r] += weight * sensitivity.lam[s, r] + slope * d_fraction * history.lam[k, s, r]
+            out[r] += weight * derivatives[s, r] + slope * d_fraction * stages[s, r]
 
 
 @routine
-def sensitivity_at_sample(tableau, k, i, history, sensitivity):
+def sensitivity_at_sample(tableau, k, i, long, history, sensitivity):
     """Derivatives at sample i, within step k, of the curves there; their accelerations into sensitivity.moved_v."""
     t, h, last = history.t[k], history.h[k], tableau.c.size - 1
     time, d_time = sensitivity.times[i], sensitivity.sample_times[i] - sensitivity.t[k]
@@ -136,7 +136,10 @@ def sensitivity_at_sample(tableau, k, i, history, sensitivity):
                 sensitivity.sample_a[i, j] += WEIGHTS[e] * a / DIFFERENCE_STEP
     done = min(max((time - t) / h, 0.0), 1.0)
     d_done, left = (d_time - (time - t) / h * sensitivity.h[k]) / h, 1.0 - done
-    multiplier_sensitivity(tableau, k, (time - t) / h, d_done, history, sensitivity, sensitivity.sample_lam[i])
+    fraction = (time - t) / h
+    node_sensitivity(tableau, fraction, d_done, history.lam[k], sensitivity.lam, sensitivity.sample_lam[i])
+    if long:
+        node_sensitivity(tableau, fraction, d_done, history.q[k], sensitivity.q, sensitivity.sample_q[i])
     work, d_work = work_sensitivity(tableau, k, history, sensitivity)
     first, end = history.power[k, 0], history.power[k, last]
     sensitivity.sample_work[i] = (
