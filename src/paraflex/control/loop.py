@@ -13,7 +13,7 @@ from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.discrete import DiscreteModel
-from paraflex.control.inside import linear_model, wrong_torques
+from paraflex.control.inside import exception_of, linear_model, wrong_torques
 from paraflex.control.together import (
     check_distinct,
     check_name,
@@ -164,7 +164,12 @@ class Loop:
     @property
     def failure(self) -> LawFailure | None:
         """What ended a run in the compiled time loop."""
-        wrong = [] if self.inside is None else wrong_torques(self.inside)
+        if self.inside is None:
+            return None
+        raised = exception_of(self.inside, self.controllers[0])
+        if raised is not None:
+            return _raised(self.names[0], raised)
+        wrong = wrong_torques(self.inside)
         return _not_finite(self.names[0], [self._plants[0].outputs[k] for k in wrong]) if wrong else None
 
     @property
