@@ -20,6 +20,7 @@ from paraflex.control.together import (
     check_whole,
     checked_number,
     multiple_of,
+    real_numbers,
     whole_and_part,
 )
 from paraflex.errors import InputError
@@ -227,12 +228,11 @@ class Loop:
             given = controller.step(number, t, y)
         except Exception as error:
             raise _raised(name, error) from error
-        try:
-            torques = np.atleast_1d(np.asarray(given, dtype=float))
-        except (TypeError, ValueError):
-            torques = None
-        if torques is None or given is None:
-            raise LawFailure(f'controller "{name}" returned {type(given).__name__}, no torques')
+        torques = None if given is None else real_numbers(given)
+        if torques is None:
+            kind = "complex numbers" if np.iscomplexobj(given) else type(given).__name__
+            raise LawFailure(f'controller "{name}" returned {kind}, no torques')
+        torques = np.atleast_1d(torques)
         if torques.shape != (len(outputs),):
             count = "one" if torques.size == 1 else " x ".join(map(str, torques.shape))
             raise LawFailure(f'controller "{name}" returned {count} in place of {len(outputs)} torques')
