@@ -6,6 +6,8 @@ import shutil
 import signal
 import sqlite3
 import sys
+import warnings
+from contextlib import suppress
 
 import pytest
 
@@ -270,3 +272,52 @@ def test_workers_take_any_function(name):
     with open_engine(name, 2) as engine:
         assert open_engine(engine) is engine
         assert dict(outcomes(engine, squared, range(20))) == {n: n**2 for n in range(20)}
+
+
+HOSTILE = [
+    "CREATE TRIGGER more AFTER INSERT ON runs BEGIN UPDATE runs SET content = '{}'; END",
+    "CREATE VIEW seen AS SELECT * FROM runs",
+    "CREATE TABLE other (a)",
+]
+
+
+@pytest.mark.parametrize("statement", HOSTILE)
+def test_a_journal_with_more_than_its_tables_is_damaged(tmp_path, statement):
+    with write_journal(tmp_path) as journal:
+        journal.add([{"run": 1, "id": "a", "x": 2.0}])
+    with sqlite3.connect(tmp_path / JOURNAL) as connection:
+        connection.execute(statement)
+    connection.close()
+    with pytest.raises(OutputError, match="other things than the tables"):
+        rows_in(tmp_path)
+    with pytest.warns(ResultWarning, match="1 rows are whole"), write_journal(tmp_path) as journal:
+        journal.add([{"run": 2, "id": "b", "x": 3.0}])
+    assert rows_in(tmp_path) == 2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a privilege")
+@pytest.mark.parametrize("end", ["", "-journal", "-wal"])
+def test_a_journal_that_is_a_link_is_not_followed(tmp_path, end):
+    (tmp_path / "theirs").write_text("theirs")
+    folder = tmp_path / "out"
+    folder.mkdir()
+    with write_journal(folder) as journal:
+        journal.add([{"run": 1, "id": "a", "x": 2.0}])
+    if not end:
+        (folder / JOURNAL).unlink()
+    (folder / f"{JOURNAL}{end}").symlink_to(tmp_path / "theirs")
+    with pytest.raises(OutputError, match="it is a link"), read_journal(folder / JOURNAL):
+        pass
+    with suppress(OutputError), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with write_journal(folder) as journal:
+            journal.add([{"run": 2, "id": "b", "x": 2.0}])
+    assert (tmp_path / "theirs").read_text() == "theirs"
+
+
+def test_a_rollback_journal_that_names_another_file_is_not_used(tmp_path):
+    with write_journal(tmp_path) as journal:
+        journal.add([{"run": 1, "id": "a", "x": 2.0}])
+    (tmp_path / f"{JOURNAL}-journal").write_bytes(bytes(512) + bytes.fromhex("d9d505f920a163d7"))
+    with pytest.raises(OutputError, match="names another file"):
+        rows_in(tmp_path)

@@ -281,3 +281,78 @@ def test_what_is_in_the_way_is_named_before_anything_is_moved(folder):
             replace(folder, AFTER | new)
         assert ours(folder) == BEFORE
         assert not (folder / ".ready").exists()
+
+
+def foreign(place, names, removed=(), links=()):
+    """A folder as another may have made it: with results that are ready to be moved, and links."""
+    ready = place / ".ready"
+    write(ready, dict.fromkeys(names, "theirs"))
+    write_json(ready / "manifest.json", vars(Manifest.of(RUN, {})) | {"files": {}})
+    write_json(ready / "removed.json", list(removed))
+    for name, target in links:
+        (place / name).symlink_to(target)
+    return place
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a privilege")
+@pytest.mark.parametrize(
+    "hostile",
+    [
+        {"names": ["x/a"], "links": [("x", "../outside")]},
+        {"names": ["x/y/a"], "links": [("x", "../outside")]},
+        {"names": [], "removed": ["x/theirs.txt"], "links": [("x", "../outside")]},
+        {"names": ["loop/a"], "links": [("loop", "loop")]},
+    ],
+)
+def test_nothing_is_moved_or_removed_where_links_lead_out(tmp_path, hostile):
+    outside = tmp_path / "outside"
+    write(outside, {"theirs.txt": "theirs"})
+    folder = foreign(tmp_path / "out", **hostile)
+    uses = (kind_of_folder, lambda place: check_listed(place / "a.nc", "again"), lambda place: replace(place, AFTER))
+    for use in uses:
+        with pytest.raises(OutputError, match=r"a link leads out of|cannot be written"):
+            use(folder)
+    assert {file.name: file.read_text() for file in outside.iterdir()} == {"theirs.txt": "theirs"}
+    assert not (folder / "results.nc").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a privilege")
+@pytest.mark.parametrize("name", [".ready", ".lock", "figures", ".new"])
+def test_links_in_place_of_own_files_and_folders_are_refused(folder, tmp_path, name):
+    outside = foreign(tmp_path / "outside", ["a"])
+    shutil.move(outside / ".ready", tmp_path / "theirs")
+    before = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file() and folder not in file.parents}
+    if (folder / name).is_dir():
+        shutil.rmtree(folder / name)
+    (folder / name).unlink(missing_ok=True)
+    (folder / name).symlink_to(tmp_path / ("new file" if name == ".lock" else "theirs"))
+    with pytest.raises(OutputError):
+        replace(folder, AFTER)
+    after = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file() and folder not in file.parents}
+    assert after == before
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owners")
+def test_what_another_user_prepared_is_not_moved(tmp_path, monkeypatch):
+    folder = foreign(tmp_path / "out", ["results.nc"])
+    monkeypatch.setattr(os, "getuid", lambda: (folder / ".ready").stat().st_uid + 1)
+    with pytest.raises(OutputError, match="another user prepared"):
+        kind_of_folder(folder)
+    assert not (folder / "results.nc").exists()
+
+
+@pytest.mark.parametrize("removed", [{"a": 1}, [1, 2], "results.nc"])
+def test_a_list_of_files_that_is_none(tmp_path, removed):
+    folder = foreign(tmp_path / "out", ["results.nc"])
+    (folder / ".ready" / "removed.json").write_text(json.dumps(removed))
+    with pytest.raises(InputError, match="not a list of names"):
+        kind_of_folder(folder)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a privilege")
+def test_unfinished_files_that_are_links_are_not_written_through(tmp_path):
+    write(tmp_path, {"theirs.txt": "theirs"})
+    (tmp_path / "a.json.part").symlink_to("theirs.txt")
+    write_json(tmp_path / "a.json", {"mine": 1})
+    assert (tmp_path / "theirs.txt").read_text() == "theirs"
+    assert not (tmp_path / "a.json").is_symlink()

@@ -1,15 +1,20 @@
 """Signals end any command at any time with a line and its exit code; workers end with their parent."""
 
+import importlib
 import os
 import re
 import signal
 import sys
 import time
 
+import pyarrow as pa
 import pytest
+import xarray as xr
 
 from journals import rows_in
 from paraflex.interrupts import uninterrupted
+from paraflex.results.parquet import write_parquet
+from paraflex.results.storage import write_results
 from processes import started, wait_until
 
 if os.name != "posix":
@@ -229,3 +234,29 @@ def test_what_must_not_be_interrupted_is_not():
         work()
     assert done == [2]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize(
+    ("library", "name", "write"),
+    [
+        ("xarray.Dataset", "to_netcdf", lambda file: write_results(xr.Dataset({"a": ("x", [1.0])}), file)),
+        ("pyarrow.parquet.ParquetWriter", "write_table", lambda file: write_parquet(pa.table({"a": [1.0]}), file)),
+        ("pyarrow.parquet.ParquetWriter", "close", lambda file: write_parquet(pa.table({"a": [1.0]}), file)),
+    ],
+)
+def test_signals_wait_until_numbers_are_written(tmp_path, monkeypatch, library, name, write):
+    """Libraries take locks in Python, which an exception between would leave taken for ever."""
+    place, _, kind = library.rpartition(".")
+    owner = getattr(importlib.import_module(place), kind)
+    plain, ended = getattr(owner, name), []
+
+    def interrupted(*arguments, **options):
+        signal.raise_signal(signal.SIGINT)
+        plain(*arguments, **options)
+        ended.append(1)
+
+    monkeypatch.setattr(owner, name, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path / "file")
+    assert ended
+    assert not list(tmp_path.iterdir())

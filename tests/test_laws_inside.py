@@ -1,6 +1,7 @@
 """Laws within the compiled time loop do what they do outside of it, sample by sample."""
 
 import tomllib
+import types
 
 import numpy as np
 import pytest
@@ -301,9 +302,99 @@ def test_what_stays_outside():
 
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: CompiledLaw(3.0), "function"),
+    (lambda: CompiledLaw(len), "function"),
     (lambda: CompiledLaw(pd, states=-1), "states"),
+    (lambda: CompiledLaw(pd, states=10**9), "states"),
     (lambda: SampledController(CompiledLaw(lambda k, t, y, x, u: u.nothing()), **BOTH), "cannot be compiled"),
 ])  # fmt: skip
 def test_bad_compiled_laws(make, said):
     with pytest.raises(InputError, match=said):
         Simulation(rotor(), duration=0.01, samples=11).run(make())
+
+
+@njit
+def _beyond(torques, place):
+    torques[place] = 5.0
+
+
+_helpers = types.ModuleType("helpers")
+_helpers.beyond = _beyond
+
+
+def _raises(k, t, y, x, torques):
+    x[0] += 1.0
+    if x[0] > 7.0:
+        raise ValueError("the eighth")
+
+
+def _divides(k, t, y, x, torques):
+    torques[0] = 1.0 / (k - 7)
+
+
+def _writes(k, t, y, x, torques):
+    torques[0 if k < 7 else 10_000_000] = 0.0
+
+
+def _reads(k, t, y, x, torques):
+    torques[0] = y[1 if k < 7 else -3]
+
+
+def _calls(k, t, y, x, torques):
+    _beyond(torques, 0 if k < 7 else 10_000_000)
+
+
+def _calls_by_module(k, t, y, x, torques):
+    _helpers.beyond(torques, 0 if k < 7 else 10_000_000)
+
+
+def _closure():
+    here = _beyond
+
+    def calls_a_name_around_it(k, t, y, x, torques):
+        here(torques, 0 if k < 7 else 10_000_000)
+
+    return calls_a_name_around_it
+
+
+def _slices(k, t, y, x, torques):
+    torques[:] = np.zeros(1 if k < 7 else 7)
+
+
+@pytest.mark.parametrize(
+    ("law", "raised"),
+    [(_raises, "ValueError: the eighth"), (_divides, "ZeroDivisionError"), (_writes, "IndexError"),
+     (_reads, "IndexError"), (_calls, "IndexError"), (_calls_by_module, "IndexError"), (_closure(), "IndexError"),
+     (_slices, "ValueError: cannot assign")],
+)  # fmt: skip
+def test_exceptions_of_compiled_functions_end_the_run(law, raised):
+    """Within the time loop as outside: accesses out of bounds too, in functions that are called as well."""
+    said = []
+    for kind in (SampledController, Outside):
+        sim = Simulation(rotor(), duration=0.02, samples=21)
+        with pytest.raises(ControllerError, match=f'controller "law" raised {raised}') as got:
+            sim.run(kind(CompiledLaw(law, states=1), name="law", **BOTH), warning=False)
+        assert len(got.value.partial.controllers[0].t) == 7
+        assert (sim._loop.inside is not None) is (kind is SampledController)
+        said.append(str(got.value))
+    assert said[0] == said[1]
+
+
+def test_what_a_compiled_function_is_given():
+    """Torques are zero before each sample, and errors its own: it may write into them."""
+
+    def adds(k, t, y, x, torques):
+        torques[0] += -40.0 * y[0] - 1.2 * y[1]
+        y[0] = 99.0
+
+    inside, outside = both(lambda: CompiledLaw(adds), BOTH)
+    plain, _ = both(lambda: CompiledLaw(pd), BOTH)
+    for run in (inside, outside):
+        np.testing.assert_allclose(run.controllers[0].wanted, plain.controllers[0].wanted, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(run.controllers[0].readings, plain.controllers[0].readings, rtol=1e-9, atol=1e-9)
+
+
+def test_functions_are_compiled_once():
+    first, second = CompiledLaw(pd), CompiledLaw(pd)
+    for law in (first, second):
+        Simulation(rotor(), duration=0.01, samples=11).run(SampledController(law, **BOTH), warning=False)
+    assert first.address == second.address

@@ -1,5 +1,6 @@
 """Simulations one can step, under sampled controllers: closed forms, open-loop runs, saved states, failures."""
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -406,12 +407,66 @@ def test_continuous_models_are_refused():
         (lambda task: simulated_rotor().step([1.0], 0.5), "until: is not within the rest of the run"),
         (lambda task: simulated_rotor().step([1.0], "1 ms"), "until: is not within the rest of the run"),
         (lambda task: simulated_rotor().step(["one"], 0.01), "torques: not 1 finite numbers"),
+        (lambda task: simulated_rotor().step([1.0 + 1j], 0.01), "torques: not 1 finite numbers"),
+        (lambda task: simulated_rotor().step({"tau": 10**400}, 0.01), "torques: not 1 finite numbers"),
         (lambda task: simulated_rotor().restore(3), "saved: not a saved simulation"),
+        (lambda task: simulated_rotor().restore(Simulation(task).save()), "saved: the state of another simulation"),
+        (
+            lambda task: simulated_rotor().restore(simulated_rotor(0.03).save()),
+            "saved: the state of another simulation",
+        ),
     ],
 )
 def test_bad_simulations(task, make, said):
     with pytest.raises(pf.InputError, match=said):
         make(task)
+
+
+def test_a_state_goes_on_in_another_simulation_of_the_same():
+    one, other = simulated_rotor(), simulated_rotor()
+    one.step([1.0], 0.01)
+    other.restore(one.save())
+    assert one.step([2.0], 0.02) == other.step([2.0], 0.02)
+
+
+@pytest.mark.parametrize("call", ["step", "reset", "restore", "run"])
+def test_a_law_does_not_run_its_own_simulation(call):
+    sim = simulated_rotor()
+    saved = sim.save()
+    calls = {"step": lambda: sim.step([1.0], 0.01), "reset": sim.reset, "restore": lambda: sim.restore(saved),
+             "run": lambda: sim.run(pd())}  # fmt: skip
+
+    def law(k, t, y):
+        calls[call]()
+
+    with pytest.raises(ControllerError, match="a law, or another thread, may not run it"):
+        sim.run(pf.SampledController(law, period=T, inputs=["hub"]))
+    sim.reset()
+    assert sim.step([0.0], 0.01) == simulated_rotor().step([0.0], 0.01)
+
+
+def test_threads_do_not_share_a_simulation():
+    sim, inside, go_on = simulated_rotor(), threading.Event(), threading.Event()
+
+    def waits(k, t, y):
+        inside.set()
+        go_on.wait(60.0)
+        return [0.0]
+
+    thread = threading.Thread(target=sim.run, args=(pf.SampledController(waits, period=T, inputs=["hub"]),))
+    thread.start()
+    inside.wait(60.0)
+    with pytest.raises(pf.InputError, match="simulation: is running"):
+        sim.step([1.0], 0.01)
+    go_on.set()
+    thread.join()
+    assert sim.ended
+
+
+def test_complex_torques_of_a_law_are_none():
+    law = pf.SampledController(lambda k, t, y: np.array([1.0 + 2.0j]), period=T, inputs=["hub"])
+    with pytest.raises(ControllerError, match="returned complex numbers, no torques"):
+        simulated_rotor().run(law)
 
 
 def test_an_event_ends_it():

@@ -50,6 +50,8 @@ def whole_file(path: Path, *, remedy: str = ELSEWHERE, field: str = "", parents:
     try:
         if parents:
             path.parent.mkdir(parents=True, exist_ok=True)
+        # A link, perhaps, through which another file would be written.
+        unfinished.unlink(missing_ok=True)
         yield unfinished
         with unfinished.open("rb+") as opened:
             os.fsync(opened.fileno())

@@ -40,6 +40,8 @@ COMMIT;
 """
 # The first bytes of any journal's file, by these settings.
 _HEAD = b"SQLite format 3\0\x10\0\x01\x01\0\x40\x20\x20"
+# Last bytes of a rollback journal that names a file of several databases.
+_NAMES_ANOTHER = bytes.fromhex("d9d505f920a163d7")
 _ALL = "SELECT run, id, content, digest FROM runs"
 # The note that says how many rows there are, and the sum of their digests.
 _TALLY = "rows"
@@ -80,7 +82,7 @@ class Journal:
 
     def note(self, name: str, value: bytes) -> None:
         """Keep something about the study."""
-        with self._connection:
+        with uninterrupted(), self._connection:
             self._note(name, value)
 
     def _note(self, name: str, value: bytes) -> None:
@@ -151,7 +153,7 @@ class Journal:
             # Of two rows of a run the later one.
             waiting = {(int(row["run"]), row["id"]): row for row in self._waiting}
             contents = {key: json.dumps(row, default=_plain) for key, row in waiting.items()}
-            with self._connection:
+            with uninterrupted(), self._connection:
                 self._write([(*key, content, _digest(*key, content)) for key, content in contents.items()])
             # Not before: what Ctrl-C met half written is written at the end.
             self._waiting = []
@@ -233,7 +235,6 @@ def _mend(file: Path, how: str, reason: str) -> None:
     copy = file.with_name(f"{file.name}.copy.part")
     try:
         with whole_file(file, remedy=GO_ON) as unfinished:
-            unfinished.unlink(missing_ok=True)
             with _connected(unfinished, how) as connection:
                 shutil.copyfile(file, copy)
                 _restore_first_page(copy, unfinished.read_bytes())
@@ -278,6 +279,7 @@ def _keep_whole(damaged: Path, journal: Journal) -> int:
 @contextmanager
 def _connected(file: Path, how: str) -> Iterator[sqlite3.Connection]:
     """A connection to a journal, with its tables where the file is new."""
+    _check_files(file)
     with closing(sqlite3.connect(f"{file.absolute().as_uri()}?{how}", timeout=_PATIENCE, uri=True)) as connection:
         # A damaged text is a matter of its digest.
         connection.text_factory = lambda text: text.decode(errors="replace")
@@ -286,7 +288,25 @@ def _connected(file: Path, how: str) -> Iterator[sqlite3.Connection]:
         connection.executescript(_SETTINGS)
         if not file.stat().st_size:
             connection.executescript(_TABLES)
+        # Triggers and views would act on what is read and written; whoever sends a folder may have put them in.
+        found = connection.execute("SELECT type, name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'").fetchall()
+        if sorted(found) != [("table", "notes"), ("table", "runs")]:
+            raise sqlite3.DatabaseError("it holds other things than the tables of a journal")
         yield connection
+
+
+def _check_files(file: Path) -> None:
+    """Check that SQLite touches no other files than a journal and those beside it, whoever made them.
+
+    It rolls back into what a link leads to, and deletes the file that a rollback journal names.
+    """
+    beside = [file.with_name(file.name + end) for end in ("", "-journal", "-wal", "-shm")]
+    if any(each.is_symlink() for each in beside):
+        raise sqlite3.DatabaseError("it is a link, or a file beside it is")
+    with suppress(OSError), beside[1].open("rb") as stream:
+        stream.seek(-len(_NAMES_ANOTHER), 2)
+        if stream.read() == _NAMES_ANOTHER:
+            raise sqlite3.DatabaseError(f"{beside[1].name} names another file")
 
 
 @contextmanager

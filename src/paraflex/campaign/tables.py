@@ -11,6 +11,7 @@ import xarray as xr
 
 from paraflex.campaign.journal import JOURNAL, Journal, read_journal
 from paraflex.errors import InputError, ResultWarning, warn_user
+from paraflex.interrupts import uninterrupted
 from paraflex.results.parquet import open_parquet, read_parquet
 from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.seals import damaged
@@ -56,7 +57,8 @@ def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
     pieces = _pieces(journal, held)
     with open_parquet(file, schema, remedy=GO_ON) as writer:
         while group := list(islice(pieces, _GROUP // held)):
-            writer.write_table(pa.concat_tables(group).combine_chunks(), row_group_size=_GROUP)
+            with uninterrupted():
+                writer.write_table(pa.concat_tables(group).combine_chunks(), row_group_size=_GROUP)
     if finished:
         _write_csv(file, folder / CSV)
     return file
@@ -166,7 +168,8 @@ def _write_csv(table: Path, file: Path) -> None:
         pyarrow.csv.CSVWriter(unfinished, schema) as writer,
     ):
         for number in range(read.num_row_groups):
-            writer.write_table(spreadsheet_table(read.read_row_group(number)))
+            with uninterrupted():
+                writer.write_table(spreadsheet_table(read.read_row_group(number)))
 
 
 def _schema(journal: Journal) -> pa.Schema:

@@ -22,7 +22,7 @@ from paraflex.control.discrete import DiscreteModel, discrete_model, is_model
 from paraflex.control.estimators import rounded
 from paraflex.control.filters import transfer_function
 from paraflex.control.references import Reference, references
-from paraflex.control.together import by_name, checked_number, is_number
+from paraflex.control.together import by_name, checked_number, is_number, real_numbers
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import not_negative
@@ -209,9 +209,8 @@ class SampledController:
         said = self.law.step(k, t, errors)
         if said is None:
             return None  # Which as a number would be NaN.
-        try:
-            wanted = np.array(said, dtype=float)
-        except (TypeError, ValueError):
+        wanted = real_numbers(said)
+        if wanted is None:
             return said  # The loop says what is wrong with it.
         if wanted.shape != self._given.shape or not np.all(np.isfinite(wanted)):
             return wanted

@@ -11,6 +11,7 @@ from paraflex.actuation import FeedForward
 from paraflex.arrays import Array
 from paraflex.control.amplifiers import Amplifiers, relaxing, with_room
 from paraflex.control.runs import TorqueLog
+from paraflex.control.together import real_numbers
 from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
@@ -89,11 +90,8 @@ class HeldTorques:
         if isinstance(torques, Mapping):
             all_known(torques, self.motors, "torques", "motor")
             torques = [torques.get(name, 0.0) for name in self.motors]
-        try:
-            given = np.asarray(torques, dtype=float)
-        except (TypeError, ValueError):
-            given = np.full(1, np.nan)
-        if given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
+        given = real_numbers(torques)
+        if given is None or given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
             raise InputError(f"not {len(self.motors)} finite numbers", field="torques", value=torques,
                              remedy=f"give one each of {', '.join(self.motors)}")  # fmt: skip
         return self.of_all(given)

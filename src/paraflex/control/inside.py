@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import ceil
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 import scipy
-from numba import cfunc, njit, types
-from numba.core.errors import NumbaError
 from numba.extending import is_jitted
-from numba.np.numpy_support import carray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.chain import SampledController
+from paraflex.control.compiled import MOST_STATES, compiled_function
 from paraflex.control.controllers import Plant
 from paraflex.control.discrete import DiscreteModel
 from paraflex.control.linear_law import LinearLaw
@@ -24,10 +23,7 @@ from paraflex.control.references import AtSamples
 from paraflex.control.together import SAME, whole_and_part
 from paraflex.errors import InputError
 from paraflex.kernel.arrays import apart
-from paraflex.kernel.sampled import SAMPLED, WRONG, SampledLaw
-
-_POINTER = types.CPointer(types.float64)
-_SIGNATURE = types.void(types.int64, types.float64, _POINTER, _POINTER, _POINTER)
+from paraflex.kernel.sampled import NOT_FINITE, RAISED, SAMPLED, WRONG, SampledLaw
 
 
 class CompiledLaw:
@@ -37,25 +33,28 @@ class CompiledLaw:
     ----------
     function : callable
         Of (k, t, y, x, torques), compiled by Numba, or such that Numba can compile it: from the errors y (inputs,) of
-        sample k at time t [s] and its states x (states,), zero at the start, it writes torques (outputs,) [N m, N] and
-        changes x.
+        sample k at time t [s] and its states x (states,), zero at the start, it writes torques (outputs,) [N m, N],
+        zero before, and changes x. It is compiled with bounds of arrays checked, and so are the functions it calls; an
+        exception ends the run.
     states : int
         Number of its states.
 
     Raises
     ------
     InputError
-        No function, or a number of states below zero; as it starts, of a function that Numba cannot compile.
+        No function, or a number of states below zero or above `MOST_STATES`; as it starts, of a function that Numba
+        cannot compile.
     """
 
     @checked_arguments()
     def __init__(self, function: Callable[..., None], states: int = 0) -> None:
-        if not callable(function):
+        if not (is_jitted(function) or isinstance(function, FunctionType)):
             raise InputError("is no function", field="function", value=function,
                              remedy="give one of (k, t, y, x, torques)")  # fmt: skip
-        if states < 0:
-            raise InputError("is negative", field="states", value=states, remedy="give the number of states, or none")
-        self._function: Any = function if is_jitted(function) else njit(function)
+        if not 0 <= states <= MOST_STATES:
+            raise InputError("is out of range", field="states", value=states,
+                             remedy=f"give the number of states, at most {MOST_STATES}")  # fmt: skip
+        self._compiled = compiled_function(function)
         self.states: int = states
         name = getattr(function, "__name__", "")
         self.title: str = f"compiled {name if name.isidentifier() else 'function'}"
@@ -64,16 +63,14 @@ class CompiledLaw:
     def start(self, plant: Plant) -> None:
         """See `Controller`."""
         self.x: Array = np.zeros(self.states)
-        self._torques = np.zeros(len(plant.outputs))
-        sizes = (len(plant.inputs), self.states, len(plant.outputs))
-        if self._entry is None or self._sizes != sizes:
-            self._sizes = sizes
-            self._entry = _entry(self._function, *sizes)
+        self._outputs = len(plant.outputs)
+        self._entry = self._compiled.entry(len(plant.inputs), self.states, self._outputs)
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """See `Controller`."""
-        self._function(k, t, np.ascontiguousarray(y), self.x, self._torques)
-        return self._torques.copy()
+        torques = np.zeros(self._outputs)
+        self._compiled.function(k, t, np.array(y), self.x, torques)
+        return torques
 
     @property
     def address(self) -> int:
@@ -84,22 +81,8 @@ class CompiledLaw:
         """A copy with its own states and the same function."""
         other = object.__new__(type(self))
         vars(other).update(vars(self))
-        other.x, other._torques = self.x.copy(), self._torques.copy()
+        other.x = self.x.copy()
         return other
-
-
-def _entry(law: Any, inputs: int, states: int, outputs: int) -> Any:
-    """The function for C: numbers and pointers."""
-
-    def entry(k, t, y, x, torques):
-        law(k, t, carray(y, inputs), carray(x, states), carray(torques, outputs))
-
-    try:
-        return cfunc(_SIGNATURE)(entry)
-    except NumbaError as error:
-        cause = " ".join(str(error).split())[:200]
-        raise InputError(f"cannot be compiled: {cause}", field="law", value=law.__name__,
-                         remedy="write it as Numba takes functions, or give a law in Python") from None  # fmt: skip
 
 
 def sampled_law(
@@ -167,9 +150,22 @@ def linear_model(controller: Any, plant: Plant) -> DiscreteModel | None:
 
 def wrong_torques(law: SampledLaw) -> list[int]:
     """Places among its outputs of torques that are not finite, where that ended a run."""
-    if not law.counts[WRONG]:
+    if law.counts[WRONG] != NOT_FINITE:
         return []
     return np.flatnonzero(~np.isfinite(law.wanted[law.counts[SAMPLED]])).tolist()
+
+
+def exception_of(law: SampledLaw, controller: Any) -> Exception | None:
+    """What a controller's compiled function raised, where that ended a run: its last sample is taken again."""
+    if law.counts[WRONG] != RAISED:
+        return None
+    k, function = int(law.counts[SAMPLED]), controller.law
+    function.x = law.scratch[1, : function.states].copy()
+    try:
+        function.step(k, float(law.t[k]), law.readings[k] - law.reference[k])
+    except Exception as error:
+        return error
+    return RuntimeError("an exception that does not come again")
 
 
 def _linear(law: Any) -> LinearLaw | None:

@@ -13,13 +13,14 @@ from paraflex.arrays import Array
 from paraflex.control.chain import ChainSample, SampledController, as_law
 from paraflex.control.controllers import Controller, Plant
 from paraflex.control.discrete import DiscreteModel
-from paraflex.control.inside import linear_model, wrong_torques
+from paraflex.control.inside import exception_of, linear_model, wrong_torques
 from paraflex.control.together import (
     check_distinct,
     check_name,
     check_whole,
     checked_number,
     multiple_of,
+    real_numbers,
     whole_and_part,
 )
 from paraflex.errors import InputError
@@ -164,7 +165,12 @@ class Loop:
     @property
     def failure(self) -> LawFailure | None:
         """What ended a run in the compiled time loop."""
-        wrong = [] if self.inside is None else wrong_torques(self.inside)
+        if self.inside is None:
+            return None
+        raised = exception_of(self.inside, self.controllers[0])
+        if raised is not None:
+            return _raised(self.names[0], raised)
+        wrong = wrong_torques(self.inside)
         return _not_finite(self.names[0], [self._plants[0].outputs[k] for k in wrong]) if wrong else None
 
     @property
@@ -222,12 +228,11 @@ class Loop:
             given = controller.step(number, t, y)
         except Exception as error:
             raise _raised(name, error) from error
-        try:
-            torques = np.atleast_1d(np.asarray(given, dtype=float))
-        except (TypeError, ValueError):
-            torques = None
-        if torques is None or given is None:
-            raise LawFailure(f'controller "{name}" returned {type(given).__name__}, no torques')
+        torques = None if given is None else real_numbers(given)
+        if torques is None:
+            kind = "complex numbers" if np.iscomplexobj(given) else type(given).__name__
+            raise LawFailure(f'controller "{name}" returned {kind}, no torques')
+        torques = np.atleast_1d(torques)
         if torques.shape != (len(outputs),):
             count = "one" if torques.size == 1 else " x ".join(map(str, torques.shape))
             raise LawFailure(f'controller "{name}" returned {count} in place of {len(outputs)} torques')

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,6 +52,7 @@ class Saved:
     """
 
     time: float
+    identity: str
     kept: Kept
     torques: tuple[Array, TorqueLog]
     loop: Loop | None
@@ -157,6 +161,8 @@ class Simulation:
             options=self._options, samples=self._times.size,
         )  # fmt: skip
         self._loop: Loop | None = None
+        # Taken by the call that runs it: a law, or another thread, finds none.
+        self._turn = [None]
         self._integration.start()
         self._fresh = self.save()
 
@@ -179,7 +185,8 @@ class Simulation:
 
     def reset(self) -> dict[str, float]:
         """Go back to the start, without torques and controllers; the readings there."""
-        self.restore(self._fresh)
+        with self._alone():
+            self._restore(self._fresh)
         return self.sensors()
 
     def step(self, torques: Torques, until: float) -> dict[str, float]:
@@ -203,9 +210,10 @@ class Simulation:
         if not is_number(until) or not self.time < until <= self.end * (1.0 + SAME):
             raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
                              value=until, remedy="give a later time in it, or reset the simulation")  # fmt: skip
-        self._use(None)
-        self._apply(given)
-        self._march(min(until, self.end))
+        with self._alone():
+            self._use(None)
+            self._apply(given)
+            self._march(min(until, self.end))
         if self._integration.status == "stopped":
             cause = f"the run has ended: {self._integration.message}"
             raise IntegrationError(cause, None, self.result(), "call result() for what there is, or reset()")
@@ -220,11 +228,46 @@ class Simulation:
         """The whole state, controllers included: a run restored from it continues bit for bit."""
         loop = self._loop
         controllers = None if loop is None else loop.saved()
-        return Saved(self.time, self._integration.saved(), self._torques.saved(), loop, controllers)
+        return Saved(self.time, self._identity, self._integration.saved(), self._torques.saved(), loop, controllers)
 
     @checked_arguments()
     def restore(self, saved: Saved) -> None:
-        """Go back to what `save` gave, of this simulation."""
+        """Go back to what `save` gave, of this simulation or one that was made of the same.
+
+        Raises
+        ------
+        InputError
+            It is of another simulation.
+        """
+        if saved.identity != self._identity:
+            raise InputError("the state of another simulation", field="saved",
+                             remedy="give what save returned, of the same mechanism, plan and options")  # fmt: skip
+        with self._alone():
+            self._restore(saved)
+
+    @cached_property
+    def _identity(self) -> str:
+        """A digest of all that a state goes on with."""
+        signals, start = self._integration.run.problem.signals, self._initial
+        found = hashlib.blake2b(repr((self.mechanism, self.mode, self._options, self._fed_forward)).encode())
+        for array in (*self.system.packed, *signals, self._times, start.q, start.v):
+            found.update(np.ascontiguousarray(array).tobytes())
+        return found.hexdigest()
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Let one call at a time run it."""
+        try:
+            self._turn.pop()
+        except IndexError:
+            raise InputError("is running: a law, or another thread, may not run it as well", field="simulation",
+                             remedy="make another simulation") from None  # fmt: skip
+        try:
+            yield
+        finally:
+            self._turn.append(None)
+
+    def _restore(self, saved: Saved) -> None:
         self._integration.restore(saved.kept)
         self._torques.restore(saved.torques)
         self._use(saved.loop)
@@ -273,12 +316,13 @@ class Simulation:
         finite(self.end if until is None else until, "until")
         end = self.end if until is None else min(until, self.end)
         try:
-            if controllers is not None:
-                self._begin(controllers if isinstance(controllers, list | tuple) else [controllers])
-            while self.time < end and not self.ended:
-                self._go_on(end, on_progress)
-                if on_progress is not None:
-                    on_progress(self.time)
+            with self._alone():
+                if controllers is not None:
+                    self._begin(controllers if isinstance(controllers, list | tuple) else [controllers])
+                while self.time < end and not self.ended:
+                    self._go_on(end, on_progress)
+                    if on_progress is not None:
+                        on_progress(self.time)
         except KeyboardInterrupt:
             self._integration.interrupt()
         except LawFailure as failure:
@@ -293,7 +337,7 @@ class Simulation:
 
     def _begin(self, controllers: Sequence[Any]) -> None:
         """Start anew under controllers; in open loop under none."""
-        self.restore(self._fresh)
+        self._restore(self._fresh)
         several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
                    for each in controllers]  # fmt: skip
         start = self._initial.time

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import all_known, known, positive
 
@@ -140,3 +141,11 @@ def check_whole(names: Sequence[str]) -> None:
             f'gives the whole torque, as "{names[0]}" does', field=names[1],
             remedy="let one of the two act, or put a feedback law beside it",
         )  # fmt: skip
+
+
+def real_numbers(given: Any) -> Array | None:
+    """An array of what a law or user gives as torques; None of what are no real numbers."""
+    try:
+        return None if np.iscomplexobj(given) else np.asarray(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return None

@@ -41,6 +41,7 @@ from paraflex.designs.setting import Setting, make_setting
 from paraflex.equilibria.given import conditions
 from paraflex.errors import InputError
 from paraflex.files import Model, model_from
+from paraflex.folders import check_inside
 from paraflex.results.metrics import VALIDITY, Members
 from paraflex.results.parquet import read_parquet
 from paraflex.results.storage import write_results
@@ -344,8 +345,10 @@ class _Session:
 
     def _take(self, outcome: Outcome) -> None:
         # A trajectory is written before its row, as a run with a row is not repeated.
+        folder = self.campaign.folder.path
         for name, data in outcome.trajectories.items():
-            write_results(data, self.campaign.folder.path / TRAJECTORIES / f"{name}.nc", remedy=GO_ON)
+            check_inside(folder, f"{TRAJECTORIES}/{name}.nc")
+            write_results(data, folder / TRAJECTORIES / f"{name}.nc", remedy=GO_ON)
         self.campaign.journal.add(outcome.rows)
         self.done[outcome.task.number] = True
         self.fresh += len(outcome.rows)

@@ -3,7 +3,7 @@
 Whoever opens a folder next moves what is left to move, should the writer be killed.
 """
 
-from paraflex.folders.changes import MANIFEST as MANIFEST
+from paraflex.folders.changes import MANIFEST as MANIFEST, check_inside as check_inside
 from paraflex.folders.held import ResultsFolder as ResultsFolder, added_to as added_to, hold_folder as hold_folder
 from paraflex.folders.lock import (
     LOCK as LOCK,

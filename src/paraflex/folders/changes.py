@@ -5,12 +5,14 @@ With a manifest of all that is to be there `.new` is renamed to `.ready`: from t
 
 from __future__ import annotations
 
+import os
 import shutil
 from contextlib import suppress
 from pathlib import Path, PureWindowsPath
 
 from paraflex.errors import OutputError
 from paraflex.interrupts import uninterrupted
+from paraflex.seals import damaged
 from paraflex.writing import ELSEWHERE, read_values, unwritable
 
 MANIFEST = "manifest.json"
@@ -18,10 +20,21 @@ NEW, READY, REMOVED = ".new", ".ready", "removed.json"
 
 
 def finish_moves(folder: Path) -> None:
-    """Put a change that is ready in its place; where it was broken off, the rest of it. Ctrl-C waits for its end."""
+    """Put a change that is ready in its place; where it was broken off, the rest of it. Ctrl-C waits for its end.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written, another user prepared it, or its files would come to lie outside the folder.
+    """
     ready = folder / READY
     if not ready.is_dir():
         return
+    remedy = "look at what is in it and who made it; without it, the results before are read"
+    if ready.is_symlink():
+        raise OutputError("is a link, not results that paraflex prepared", field=str(ready), remedy=remedy)
+    if hasattr(os, "getuid") and ready.stat().st_uid != os.getuid():
+        raise OutputError("results that another user prepared and did not move", field=str(ready), remedy=remedy)
     try:
         with uninterrupted():
             _put(ready, folder)
@@ -29,8 +42,23 @@ def finish_moves(folder: Path) -> None:
         raise unwritable(error, str(folder), ELSEWHERE) from error
 
 
+def check_inside(folder: Path, name: Path | str) -> None:
+    """Check that a file of a folder lies in it, wherever links lead: none is written or removed elsewhere.
+
+    Raises
+    ------
+    OutputError
+        A link leads to another place.
+    """
+    place = (folder / name).parent
+    if not Path(os.path.realpath(place)).is_relative_to(os.path.realpath(folder)):
+        remedy = "put a folder in place of the link"
+        raise OutputError(f"a link leads out of {folder}", field=str(place), remedy=remedy)
+
+
 def check_place(folder: Path, name: Path) -> None:
     """Check that a file can be moved to its place in a folder, before any is."""
+    check_inside(folder, name)
     inner = [folder / each for each in list(name.parents)[:-1]]
     if (folder / name).is_dir() or any(each.exists() and not each.is_dir() for each in inner):
         what = "a folder" if (folder / name).is_dir() else "a file"
@@ -40,13 +68,19 @@ def check_place(folder: Path, name: Path) -> None:
 
 def _put(ready: Path, folder: Path) -> None:
     if (ready / MANIFEST).is_file():
-        removed = read_values(ready / REMOVED, f"delete the folder {READY}, and run the same command again")
-        for file in files_in(ready):
-            name = file.relative_to(ready)
-            if name.as_posix() not in (MANIFEST, REMOVED):
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                file.replace(folder / name)
-        for name in filter(is_inside, removed):
+        remedy = f"delete the folder {READY}, and run the same command again"
+        listed = read_values(ready / REMOVED, remedy)
+        if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
+            raise damaged(ready / REMOVED, "not a list of names", remedy)
+        removed = list(filter(is_inside, listed))
+        moved = [file for file in files_in(ready) if file not in (ready / MANIFEST, ready / REMOVED)]
+        for name in [*removed, *(file.relative_to(ready) for file in moved)]:
+            check_inside(folder, name)
+        for file in moved:
+            place = folder / file.relative_to(ready)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            file.replace(place)
+        for name in removed:
             (folder / name).unlink(missing_ok=True)
             with suppress(OSError):  # it holds other files, or is gone
                 (folder / name).parent.rmdir()

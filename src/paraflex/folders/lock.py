@@ -37,6 +37,8 @@ def lock_folder(folder: Path, *, field: str = "--output") -> Iterator[bool]:
     locks = True
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        if (folder / LOCK).is_symlink() or ((folder / LOCK).is_file() and (folder / LOCK).stat().st_size):
+            raise OSError(f"{LOCK} is not the empty file that keeps others away")
         lock = sqlite3.connect(folder / LOCK, timeout=0.0)
     except (OSError, sqlite3.OperationalError) as error:
         raise unwritable(error, field, ELSEWHERE, str(folder)) from error

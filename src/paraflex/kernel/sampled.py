@@ -22,13 +22,15 @@ from numpy.typing import NDArray
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.compiling import by_reference, routine
 
-# SampledLaw.counts: number of the next sample, of the next torques to act, whole periods of delay, whether torques of
-# the next sample are not finite; the address of a compiled function.
+# SampledLaw.counts: number of the next sample, of the next torques to act, whole periods of delay, what is wrong with
+# the next sample (0, NOT_FINITE or RAISED); the address of a compiled function.
 SAMPLED, ACTED, WHOLE, WRONG, FUNCTION = range(5)
 # SampledLaw.clock: of the first sample, period [s]; part of a period of delay; instants closer than this are one [s].
 START, PERIOD, PART, SLACK = range(4)
 # What `control` did.
 NOTHING, CHANGED, FAILED = range(3)
+# Torques that are not finite, or an exception of a compiled function; its states before are in `scratch[1]` then.
+NOT_FINITE, RAISED = 1, 2
 
 
 @by_reference
@@ -88,18 +90,17 @@ def no_law() -> SampledLaw:
 
 
 def _function_called(typingctx, address, k, t, y, x, torques):
-    """Code that calls a function of C by its address, with numbers and pointers to data of vectors."""
-    signature = types.void(address, k, t, y, x, torques)
+    """Code that calls a function of C by its address, with numbers and pointers to data of vectors; what it returns."""
+    signature = types.int64(address, k, t, y, x, torques)
 
     def code(context, builder, given, arguments):
         number, real = ir.IntType(64), ir.DoubleType()
-        kind = ir.FunctionType(ir.VoidType(), [number, real, *3 * [real.as_pointer()]])
+        kind = ir.FunctionType(number, [number, real, *3 * [real.as_pointer()]])
         arrays = [
             cgutils.create_struct_proxy(array)(context, builder, value=value).data
             for array, value in zip(given.args[3:], arguments[3:], strict=True)
         ]
-        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [arguments[1], arguments[2], *arrays])
-        return context.get_dummy_value()
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [arguments[1], arguments[2], *arrays])
 
     return signature, code
 
@@ -177,7 +178,11 @@ def take_sample(law, k, q, v, a):
     for i in range(y.size):
         errors[i] = y[i] - law.reference[k, i]
     if law.counts[FUNCTION] != 0:
-        call_function(law.counts[FUNCTION], k, law.t[k], errors, x, wanted)
+        copy(x, law.scratch[1])
+        fill(wanted, 0.0)
+        if call_function(law.counts[FUNCTION], k, law.t[k], errors, x, wanted) != 0:
+            law.counts[WRONG] = RAISED
+            return False
     else:
         if k == 0:
             fill(x, 0.0)
@@ -193,7 +198,7 @@ def take_sample(law, k, q, v, a):
     limited = False
     for i in range(wanted.size):
         if not isfinite(wanted[i]):
-            law.counts[WRONG] = 1
+            law.counts[WRONG] = NOT_FINITE
             return False
         within = min(max(wanted[i], law.lowest[i]), law.highest[i])
         given[i] = min(max(within, law.last[i] - law.most[i]), law.last[i] + law.most[i])

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from paraflex.folders import check_listed
+from paraflex.interrupts import uninterrupted
 from paraflex.seals import check_seal, damaged
 from paraflex.writing import sealed_file
 
@@ -20,7 +21,7 @@ _AGAIN = "delete it and run the same command again"
 
 def write_parquet(table: pa.Table, path: Path, compression: str = "snappy", **options: Any) -> None:
     """Write a table; see `whole_file` for the options and errors."""
-    with open_parquet(path, table.schema, compression, **options) as writer:
+    with open_parquet(path, table.schema, compression, **options) as writer, uninterrupted():
         writer.write_table(table)
 
 
@@ -31,11 +32,14 @@ def open_parquet(
     """A file to write tables into; see `whole_file` for the options and errors."""
     import pyarrow.parquet as pq
 
-    with (
-        sealed_file(path, **options) as unfinished,
-        pq.ParquetWriter(unfinished, schema, compression=compression, write_page_checksum=True) as writer,
-    ):
-        yield writer
+    with sealed_file(path, **options) as unfinished:
+        with uninterrupted():
+            writer = pq.ParquetWriter(unfinished, schema, compression=compression, write_page_checksum=True)
+        try:
+            yield writer
+        finally:
+            with uninterrupted():
+                writer.close()
 
 
 def read_parquet(file: Path, columns: Sequence[str] | None = None) -> pa.Table:

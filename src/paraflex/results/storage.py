@@ -14,6 +14,7 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.folders import check_listed
+from paraflex.interrupts import uninterrupted
 from paraflex.results.following import metric_variables
 from paraflex.seals import NETCDF, PARQUET, check_seal, damaged, unreadable
 from paraflex.writing import sealed_file
@@ -55,8 +56,11 @@ def save_results(data: xr.Dataset, path: str | Path) -> None:
 
 
 def write_results(data: xr.Dataset, path: Path, **options: Any) -> None:
-    """Write a dataset as netCDF; see `whole_file` for the options and errors."""
-    with sealed_file(path, **options) as unfinished:
+    """Write a dataset as netCDF; see `whole_file` for the options and errors. Ctrl-C waits for the end.
+
+    Its library takes locks in Python: one that an exception leaves taken lets all who read or write after it wait.
+    """
+    with sealed_file(path, **options) as unfinished, uninterrupted():
         _write_netcdf(data, unfinished)
 
 
@@ -158,7 +162,8 @@ def _read(file: Path) -> xr.Dataset:
     check_seal(file, _AGAIN)
     check_listed(file, _AGAIN)
     try:
-        return xr.load_dataset(file, engine="netcdf4")
+        with uninterrupted():
+            return xr.load_dataset(file, engine="netcdf4")
     # Of a damaged file without a seal the libraries raise whatever its bytes lead them to.
     except Exception as error:
         raise damaged(file, "cut short, or not a readable netCDF file", _AGAIN) from error
