@@ -164,9 +164,10 @@ def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> 
         reached = there.at.s
     first = own.factors[0] if count else np.nan
     if first > lost or (first <= reached and reached > point.at.s):
+        until = f", unstable from {lost:.4g} on" if lost < np.inf else ""
         return Buckling(
             np.full(count, np.nan), np.full_like(own.shapes[:, :count], np.nan),
-            f"the branch contradicts the linear estimate: stable up to {reached:.4g} of what is given",
+            f"the branch contradicts the linear estimate: stable up to {reached:.4g} of what is given{until}",
         )  # fmt: skip
     return Buckling(own.factors[:count], own.shapes[:, :count], own.reason)
 

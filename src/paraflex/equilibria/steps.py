@@ -22,8 +22,8 @@ from paraflex.mechanism import Mechanism, Start
 from paraflex.validity import warn
 
 # A limit point is looked for where the linear estimate is further away, as it is off by no more than its distance; and
-# no further along than so much of what is given.
-_NEAR, _FURTHEST = 0.01, 2.0
+# no further along than so much of what is given: further where estimates change along the branch by more than a part.
+_NEAR, _FURTHEST, _CHANGING_FURTHEST, _CHANGING = 0.01, 2.0, 5.0, 0.05
 
 
 @checked_arguments()
@@ -124,7 +124,7 @@ def _followed(
     except EquilibriumError as error:
         error.partial = Statics(equations, _checked(found, [], asked), "failed", str(error)) if found else None
         raise
-    return Statics(equations, _checked(found, _limit_beyond(branch, found[-1], asked), asked))
+    return Statics(equations, _checked(found, _limit_beyond(branch, found, asked), asked))
 
 
 def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibrium:
@@ -146,13 +146,16 @@ def _checked(found: list[Equilibrium], beyond: list[Equilibrium], asked: Statics
     return tuple(replace(one, buckling=checked(seen[k:], asked.buckling)) for k, one in enumerate(found))
 
 
-def _limit_beyond(branch: Branch, last: Equilibrium, asked: StaticsDefaults) -> list[Equilibrium]:
+def _limit_beyond(branch: Branch, found: list[Equilibrium], asked: StaticsDefaults) -> list[Equilibrium]:
     """The limit point beyond what is given, if the last equilibrium buckles by its estimate and there is one near."""
+    last = found[-1]
+    begun, ended = (float(np.min(one.buckling.factors[:1], initial=np.inf)) for one in (found[0], last))
+    furthest = _CHANGING_FURTHEST if abs(begun - ended) > _CHANGING * ended else _FURTHEST
     estimate = float(np.min(last.buckling.factors[:1], initial=np.inf)) / max(last.point.at.s, 1e-300)
     if not (last.vibrations.stable and 1.0 + _NEAR < estimate < np.inf):
         return []
     try:
-        for point in branch.follow(last.point, asked.steps, min(estimate, _FURTHEST)):
+        for point in branch.follow(last.point, asked.steps, min(estimate, furthest)):
             if point.limit:
                 return [_equilibrium(branch.equations, point, asked.buckling)]
     except EquilibriumError:
