@@ -126,6 +126,7 @@ def test_models_of_others_run_as_they_are(model):
     ("model", "said"),
     [
         (scipy.signal.lti(*LEAD), "is a continuous model"),
+        (scipy.signal.StateSpace([[0.5]], [[1.0]], [[np.nan]], [[0.0]], dt=T), "holds numbers that are not finite"),
         (lambda control: control.tf(*LEAD), "is a continuous model"),
         (scipy.signal.dlti([1.0, 0.0, 0.0], [1.0, 2.0], dt=T), "has no state space"),
         (lambda control: control.tf([1.0, 0.0, 0.0], [1.0, 2.0], T), "has no state space"),

@@ -93,7 +93,7 @@ def discrete_model(given: Any) -> DiscreteModel:
     Raises
     ------
     InputError
-        It is continuous.
+        It is continuous, or holds numbers that are not finite.
     """
     check_discrete(given.dt, given, "law", "model")
     labels = [_own_names(getattr(given, name, None)) for name in ("input_labels", "output_labels")]
@@ -154,7 +154,10 @@ def matrices_of(model: Any) -> StateSpace:
     except (ValueError, NotImplementedError) as error:
         raise InputError(f"has no state space: {error}", field="model", value=model,
                          remedy="give a proper transfer function, or a state space") from None  # fmt: skip
-    return StateSpace.of(model.A, model.B, model.C, model.D)
+    found = StateSpace.of(model.A, model.B, model.C, model.D)
+    if not all(np.all(np.isfinite(each)) for each in found):
+        raise InputError("holds numbers that are not finite", field="model", remedy="look at how it was computed")
+    return found
 
 
 def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:

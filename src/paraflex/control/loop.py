@@ -230,7 +230,7 @@ class Loop:
             raise _raised(name, error) from error
         torques = None if given is None else real_numbers(given)
         if torques is None:
-            kind = "complex numbers" if np.iscomplexobj(given) else type(given).__name__
+            kind = "complex numbers" if given is not None and np.iscomplexobj(given) else type(given).__name__
             raise LawFailure(f'controller "{name}" returned {kind}, no torques')
         torques = np.atleast_1d(torques)
         if torques.shape != (len(outputs),):

@@ -83,7 +83,8 @@ class Margins:
             name: {
                 "gain_up": one.gain_up, "gain_down": one.gain_down, "phase": float(np.rad2deg(one.phase)),
                 "delay": 1e3 * one.delay, "samples": one.delay / period, "peak": one.peak,
-                "crossover": float(np.max(one.crossovers, initial=0.0)) / (2.0 * np.pi), "stable": self.loop.stable,
+                "crossover": float(np.max(one.crossovers, initial=0.0)) / (2.0 * np.pi) if self.loop.stable else np.nan,
+                "stable": self.loop.stable,
             }
             for name, one in self.motors.items()
         }  # fmt: skip
