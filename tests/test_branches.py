@@ -313,6 +313,31 @@ def test_a_rate_given_at_a_change_point_chooses_the_branch(rate):
     assert np.max(off_by_turns(rocker[1:], expected)) < 3e-5
 
 
+@pytest.mark.parametrize("crank", [0.5, -0.5, 3.0])
+def test_a_drive_that_starts_at_a_change_point_away_from_the_assembly(crank):
+    """A parallelogram, led flat: its rocker goes on with the crank's rate, or three times against it."""
+    lengths, law = (0.4, 0.2, 0.4, 0.2), ConstantSpeed(0.0, 3.0)
+    assembled = Assembly("open", {"crank": crank, "coupler": 0.0, "rocker": crank})
+    mechanism = four_bar(lengths, 1.0, 1.0, law, assemblies=(assembled,))
+    with pytest.raises(InconsistentConstraintsError, match="a change point, at which two branches meet") as caught:
+        consistent_state(build_system(mechanism), None)
+    rates = [float(each) for each in re.search(r"rocker at (\S+) or (\S+) rad/s", str(caught.value)).groups()]
+    assert sorted(rates) == pytest.approx([-9.0, 3.0], rel=1e-5)
+    run = pf.simulate_motion(mechanism, 0.1, samples=2, start=Start(angular={"rocker": 3.0})).solution
+    assert run.v[0, [2, 5, 8]] == pytest.approx([3.0, 0.0, 3.0], abs=1e-6)
+    assert run.q[0, [2, 5, 8]] == pytest.approx(np.zeros(3), abs=1e-8)
+    assert run.q[-1, [2, 5, 8]] == pytest.approx([0.3, 0.0, 0.3], abs=1e-5)
+
+
+@pytest.mark.parametrize("crank", [0.5, -1.0])
+def test_a_drive_that_starts_at_a_dead_centre_away_from_the_assembly(crank):
+    with pytest.raises(InconsistentConstraintsError, match=r"a dead centre, with push at 1\.1 m") as caught:
+        consistent_state(build_system(slider_crank(polynomial(1.1, 0.0, -0.1), crank)), None)
+    rate = np.sqrt(0.2 / (0.3 + 0.3**2 / 0.8))
+    found = float(re.search(r"crank at (\S+) or", str(caught.value)).group(1))
+    assert abs(found) == pytest.approx(rate, rel=1e-5)
+
+
 def test_an_undriven_change_point_asks_for_a_rate():
     with pytest.raises(InputError, match=r"change point.* rocker at 0\.689898 or -0\.289898 rad/s"):
         pf.simulate_motion(folded(None), 0.1, start=Start(angular={"crank": 1.0}))

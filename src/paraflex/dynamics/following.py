@@ -25,6 +25,11 @@ _NEAR = 1e-9
 _SAME = 1e-5
 # Longest predicted step [sizes of the mechanism, rad], shortest as a part of the way, largest number of steps.
 _LONGEST, _SHORTEST, _MAX_STEPS = 0.25, 1e-9, 2000
+# Drives nearer to where they start than this, where steps shorten without end, start at a singular pose.
+_BARELY = 1e-4
+# A pose whose least singular value is this part of the largest, and as near to a singular pose, is that; and a move for
+# the slope of that value.
+_SINGULAR, _PROBE = 3e-6, 1e-4
 # A step is accepted if its correction, and the change of the direction, are smaller than these parts of it.
 _CORRECTION, _TURN = 0.25, 0.5
 
@@ -64,7 +69,8 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> tuple
                 system, signals, t, q, partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
             )
             same = np.max(np.abs(direct - found) / system.units) <= _SAME
-            return (q if same else found), ""
+            sharp = _sharpened(system, found)
+            return (q if same and sharp is found else sharp), ""
     return q, limit
 
 
@@ -126,6 +132,11 @@ def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array
         step *= 0.5
         if step < _SHORTEST:
             break
+    if (1.0 - part) * system.gap(away) < _BARELY:
+        # Where branches meet steps shorten without end.
+        found = pose_at(1.0, pose)
+        if found is not None and np.max(np.abs(found - pose) / system.units) < np.sqrt(_BARELY):
+            return found, ""
     held = drives_at(system, pose, set(np.flatnonzero(away).tolist()))
     return None, f"the joints bar the way from the assembly to the start of prescribed motions, {held}"
 
@@ -137,3 +148,24 @@ def _side(system: System, q: Array) -> float:
     if np.sum(rows) != len(rigid) or len(rigid) > DENSE_ROWS:
         return 0.0
     return float(np.linalg.slogdet(system.jacobian(q)[np.ix_(rows, rigid)])[0])
+
+
+def _sharpened(system: System, q: Array) -> Array:
+    """The singular pose that a closed pose is at but for the root of rounding; else the pose itself.
+
+    Along the direction in which loops hardly open their gap is a square, but the least singular value a line.
+    """
+    rows = system.packed.rows["kind"] == CONSTRAINT
+    if not 0 < np.sum(rows) <= min(DENSE_ROWS, system.n):
+        return q
+
+    def jacobian(q: Array) -> Array:
+        return system.jacobian(q)[rows] * system.units / system.row_units[rows, None]
+
+    left, sizes, right = np.linalg.svd(jacobian(q), full_matrices=False)
+    if sizes[-1] > _SINGULAR * sizes[0]:
+        return q
+    u, v = left[:, -1], right[-1]
+    slope = (u @ jacobian(q + _PROBE * system.units * v) @ v - sizes[-1]) / _PROBE
+    move = -sizes[-1] / slope if slope else np.inf
+    return q + move * system.units * v if abs(move) <= _SINGULAR else q
