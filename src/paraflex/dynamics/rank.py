@@ -104,7 +104,7 @@ def _dense(system: System, q: Array, rigid: NDArray[np.int64], threshold: float,
     units, columns = system.row_units[rigid], system.units.copy()
     for body in system.bodies:
         # Elastic coordinates are of unit modal mass: with this unit they move points by about the size.
-        columns[body.flexible] *= system.size * np.sqrt(body.integrals.m)
+        columns[body.flexible] *= system.size * np.sqrt(np.real(body.integrals.m))
     jacobian = system.jacobian(q)[rigid] * columns / units[:, None]
     factors = scipy.linalg.qr(jacobian.T, mode="r", pivoting=True)
     upper, order = np.asarray(factors[0]), np.asarray(factors[-1])
