@@ -209,7 +209,7 @@ def test_steps_from_sample_to_sample_are_fine_enough_for_the_laws(laws):
     for law in ("open loop", "unprojected", "pd+gauges"):
         for metric in CELL:
             coarse, fine = laws[f"{law}, square"]["++++"][metric], float(finely.data[metric].sel(law=law, mode="++++"))
-            # A step of an encoder, 0.16 mrad, is worth 0.05 N m of a damping of 0.3 N m s/rad: which sample it falls into
+            # A step of an encoder, 0.16 mrad, is worth 0.05 N m of a damping of 0.3 N m s/rad: which sample it falls in
             # is up to rounding, and moves what motors do against one another.
             rel = 2e-2 if metric == "internal_torque_max" else 5e-3
             assert coarse == pytest.approx(fine, rel=rel, abs=1e-7), (law, metric)
