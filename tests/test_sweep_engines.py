@@ -5,12 +5,15 @@ import os
 import signal
 import sys
 import time
+import urllib.error
+import urllib.request
 
 import pandas as pd
+import psutil
 import pytest
 
 from journals import rows_in
-from paraflex.campaign import LostCluster, Workers
+from paraflex.campaign import LostCluster, Workers, open_engine
 from paraflex.designs.run import Outcome, run_task
 from paraflex.errors import InputError
 from paraflex.studies import load_sweep, sweep
@@ -115,6 +118,24 @@ def test_dask_with_a_worker_killed_in_the_middle(study, table, tmp_path):
     assert killed[0] not in pids
     assert result.counts == {"complete": 24}
     assert result.table.read_bytes() == table
+
+
+def test_nobody_else_is_let_into_the_own_cluster():
+    """Keys are its own, all ports those of this machine, and none says what runs."""
+    engine = open_engine("dask", 1)
+    try:
+        address = engine._cluster.scheduler_address
+        assert address.startswith("tls://127.0.0.1:")
+        with pytest.raises(OSError, match=r"Timed out|closed|connect"):
+            distributed.Client(address.replace("tls://", "tcp://"), timeout=2, set_as_default=False)
+        own = psutil.Process()
+        open_ports = [one.laddr for each in (own, *own.children(recursive=True)) for one in each.net_connections()
+                      if one.status == psutil.CONN_LISTEN]  # fmt: skip
+        assert {place.ip for place in open_ports} <= {"127.0.0.1", "::1"}
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            urllib.request.urlopen(engine._cluster.dashboard_link, timeout=10)
+    finally:
+        engine.close()
 
 
 def test_a_cluster_that_goes_away_leaves_what_is_written(study, table, tmp_path):

@@ -162,8 +162,15 @@ class Dask(Engine):
             raise InputError("Dask is not installed", field="--engine", value=DASK, remedy=remedy) from None
         self._cluster = None
         if address is None:
-            quiet = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
-            self._cluster = _apart(lambda: distributed.LocalCluster(n_workers=workers, threads_per_worker=1, **quiet))
+            # Only this process has the keys, and no port shows what runs.
+            alone = {"security": distributed.Security.temporary(), "protocol": "tls://", "host": "127.0.0.1",
+                     "dashboard_address": "127.0.0.1:0", "worker_dashboard_address": None,
+                     "scheduler_kwargs": {"dashboard": False}, "silence_logs": logging.CRITICAL}  # fmt: skip
+            silent = {f"distributed.{each}.http.routes": [] for each in ("scheduler", "worker")}
+            with import_module("dask").config.set(silent):
+                self._cluster = _apart(
+                    lambda: distributed.LocalCluster(n_workers=workers, threads_per_worker=1, **alone)
+                )
         try:
             self._client = distributed.Client(address or self._cluster, timeout=_REACHED_WITHIN, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
