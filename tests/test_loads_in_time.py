@@ -590,3 +590,14 @@ def test_a_torque_that_is_large_for_a_moment_is_seen(tmp_path):
     pieces = "{ pieces = [{ until = 0.5, torque = 0 }, { until = 0.501, torque = 1e6 }, { torque = 0 }] }"
     model = load(written(tmp_path, f"torques = {{ drive = {pieces} }}\n[motor]\ndrive = 'O'\n"))
     assert "study.torques.drive" in [one.place for one in check(model) if one.code == "load-large"]
+
+
+@pytest.mark.parametrize("constant", ["log(0)", "exp(1000)", "1e308*10"])
+@pytest.mark.parametrize("form", ["{}", "[{{ until = 0.1, force = {} }}, {{ force = [0, 0] }}]"])
+def test_constants_of_loads_that_are_not_finite(tmp_path, constant, form):
+    key = "pieces" if "until" in form else "force"
+    force = form.format(f'["{constant}", 0]')
+    text = library_file("four_bar").read_text(encoding="utf-8")
+    (tmp_path / "model.toml").write_text(f'{text}\n[load.tool]\ntype = "force"\npoint = "coupler.B"\n{key} = {force}\n')
+    with pytest.raises(InputError, match=r"load\.tool.*: (not a finite number|too large a number)"):
+        load(tmp_path / "model.toml")

@@ -333,3 +333,13 @@ def test_newtons_failure_at_a_fixed_step_is_typed_and_keeps_what_was_computed(me
     assert caught.value.moment.time < 1.0
     assert caught.value.partial.status == "failed"
     assert caught.value.partial.t.size == 1
+
+
+@pytest.mark.parametrize("value", [1, np.float32(1.0), np.array(1.0), True])
+def test_numbers_of_options_are_converted_once(value):
+    """Kernels would be compiled anew for another type of number."""
+    options = IntegrationOptions(step=value, alpha=value)
+    assert type(options.step) is type(options.alpha) is float
+    for wrong in (1j, 10**400):
+        with pytest.raises(InputError, match="step: is no real number"):
+            IntegrationOptions(step=wrong)

@@ -333,5 +333,6 @@ def _expression(given: float | str, parameters: Mapping[str, float], field: str,
     if not isinstance(given, str):
         return ConstantSpeed(given, speed)
     if is_constant(given):
-        return ConstantSpeed(evaluate(given, parameters), speed)
+        with expressed_in(field, given):
+            return ConstantSpeed(evaluate(given, parameters), speed)
     return ExpressionLaw(given, parameters, field)
