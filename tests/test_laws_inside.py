@@ -306,6 +306,7 @@ def test_what_stays_outside():
     (lambda: CompiledLaw(len), "function"),
     (lambda: CompiledLaw(pd, states=-1), "states"),
     (lambda: CompiledLaw(pd, states=10**9), "states"),
+    (lambda: SampledController(CompiledLaw(pd), inputs=["hub", "rate"], period=1e-10), "period"),
     (lambda: SampledController(CompiledLaw(lambda k, t, y, x, u: u.nothing()), **BOTH), "cannot be compiled"),
 ])  # fmt: skip
 def test_bad_compiled_laws(make, said):

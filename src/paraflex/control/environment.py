@@ -23,6 +23,7 @@ from paraflex.dynamics.joint_coordinates import marker_position
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Method
 from paraflex.kinematics import ModelWithPaths
+from paraflex.limits import SAMPLES, at_most
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import not_negative, positive
@@ -308,6 +309,7 @@ def _members(mechanism: Mechanism) -> tuple[tuple[str, ...], ...]:
 
 def _instants(start: float, end: float, period: float) -> Array:
     """Instants (k,) of observations [s]: the start, then ends of periods, the last one shorter."""
+    at_most((end - start) / period, 10 * SAMPLES, "period", "too short for the duration: too many periods")
     count = max(1, int(np.ceil((end - start) / period - _SAME)))
     times = start + period * np.arange(count + 1, dtype=np.float64)
     times[-1] = end

@@ -24,6 +24,7 @@ from paraflex.control.together import SAME, whole_and_part
 from paraflex.errors import InputError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.sampled import NOT_FINITE, RAISED, SAMPLED, WRONG, SampledLaw
+from paraflex.limits import SAMPLES, at_most
 
 
 class CompiledLaw:
@@ -112,6 +113,7 @@ def sampled_law(
     if linear is None and type(law) is not CompiledLaw:
         return None
     inputs, start, period = len(plant.inputs), plant.state.time, plant.period
+    at_most((end - start) / period, 10 * SAMPLES, "period", "too short for the duration: too many samples")
     count = max(ceil((end - start) / period - SAME), 1)
     filters = _filters(controller, inputs)
     given = _law_arrays(linear, law, inputs, len(outputs))
