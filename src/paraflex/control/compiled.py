@@ -83,7 +83,7 @@ def checked(function: Any, done: dict[int, Any]) -> Any:
     ----------
     function : numba dispatcher
     done : dict
-        What has been made so far, by the `id` of what it was made of; functions may call one another.
+        Checked functions made so far, by the `id` of the original; functions may call one another.
     """
     if id(function) in done:
         return done[id(function)]

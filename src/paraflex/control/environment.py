@@ -17,13 +17,12 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.observations import WIDEST, Observer, observed_sensors
 from paraflex.control.simulation import Simulation
-from paraflex.control.together import by_name, checked_number
+from paraflex.control.together import by_name, checked_number, periods_in
 from paraflex.dynamics import State
 from paraflex.dynamics.joint_coordinates import marker_position
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Method
 from paraflex.kinematics import ModelWithPaths
-from paraflex.limits import SAMPLES, at_most
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import not_negative, positive
@@ -38,8 +37,6 @@ else:
         from paraflex.control.no_gymnasium import Env
 
 Reward = Callable[[Simulation, Mapping[str, float], Array], float]
-# A last period of less than this part of one is none.
-_SAME = 1e-9
 # Beside the feed-forward actions are corrections, of this part of its torques.
 _CORRECTING = 0.1
 # With 0.25 ms deviations of RAParM-I are exact to a hundredth.
@@ -309,8 +306,7 @@ def _members(mechanism: Mechanism) -> tuple[tuple[str, ...], ...]:
 
 def _instants(start: float, end: float, period: float) -> Array:
     """Instants (k,) of observations [s]: the start, then ends of periods, the last one shorter."""
-    at_most((end - start) / period, 10 * SAMPLES, "period", "too short for the duration: too many periods")
-    count = max(1, int(np.ceil((end - start) / period - _SAME)))
+    count = periods_in(end - start, period)
     times = start + period * np.arange(count + 1, dtype=np.float64)
     times[-1] = end
     return times

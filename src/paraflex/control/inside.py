@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil
 from types import FunctionType
 from typing import Any
 
@@ -20,11 +19,10 @@ from paraflex.control.discrete import DiscreteModel
 from paraflex.control.linear_law import LinearLaw
 from paraflex.control.readings import Readings
 from paraflex.control.references import AtSamples
-from paraflex.control.together import SAME, whole_and_part
+from paraflex.control.together import SAME, periods_in, whole_and_part
 from paraflex.errors import InputError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.sampled import NOT_FINITE, RAISED, SAMPLED, WRONG, SampledLaw
-from paraflex.limits import SAMPLES, at_most
 
 
 class CompiledLaw:
@@ -113,8 +111,7 @@ def sampled_law(
     if linear is None and type(law) is not CompiledLaw:
         return None
     inputs, start, period = len(plant.inputs), plant.state.time, plant.period
-    at_most((end - start) / period, 10 * SAMPLES, "period", "too short for the duration: too many samples")
-    count = max(ceil((end - start) / period - SAME), 1)
+    count = periods_in(end - start, period)
     filters = _filters(controller, inputs)
     given = _law_arrays(linear, law, inputs, len(outputs))
     states, kept = given["A"].shape[0], filters["filter_A"].shape[0]
@@ -158,7 +155,7 @@ def wrong_torques(law: SampledLaw) -> list[int]:
 
 
 def exception_of(law: SampledLaw, controller: Any) -> Exception | None:
-    """What a controller's compiled function raised, where that ended a run: its last sample is taken again."""
+    """Exception of a controller's compiled function that ended a run, by a repetition of the last sample; else None."""
     if law.counts[WRONG] != RAISED:
         return None
     k, function = int(law.counts[SAMPLED]), controller.law

@@ -462,8 +462,9 @@ class Simulation:
             self._integration.march(until, on_progress=on_progress)
         finally:
             self._note_inside()
-        if self._loop is not None and self._loop.failure is not None:
-            raise self._loop.failure
+        failure = None if self._loop is None else self._loop.failure
+        if failure is not None:
+            raise failure
         if not (self._integration.goes_on or self.ended):
             self.result()
 

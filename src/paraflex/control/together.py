@@ -11,12 +11,14 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError
+from paraflex.limits import SAMPLES
 from paraflex.mechanism.quantities import all_known, known, positive
 
 # One number, or one for each of some names.
 Numbers = float | Mapping[str, float]
 # Instants closer than this part of the shortest period are one.
 SAME = 1e-9
+_MOST_PERIODS = 10 * SAMPLES
 
 
 def is_number(value: Any) -> bool:
@@ -141,6 +143,20 @@ def check_whole(names: Sequence[str]) -> None:
             f'gives the whole torque, as "{names[0]}" does', field=names[1],
             remedy="let one of the two act, or put a feedback law beside it",
         )  # fmt: skip
+
+
+def periods_in(duration: float, period: float) -> int:
+    """Number of periods in a duration [s], at least one; a last one of less than `SAME` of one does not count.
+
+    Raises
+    ------
+    InputError
+        More than memory holds samples of.
+    """
+    if duration / period > _MOST_PERIODS:
+        raise InputError("is too short for the duration: more samples than memory holds", field="period", value=period,
+                         remedy=f"at least {duration / _MOST_PERIODS:.2g} s")  # fmt: skip
+    return max(1, math.ceil(duration / period - SAME))
 
 
 def real_numbers(given: Any) -> Array | None:

@@ -134,9 +134,9 @@ def sensitivity_at_sample(tableau, k, i, long, history, sensitivity):
                 sensitivity.sample_q[i, j] += WEIGHTS[e] * q / DIFFERENCE_STEP
                 sensitivity.sample_v[i, j] += WEIGHTS[e] * v / DIFFERENCE_STEP
                 sensitivity.sample_a[i, j] += WEIGHTS[e] * a / DIFFERENCE_STEP
-    done = min(max((time - t) / h, 0.0), 1.0)
-    d_done, left = (d_time - (time - t) / h * sensitivity.h[k]) / h, 1.0 - done
     fraction = (time - t) / h
+    done = min(max(fraction, 0.0), 1.0)
+    d_done, left = (d_time - fraction * sensitivity.h[k]) / h, 1.0 - done
     node_sensitivity(tableau, fraction, d_done, history.lam[k], sensitivity.lam, sensitivity.sample_lam[i])
     if long:
         node_sensitivity(tableau, fraction, d_done, history.q[k], sensitivity.q, sensitivity.sample_q[i])
