@@ -225,7 +225,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
     first = place_samples(tableau, t, h, is_long(system, tableau, controls, h), march, out)
     # Near a singular position forces have poles.
-    if h >= controls.solved_from and march.counts[NEAR] == 0:
+    if march.counts[NEAR] == 0:
         solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
     write_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)

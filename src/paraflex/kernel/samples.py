@@ -15,6 +15,7 @@ from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
     BAUMGARTE,
+    CONTRACTION,
     PEAK,
     SAMPLE,
     SAMPLE_CHANGE,
@@ -93,7 +94,7 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
     samples are solved.
     """
     for i in range(first, march.counts[SAMPLE]):
-        needed = out.asked[i] or march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN
+        needed = out.asked[i] or (h >= controls.solved_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
         if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
             out.solved[i] = solve_sample(system, signals, controls, i, march, work, out, aside)
 
@@ -111,7 +112,8 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
     begin_sample(q, v, a, g, b, march)
     copy(a, march.eq)
     copy(lam, march.guess_lam)
-    solved = solve_at(system, signals, out.times[i], weights, g, b, march, work, a, lam, march.torques)
+    contraction = march.clock[CONTRACTION]
+    solved = solve_at(system, signals, out.times[i], weights, g, b, contraction, march, work, a, lam, march.torques)
     if not solved:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
@@ -120,7 +122,10 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
         note_all_axial_forces(system, q, v, a, lam, aside, aside.geometric)
         factor_bodies(system, b, q, aside)
         orient(system, q, aside, controls.dependent_part)
-        solved = solve_at(system, signals, out.times[i], weights, g, b, march, aside, a, lam, march.torques)
+        contraction = WORST_CONTRACTION
+        solved = solve_at(
+            system, signals, out.times[i], weights, g, b, contraction, march, aside, a, lam, march.torques
+        )
     for r in range(lam.size):
         work.mu[r] = lam[r] - march.guess_lam[r] if solved else 0.0
     known = system.modal.shape[1] == 0 and largest(march.forces[PEAK]) > 0.0
@@ -142,9 +147,9 @@ def begin_sample(q, v, a, g, b, march):
 
 
 @routine
-def solve_at(system, signals, t, weights, g, b, march, work, a, lam, torques):
+def solve_at(system, signals, t, weights, g, b, contraction, march, work, a, lam, torques):
     """Newton's iteration at a sample, until forces are right to FORCES of the largest; whether it gets there."""
-    previous, contraction = 0.0, WORST_CONTRACTION
+    previous = 0.0
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     note_torques(signals, t, torques)
     for _ in range(MOST):
