@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 import paraflex as pf
+from paraflex.designs.derivatives.plans import given_torques
 from paraflex.dynamics import constant_signals, law_signal, pack_signals
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_loads import drive_torques, joint_loads
 from paraflex.errors import IntegrationError
 from paraflex.files.laws import ExpressionLaw
+from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.limits import step_limits
 from paraflex.results.loads import load_figures
 from shell import paraflex
@@ -327,3 +329,19 @@ def test_deflections_follow_a_slow_load(method):
     tip = data["point_position"].sel(point="arm.tip", axis="y").to_numpy()
     # It starts at rest, which leaves a vibration of 0.1 %.
     assert np.max(np.abs(tip - force * L**3 / (3.0 * EI))) < 0.003 * 500.0 * L**3 / (3.0 * EI)
+
+
+@pytest.mark.parametrize(
+    "chosen", [{"method": "esdirk5", "step": 1e-3, "tolerance": 1e-3}, {"method": "esdirk5"}, {"method": "tr-bdf2"}]
+)
+def test_samples_within_short_steps_solve_the_equations_of_motion(tracking, chosen):
+    """Curves between stages are up to 10 % of the largest force away from that with steps of 1 ms of esdirk5."""
+    options = pf.IntegrationOptions(**chosen)
+    run = pf.simulate(tracking, "++++", warning=False, options=options)
+    form = OdeForm(given_torques(tracking, options, run.torques).problem, options)
+    found = [form.solve(*state) for state in zip(run.solution.t, run.solution.q, run.solution.v, strict=True)]
+    for exact, of_run in (
+        (np.array([one.multipliers for one in found]), run.solution.multipliers),
+        (np.array([one.a for one in found]), run.solution.a),
+    ):
+        np.testing.assert_allclose(of_run, exact, rtol=0, atol=1e-4 * np.abs(exact).max())

@@ -249,11 +249,10 @@ def _turning(system: System) -> NDArray[np.int64]:
     return np.array([body.angle for body, one in zip(system.bodies, matters, strict=True) if one], dtype=np.int64)
 
 
-def _solved_from(system: System) -> float:
-    """Steps from which on samples are solved: all of rigid mechanisms, of flexible ones those long beside vibrations.
+def _long_from(system: System) -> float:
+    """Length of steps from which on they are long beside vibrations: all are where no body is flexible.
 
-    Accelerations of deflections that follow loads are inaccurate there, and velocities with them. Shorter steps are as
-    right between stages as at them.
+    Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them.
     """
     fastest = max((float(np.min(body.modes.omega)) for body in system.bodies if body.nf), default=np.inf)
     return _FOLLOWS / fastest
@@ -290,7 +289,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         by_cycle=int(options.step is None and options.per is TolerancePer.CYCLE),
         force_part=options.force_part(system),
         force_control=int(options.control_for(system) is Control.FORCES),
-        solved_from=_solved_from(system),
+        long_from=_long_from(system),
         newton_fraction=options.newton_fraction or method.newton_fraction,
         alpha=options.alpha,
         beta=options.beta,

@@ -53,7 +53,7 @@ def interpolate(q0, v0, a0, q1, v1, a1, h, x):
 @inlined
 def is_long(system, tableau, controls, h):
     """Whether a step is long beside all vibrations of flexible bodies, and has stages for a curve through them."""
-    return system.modal.shape[1] > 0 and h >= controls.solved_from and tableau.nodes.size > 2
+    return system.modal.shape[1] > 0 and h >= controls.long_from and tableau.nodes.size > 2
 
 
 @routine
@@ -88,13 +88,13 @@ def place_samples(tableau, t, h, long, march, out):
 def solve_samples(system, signals, controls, t, h, first, march, work, out, aside):
     """Solve the equations of motion at the samples within the step that are not at its end.
 
-    Of samples that only serve to find the largest loads those are left that the last one solved lets expect to be near.
-    Each is a stage of its own, with the g and b of the last one and such explicit parts that q and v are those between
-    the stages where the acceleration is. Deflections of flexible bodies are not between stages where forces are: all
-    samples are solved.
+    Of samples that only serve to find the largest loads those are left that the last one solved lets expect to be near,
+    or that are in a step short beside vibrations. Each is a stage of its own, with the g and b of the last one and such
+    explicit parts that q and v are those between the stages where the acceleration is. Deflections of flexible bodies
+    are not between stages where forces are: they are solved whatever the last one said.
     """
     for i in range(first, march.counts[SAMPLE]):
-        needed = out.asked[i] or (h >= controls.solved_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
+        needed = out.asked[i] or (h >= controls.long_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
         if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
             out.solved[i] = solve_sample(system, signals, controls, i, march, work, out, aside)
 
