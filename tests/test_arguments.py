@@ -444,9 +444,12 @@ def test_the_first_mechanism_of_a_newcomer_can_be_written_in_texts():
     assert pickle.loads(pickle.dumps(made)) == made
 
 
-def test_numbers_of_arrays_and_of_a_complex_step_are_numbers():
-    for mass in (np.float32(2.0), np.int64(2), np.array(2.0), 2.0 + 1e-20j):
+def test_numbers_of_arrays_are_numbers_and_what_no_float_can_be_is_none():
+    for mass in (np.float32(2.0), np.int64(2), np.array(2.0)):
         assert RigidBody("rod", mass, 0.1).mass == mass
+    for mass in (2.0 + 1e-20j, 10**400, np.array(2j), np.array("2"), np.datetime64("2026-01-01")):
+        with pytest.raises(InputError, match="mass: not a number"):
+            RigidBody("rod", mass, 0.1)
     assert WeldJoint("O", "a.b", "c.d", np.pi).angle == np.pi
 
 

@@ -9,16 +9,18 @@ from __future__ import annotations
 import collections.abc as abc
 import sys
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache, reduce, wraps
 from inspect import signature
-from numbers import Integral, Number
+from numbers import Integral, Real
 from operator import or_
 from pathlib import PurePath
 from types import NoneType, UnionType
 from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
 
 from paraflex.errors import InputError, as_enum
 
@@ -29,6 +31,8 @@ C = TypeVar("C")
 _UNIONS = (typing.Union, UnionType)
 _LISTS = (tuple, list, abc.Sequence, abc.Iterable)
 _TABLES = (dict, abc.Mapping)
+# Arrays of real numbers, and the largest whole number of compiled code.
+_REAL, _MOST = tuple("biuf"), 2**63 - 1
 
 # Takes what is given and the name of its field; returns what is wanted.
 Take = Callable[[Any, str], Any]
@@ -174,6 +178,8 @@ def _take_as(hint: Any, _spelling: str) -> Take | None:
         return _as_one_of(hint, inner)
     if _is_row(hint):
         return _as_row(hint, inner)
+    if origin is np.ndarray:
+        return numbers_in if inner[1] in (np.dtype[np.float64], np.dtype[np.int64]) else None
     if origin in _LISTS:
         return _as_many(hint, inner[0], tuple if origin is tuple else list)
     if origin in _TABLES or hint is dict:
@@ -204,16 +210,25 @@ def _as_text(value: Any, field: str) -> Any:
     if isinstance(value, str):
         return value
     name = getattr(value, "name", None)
-    if is_dataclass(value) and isinstance(name, str):
+    if (is_dataclass(value) or hasattr(value, "_fields")) and isinstance(name, str):
         return name
     raise refused(value, field, "a text", "give a text in quotes")
 
 
+def _is_number(value: Any) -> bool:
+    """Whether a value is a real number that a float can be, or an array of one."""
+    if isinstance(value, Integral):
+        return abs(int(value)) <= sys.float_info.max
+    return isinstance(value, Real) or (getattr(value, "ndim", None) == 0 and value.dtype.kind in _REAL)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool) and abs(int(value)) <= _MOST
+
+
 _PLAIN: dict[Any, Take | None] = {
-    float: _plain_of(lambda value: isinstance(value, float | Number) or getattr(value, "ndim", None) == 0,
-                     "a number", "give a number"),
-    int: _plain_of(lambda value: isinstance(value, Integral) and not isinstance(value, bool),
-                   "a whole number", "give a whole number"),
+    float: _plain_of(_is_number, "a number", "give a number"),
+    int: _plain_of(_is_whole, "a whole number", "give a whole number"),
     bool: _plain_of(lambda value: isinstance(value, bool) or getattr(getattr(value, "dtype", 0), "kind", "") == "b",
                     "True or False", "give one of the two"),
     str: _as_text, Any: None, object: None, NoneType: None,
@@ -279,17 +294,40 @@ def _as_row(hint: Any, kinds: Sequence[Any]) -> Take:
     return take
 
 
+def numbers_in(value: Any, field: str, kinds: Collection[str] = _REAL) -> Any:
+    """The array of real numbers, or of other kinds of them, that NumPy makes of a value.
+
+    Raises
+    ------
+    InputError
+        Something else.
+    """
+    if not isinstance(value, str | bytes | Mapping):
+        try:
+            made = np.asarray(value)
+        except ValueError:
+            made = np.empty(0, dtype=object)
+        if made.dtype.kind in kinds:
+            return made
+    raise refused(value, field, "an array of numbers", "give an array of numbers")
+
+
 def _as_many(hint: Any, kind: Any, collect: Callable[[Iterable[Any]], Any]) -> Take:
     """Any number of one type; one alone is a list of one."""
     one = take_as(kind)
 
     def take(value: Any, field: str) -> Any:
-        alone = is_dataclass(value) and not isinstance(value, Sequence)
+        numbers = getattr(getattr(value, "dtype", None), "kind", "") in _REAL
+        alone = (is_dataclass(value) and not isinstance(value, Sequence)) or getattr(value, "ndim", 1) == 0
         if isinstance(value, str | Mapping) or alone or not isinstance(value, Iterable):
             if value is None or one is None:
                 raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
             return collect([one(value, field)])
-        if one is None or hasattr(value, "dtype"):
+        if one is None or (numbers and kind is float and getattr(value, "ndim", 1) == 1):
+            return value
+        if numbers:
+            for each in value:
+                one(each, field)
             return value
         return _same(value, collect(one(each, field) for each in value))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 
+from paraflex.arguments import checked_arguments
 from paraflex.checks.pose import Examination, examine, pose_findings
 from paraflex.checks.start import start_findings
 from paraflex.checks.study import path_findings, study_findings, task_findings
@@ -26,6 +27,7 @@ def loaded(model: Model | Mechanism | str | FilePath) -> Model | Mechanism:
     raise InputError("not a model", field="model", value=model, remedy="give a model, a mechanism, or a file's name")
 
 
+@checked_arguments()
 def check(
     model: Model | Mechanism | str | FilePath,
     *,

@@ -6,14 +6,18 @@ import warnings
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
+from paraflex.arguments import checked_arguments
 from paraflex.checks.check import loaded
-from paraflex.errors import ModelWarning
+from paraflex.errors import InputError, ModelWarning
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.results.posed import Posed, posed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+# Within which there is room for a drawing beside its margins [mm].
+_NARROWEST = 20.0
 
 
 def pose_of(
@@ -46,6 +50,7 @@ def pose_of(
     return posed(model.mechanism, assembly or model.study.assembly, followed, model.start, duration)
 
 
+@checked_arguments()
 def draw(
     model: Model | Mechanism | str | FilePath,
     *,
@@ -77,6 +82,9 @@ def draw(
         See `pose_of`.
     """
     from paraflex.plots.model_drawing import model_drawing  # Matplotlib takes long to import
+
+    if not width >= _NARROWEST:
+        raise InputError("too narrow", field="width", value=width, remedy=f"at least {_NARROWEST:g} mm")
 
     shown = pose_of(model, assembly=assembly, path=path)
     for problem in shown.problems:

@@ -9,12 +9,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import positive
 
 
+@checked_arguments()
 def quantisation_noise(resolution: float) -> float:
     """Standard deviation of what rounding to multiples of a resolution adds, resolution / sqrt(12), in its unit.
 
@@ -173,6 +175,7 @@ class Differentiator:
         A number that is not positive.
     """
 
+    @checked_arguments()
     def __init__(self, period: float, resolution: float, acceleration: float) -> None:
         positive(period, "period", "s")
         positive(acceleration, "acceleration", "the unit of the readings per s^2")
@@ -238,6 +241,7 @@ class BackwardDifference:
         A number that is not positive.
     """
 
+    @checked_arguments()
     def __init__(self, period: float, cutoff: float | None = None) -> None:
         positive(period, "period", "s")
         self.period: float = period

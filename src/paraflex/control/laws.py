@@ -179,6 +179,7 @@ def torque_projectors(effort: Effort, motors: Sequence[str]) -> Array:
     return np.linalg.pinv(B) @ B
 
 
+@checked_arguments()
 def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Array) -> Array:
     """The part (I - P) tau (k, motors) of torques (k, motors) that only strains links, at the first samples of a task.
 
@@ -192,7 +193,10 @@ def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Arr
     names = [motor.name for motor in task.mechanism.motors]
     active = [name for name in names if name in task.mode(mode).motors]
     columns = [names.index(name) for name in active]
-    P = torque_projectors(task.effort, active)[: len(torques)]
+    P = torque_projectors(task.effort, active)[: len(torques) if torques.ndim else 0]
+    if torques.shape != (len(P), len(names)):
+        raise InputError("has not one row a sample, a column a motor", field="torques", value=torques.shape,
+                         remedy=f"give at most {len(task.effort)} x {len(names)} numbers")  # fmt: skip
     out = np.zeros_like(torques)
     out[:, columns] = torques[:, columns] - np.einsum("kij,kj->ki", P, torques[:, columns])
     # Of as many motors as degrees of freedom nothing is left but rounding.

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from paraflex.arguments import checked_arguments
+from paraflex.arguments import checked_arguments, numbers_in
 from paraflex.arrays import Array
 from paraflex.control.coloured import disturbed_plant
 from paraflex.control.estimators import kalman_filter, riccati
@@ -236,7 +236,7 @@ def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
     whole = np.zeros((size, size))
     if given is None:
         return whole
-    matrix = np.asarray(given, dtype=float)
+    matrix = np.asarray(numbers_in(given, field), dtype=float)
     if matrix.shape not in ((plant.own, plant.own), (size, size)) or not np.all(np.isfinite(matrix)):
         raise InputError("has not the numbers it should have", field=field, value=matrix.shape,
                          remedy=f"give {plant.own} x {plant.own} finite numbers")  # fmt: skip

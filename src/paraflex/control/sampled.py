@@ -84,6 +84,7 @@ class SampledPlant:
         own = np.linalg.eigvals(self.A[: self.own, : self.own])
         return np.concatenate([own, np.zeros(len(self.states) - self.own)]).astype(complex)
 
+    @checked_arguments()
     def rows(self, names: Sequence[str], field: str = "outputs") -> Array:
         """Rows of C (names, n) of some outputs.
 
@@ -94,6 +95,7 @@ class SampledPlant:
         """
         return self.C[places(names, self.outputs, field, "output")]
 
+    @checked_arguments()
     def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> SampledPlant:
         """The plant with some outputs, and with torques of some inputs; the others are zero.
 

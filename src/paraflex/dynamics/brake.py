@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from paraflex.arrays import Array
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import moment_signals
@@ -14,19 +12,7 @@ from paraflex.dynamics.sparse import sparse_mass
 from paraflex.dynamics.state import State, project_velocity
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import PrescribedAngle
-
-
-@dataclass(frozen=True)
-class HeldAngle:
-    """An angle [rad], or a travel [m], that does not change."""
-
-    value: float
-    knots: tuple[float, ...] = ()
-    breaks: tuple[float, ...] = ()
-
-    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Value, rate and acceleration at times t."""
-        return np.full(t.shape, self.value), np.zeros(t.shape), np.zeros(t.shape)
+from paraflex.mechanism.laws import HeldAngle as HeldAngle
 
 
 @dataclass(frozen=True)

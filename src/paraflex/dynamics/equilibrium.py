@@ -107,12 +107,14 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
     n, m = system.n, system.m
     residual = _Residual(system, start, held)
     z = np.concatenate([start.q, np.zeros(m + len(held))])
-    # Without dimension: forces by the mechanism's inertia, mass at its size; modes such that their stiffness is one.
-    inertia, units = system.total_mass * system.size**2, np.append(1.0 / system.row_units, np.ones(len(held)))
-    scale, by_force = np.append(system.units, inertia * units), np.append(system.units / inertia, units)
+    # Without dimension: forces by the energy of the mass at the mechanism's size and the slowest vibration of a body;
+    # modes such that their stiffness is one.
+    energy = system.total_mass * (system.size * system.slowest) ** 2
+    units = np.append(1.0 / system.row_units, np.ones(len(held)))
+    scale, by_force = np.append(system.units, energy * units), np.append(system.units / energy, units)
     for body in system.bodies:
-        scale[body.flexible] = np.sqrt(inertia) / np.maximum(body.modes.omega, 1.0)
-        by_force[body.flexible] = scale[body.flexible] / inertia
+        scale[body.flexible] = np.sqrt(energy) / body.modes.omega
+        by_force[body.flexible] = scale[body.flexible] / energy
     for _ in range(_MAX_ITERATIONS):
         if motion is not None:
             residual.v, residual.a = motion(z[:n])
@@ -120,11 +122,14 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
         jacobian = np.column_stack(
             [(by_force * residual(z + _DIFFERENCE * unit) - value) / _DIFFERENCE for unit in np.diag(scale)]
         )
-        # Dependent rows and motors that hold one another leave multipliers open: those of least norm.
-        change = scale * np.linalg.lstsq(jacobian, -value, rcond=1e-12)[0]
-        reach = _largest_move(system, change[:n])
+        # Rows of soft springs have large entries. Dependent rows and motors that hold one another leave multipliers
+        # open: those of least norm.
+        largest = np.max(np.abs(jacobian), axis=1)
+        largest[largest == 0.0] = 1.0
+        change = scale * np.linalg.lstsq(jacobian / largest[:, None], -value / largest, rcond=1e-12)[0]
+        reach = largest_move(system, change[:n])
         z += change * min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
-        if reach <= _SMALLEST_MOVE and inertia * np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_effort:
+        if reach <= _SMALLEST_MOVE and energy * np.max(np.abs(value[:n])) <= _BALANCED * residual.largest_effort:
             return z[:n]
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), z[:n], _HOLD)
 
@@ -153,7 +158,7 @@ def _sparse_equilibrium(system: System, start: State, held: Sequence[str], motio
             break
         if not np.all(np.isfinite(change)):
             break
-        reach = _largest_move(system, change)
+        reach = largest_move(system, change)
         part = min(1.0, _LONGEST_STEP / max(reach, _LONGEST_STEP))
         q, mu = q + part * change, mu + part * more
         largest = max(np.max(np.abs(system.row_units * lam), initial=0.0), np.max(np.abs(mu), initial=0.0))
@@ -172,7 +177,7 @@ def _solve(K: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, f: Array, r: 
     return z[: f.size], z[f.size :] * size
 
 
-def _largest_move(system: System, change: Array) -> float:
+def largest_move(system: System, change: Array) -> float:
     """The largest displacement or turn of links by a change of coordinates [sizes of the mechanism, rad]."""
     return max(float(np.max(np.abs(change / system.units)[body.offset : body.offset + 3])) for body in system.bodies)
 

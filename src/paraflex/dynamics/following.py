@@ -14,11 +14,12 @@ from paraflex.dynamics.joint_coordinates import value_text
 from paraflex.dynamics.projection import assemble, closed, constraint_change
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.system import System
+from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import CONSTRAINT, Signals
 from paraflex.mechanism import PrescribedAngle
 
-# Weight of stiffness against mass [s^2] when loops are closed: links move, their deflections stay as given.
-POSITION_STIFFNESS = 1.0
+# Weight of stiffness in `link_metric` when loops are closed: links move, their deflections stay as given.
+POSITION_STIFFNESS = 1e6
 # Prescribed motions nearer to the pose than this start there [sizes of the mechanism, rad].
 _NEAR = 1e-9
 # Poses nearer to one another than this are one [sizes of the mechanism, rad].
@@ -34,7 +35,7 @@ _SINGULAR, _PROBE = 3e-6, 1e-4
 _CORRECTION, _TURN = 0.25, 0.5
 
 
-def follow_drives(system: System, signals: Signals, t: float, q: Array) -> tuple[Array, str]:
+def follow_drives(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Move a pose until prescribed motions are at their values, along the poses that the joints allow.
 
     Whole turns of a drive are added to the angle of the body it turns; if the rest of the way is barred, or gears turn
@@ -50,18 +51,23 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> tuple
 
     Returns
     -------
-    q : (n,) array
-        Coordinates with the drives at their values; as given if the way there is barred, or if closing the loops from
-        there leads to the same pose.
-    limit : str
-        Limit of reach that bars the way; empty for none.
+    (n,) array
+        Coordinates with the drives at their values; as given if closing the loops from there leads to the same pose, or
+        if they close nowhere near.
+
+    Raises
+    ------
+    AssemblyError
+        A limit of reach bars the way, or a pose where branches meet.
     """
-    away, limit = _away(system, signals, t, q), ""
+    away = _away(system, signals, t, q)
     joints = [one.joint for one in system.mechanism.prescribed]
     # Motions of one joint that disagree are at no pose.
     if system.gap(away) <= _NEAR or len(set(joints)) < len(joints):
-        return q, limit
-    for begun in (_turned(system, signals, t, q, away), q):
+        return q
+    limits = []
+    ways = (_turned(system, signals, t, q, away), q, _turned(system, signals, t, q, away, other_way=True))
+    for begun in ways:
         found, limit = _follow(system, signals, t, begun)
         if found is not None:
             # Where closing at once leads to the same pose it is left to the caller, with fewer roundings.
@@ -70,8 +76,12 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> tuple
             )
             same = np.max(np.abs(direct - found) / system.units) <= _SAME
             sharp = _sharpened(system, found)
-            return (q if same and sharp is found else sharp), ""
-    return q, limit
+            return q if same and sharp is found else sharp
+        limits.append(limit)
+    if not limits[0]:
+        return q
+    remedy = "start prescribed motions within reach of the assembly, or give one near to where they start"
+    raise AssemblyError(limits[0], Moment(t, 0), q, remedy)
 
 
 def driven_rows(system: System) -> Iterator[tuple[PrescribedAngle, int]]:
@@ -92,14 +102,19 @@ def _away(system: System, signals: Signals, t: float, q: Array) -> Array:
     return np.where(system.packed.rows["signal"] >= 0, system.constraints(signals, t, q)[0], 0.0)
 
 
-def _turned(system: System, signals: Signals, t: float, q: Array, away: Array) -> Array:
-    """The pose with whole turns of drives; as it is if other constraints do not allow them."""
+def _turned(system: System, signals: Signals, t: float, q: Array, away: Array, *, other_way: bool = False) -> Array:
+    """The pose with whole turns of drives; as it is if other constraints do not allow them.
+
+    What is left is the shorter way to where they start, or the other way round.
+    """
     turned = q.copy()
     for motion, row in driven_rows(system):
         joint = system.mechanism.joint(motion.joint)
         moved, sign = (joint.a, 1.0) if joint.b.on_ground else (joint.b, -1.0)
         if not joint.slides:
-            turned[system.body(moved.body).angle] += sign * 2.0 * math.pi * round(away[row] / (2.0 * math.pi))
+            turns = away[row] / (2.0 * math.pi)
+            whole = round(turns) + (int(math.copysign(1.0, turns - round(turns))) if other_way else 0)
+            turned[system.body(moved.body).angle] += sign * 2.0 * math.pi * whole
     others = system.packed.rows["signal"] < 0
     change = (system.constraints(signals, t, turned)[0] - system.constraints(signals, t, q)[0]) * others
     return turned if system.gap(change) <= _NEAR * max(1.0, system.gap(away)) else q
@@ -138,7 +153,8 @@ def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array
         if found is not None and np.max(np.abs(found - pose) / system.units) < np.sqrt(_BARELY):
             return found, ""
     held = drives_at(system, pose, set(np.flatnonzero(away).tolist()))
-    return None, f"the joints bar the way from the assembly to the start of prescribed motions, {held}"
+    way = "the joints bar the way from the assembly to the start of prescribed motions"
+    return None, f"{way}, {held}, the limit of their reach or a change point,"
 
 
 def _side(system: System, q: Array) -> float:

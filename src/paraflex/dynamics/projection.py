@@ -99,8 +99,9 @@ def shortened(step: Array, longest: float) -> float:
 
 
 def link_metric(system: System, q: Array, stiffness: float, *, every_spring: bool = False) -> Sparse:
-    """M + stiffness K: with the stiffness [s^2] links keep their shape; `every_spring` adds those at joints.
+    """M + stiffness K / omega^2 with the slowest vibration omega of a body; `every_spring` adds springs at joints.
 
+    With a large stiffness (without dimension) links keep their shape, at any size of the mechanism.
     Bodies weigh no less than a part of the whole: what light ones carry from one heavy body to another would be lost.
     """
     mass = sparse_mass(system, q)
@@ -113,7 +114,8 @@ def link_metric(system: System, q: Array, stiffness: float, *, every_spring: boo
         mass = Sparse(mass + scipy.sparse.diags(more))
     if not stiffness:
         return mass
-    return Sparse(mass + stiffness * elastic_stiffness(system, q, every_spring=every_spring))
+    weight = stiffness / system.slowest**2
+    return Sparse(mass + weight * elastic_stiffness(system, q, every_spring=every_spring))
 
 
 def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.0) -> LeastChange:

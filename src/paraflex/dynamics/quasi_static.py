@@ -11,7 +11,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.brake import HeldAngle
-from paraflex.dynamics.equilibrium import moving_equilibrium, static_equilibrium
+from paraflex.dynamics.equilibrium import largest_move, moving_equilibrium, static_equilibrium
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.projection import LeastChange, constraint_change, project, second_rates
 from paraflex.dynamics.rank import dependence
@@ -20,7 +20,7 @@ from paraflex.dynamics.state import VELOCITY_STIFFNESS, State
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import AngleLaw, Load, PrescribedAngle
 
-# How far the mechanism moves for a central difference [m, rad].
+# How far the mechanism moves for a central difference [sizes of the mechanism, rad].
 _DIFFERENCE_MOVE = 1e-3
 
 
@@ -118,7 +118,7 @@ def _moving(drives: System, start: State) -> State:
 
     motion, q = _Motion(drives, start.time), at(start.time, start.q)
     v = motion.velocities(q)
-    step = _DIFFERENCE_MOVE / float(np.max(np.abs(v)))
+    step = _DIFFERENCE_MOVE / largest_move(drives, v)
     before, after = (at(start.time + h, q + h * v) for h in (-step, step))
     return State(start.time, q, motion.velocities(q, (after - before) / (2.0 * step)))
 

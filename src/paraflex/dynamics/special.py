@@ -8,11 +8,12 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.dynamics.following import drives_at
+from paraflex.dynamics.following import driven_rows, drives_at
 from paraflex.dynamics.projection import NAMED, second_rates
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import Signals
+from paraflex.mechanism.laws import ConstantSpeed, HeldAngle
 
 # Curvatures and rates below this part of the largest are rounding.
 _ROUNDING = 1e-7
@@ -87,6 +88,17 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
     ]
     turns = f": {', '.join(rates[:NAMED])}" if rates else ""
     return Special(f"{what}, at which two branches meet{turns}", _TWO_BRANCHES if rates else _BESIDE, velocities)
+
+
+def branches_from_rest(system: System, signals: Signals, t: float, q: Array) -> bool:
+    """Whether prescribed motions that move later are at rest at a change point, from which two branches lead on."""
+    moves = np.zeros(system.m)
+    for motion, row in driven_rows(system):
+        moves[row] = not isinstance(motion.law, HeldAngle | ConstantSpeed) or getattr(motion.law, "speed", 0.0) != 0.0
+    if not np.any(moves):
+        return False
+    found = special_start(system, signals, t, q, system.jacobian(q), moves)
+    return bool(found.velocities) and not barred_drives(system, q, dependence(system, q))
 
 
 def barred_drives(system: System, q: Array, found: Dependence) -> str:

@@ -218,7 +218,7 @@ def _coordinates(system: System, signals: Signals, start: Start, assembly: Assem
 
 def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArray[np.bool_]) -> Array:
     """Joints closed by the least change of the coordinates that are not held."""
-    q = q if np.any(held) else follow_drives(system, signals, time, q)[0]
+    q = q if np.any(held) else follow_drives(system, signals, time, q)
     change = partial(constraint_change, system, stiffness=POSITION_STIFFNESS, free=~held)
     q, phi = assemble(system, signals, time, q, change, free=~held)
     worst = int(np.argmax(np.abs(phi) / system.row_units)) if phi.size else 0

@@ -27,7 +27,7 @@ from paraflex.dynamics.projection import (
 )
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
-from paraflex.dynamics.special import special_start
+from paraflex.dynamics.special import branches_from_rest, special_start
 from paraflex.dynamics.system import System, build_system
 from paraflex.errors import AssemblyError, InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import Signals
@@ -41,8 +41,8 @@ _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
 _ASIDE = 1e-2
 # Links that must be deflected by more than this part of their size for loops to close do not fit together.
 _LARGEST_DEFLECTION = 0.1
-# Weight of stiffness against mass [s^2] for velocities: rates of deflection are to be small against those of links.
-VELOCITY_STIFFNESS = 1e3
+# Weight of stiffness in `link_metric` for velocities: rates of deflection are to be small against those of links.
+VELOCITY_STIFFNESS = 1e9
 
 
 @given_as("a state", "a state, as dynamics.consistent_state makes it")
@@ -172,16 +172,9 @@ def assembled_position(system: System, signals: Signals, t: float, q: Array) -> 
     Raises
     ------
     AssemblyError
-        See `project_position`; the limit of reach is named if one is between the assembly and the start of a drive.
+        See `follow_drives` and `project_position`.
     """
-    moved, limit = follow_drives(system, signals, t, q)
-    try:
-        return project_position(system, signals, t, moved)
-    except AssemblyError as error:
-        if not limit:
-            raise
-        remedy = "start prescribed motions within the mechanism's reach"
-        raise AssemblyError(f"{limit}, the limit of their reach,", Moment(t, 0), error.partial, remedy) from error
+    return project_position(system, signals, t, follow_drives(system, signals, t, q))
 
 
 def project_position(system: System, signals: Signals, t: float, q: Array) -> Array:
@@ -258,7 +251,7 @@ def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Arra
 def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Array, stiffness: float = 0.0) -> Array:
     """The nearest velocities, in the metric of mass, at which Phi' is zero.
 
-    That is what a blow does. With a weight of stiffness [s^2] against mass links move and do not begin to bend.
+    That is what a blow does. With a weight of stiffness, see `link_metric`, links move and do not begin to bend.
 
     Raises
     ------
@@ -335,8 +328,11 @@ def check_accelerations(system: System, signals: Signals, t: float, q: Array, v:
     Raises
     ------
     InconsistentConstraintsError
-        There are none: two prescribed laws, or a singular position in motion.
+        There are none: two prescribed laws, or a singular position in motion. Or two, from rest at a change point.
     """
+    if not np.any(v) and branches_from_rest(system, signals, t, q):
+        cause = "prescribed motions begin at rest at a change point, from which two branches lead on,"
+        raise InconsistentConstraintsError(cause, Moment(t, 0), remedy="start beside this pose, or in motion")
     rest = np.zeros(system.n)
     wanted = second_rates(system, signals, t, q, v, rest)
     if np.any(wanted):

@@ -24,6 +24,8 @@ from paraflex.mechanism import Mechanism, PointRef, in_frames, rotor_mass, with_
 
 # Damping ratio below which a vibration counts as undamped: it loses 1.2 % of its amplitude in a period.
 _HARDLY_DAMPED = 2e-3
+# Angular frequency of vibrations where none is known [rad/s].
+_USUAL = 1e3
 
 T = TypeVar("T")
 
@@ -106,6 +108,11 @@ class System:
     def least_row_unit(self) -> float:
         """The least of `row_units`."""
         return float(np.min(self.row_units, initial=1.0))
+
+    @cached_property
+    def slowest(self) -> float:
+        """Angular frequency of the slowest vibration of a flexible body [rad/s]; without one a usual one."""
+        return min((float(np.min(body.modes.omega)) for body in self.bodies if body.nf), default=_USUAL)
 
     @cached_property
     def vibrations_die_out(self) -> bool:

@@ -218,6 +218,7 @@ class Statics(Shown):
             *stresses,
         )  # fmt: skip
 
+    @checked_arguments()
     def moving_away(self, step: int) -> str:
         """In words, the motion that grows at an unstable equilibrium: the coordinate and the body that move most."""
         shape = self.equilibria[step].vibrations.shapes[:, 0] / self.equations.scale

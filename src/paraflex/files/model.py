@@ -164,6 +164,7 @@ class Model(CheckedFields):
             return self.study.duration
         return self.driven_for(followed) * self.study.duration / self.driven_for(own)
 
+    @checked_arguments()
     def driven_for(self, path: Path) -> float:
         """How long torques drive along a path [s]: the path's duration, and that of the study's shaper."""
         return path.duration + (0.0 if self.study.shaper is None else self.study.shaper.duration)

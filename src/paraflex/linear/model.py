@@ -249,6 +249,7 @@ class LinearModel(NamedModel):
         """Basis (f, free) of the motions with motors held, by default all that are inputs."""
         return kernel(self.joint_rows(self.motor_joints(motors)), 1.0 / np.sqrt(np.diag(self._reduced[0])))
 
+    @checked_arguments()
     def motor_joints(self, motors: Sequence[str] | None = None) -> list[str]:
         """Joints of motors, by default of all that are inputs.
 
@@ -264,6 +265,7 @@ class LinearModel(NamedModel):
                 raise InputError("is no motor", field="motors", value=name, remedy="choose from " + ", ".join(joints))
         return [joints[name] for name in names]
 
+    @checked_arguments()
     def joint_rows(self, joints: Sequence[str]) -> Array:
         """Changes of joints' coordinates (h, f) with the coordinates y."""
         q, Z = self.minimal.point.q[None], self.minimal.directions

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from paraflex.arguments import numbers_in
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable, named_axes
 from paraflex.mechanism.quantities import finite
@@ -57,7 +58,7 @@ class NamedModel:
 
 def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> NDArray[np.complex128]:
     """Points s = i omega of angular frequencies, which are finite [rad/s]; complex numbers are points s themselves."""
-    given = np.atleast_1d(np.asarray(frequencies))
+    given = np.atleast_1d(numbers_in(frequencies, field, "biufc"))
     finite(given.ravel().tolist(), field)
     return np.asarray(given if np.iscomplexobj(given) else 1j * given, dtype=complex)
 

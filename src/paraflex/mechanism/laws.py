@@ -57,6 +57,19 @@ class SampledAngle(CheckedFields):
 
 
 @dataclass(frozen=True)
+class HeldAngle:
+    """An angle [rad], or a travel [m], that does not change."""
+
+    value: float
+    knots: tuple[float, ...] = ()
+    breaks: tuple[float, ...] = ()
+
+    def evaluate(self, t: Array) -> Values:
+        """Value, rate and acceleration at times t."""
+        return np.full(t.shape, self.value), np.zeros(t.shape), np.zeros(t.shape)
+
+
+@dataclass(frozen=True)
 class ConstantSpeed(CheckedFields):
     """A start value [rad or m] and a constant speed [rad/s or m/s].
 

@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import Self
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError
 from paraflex.mechanism.actuators import Actuator
 from paraflex.mechanism.bodies import Body
@@ -45,7 +45,7 @@ class EndEffector(CheckedFields):
     def __post_init__(self) -> None:
         super().__post_init__()
         given = self.coordinates
-        listed = not isinstance(given, str) and all(name in TASK_COORDINATES for name in given)
+        listed = isinstance(given, list | tuple) and all(name in TASK_COORDINATES for name in given)
         if not (listed and given and len(set(given)) == len(given)):
             raise InputError(
                 "not a set of task coordinates",
@@ -204,8 +204,10 @@ class Members(CheckedFields):
         used = {point for _, members in grouped(self) for one in members for point in points_named(one).values()}
         return used if self.end_effector is None else used | {self.end_effector.point}
 
+    @checked_arguments()
     def reached(self, start: str, past: str = "") -> set[str]:
         """A body or the ground, and all bodies that joints connect with it without passing another body."""
+        known(start, self.joints_at, "start", "body")
         seen, waiting = {start, past}, [start]
         while waiting:
             for joint in self.joints_at[waiting.pop()]:
@@ -226,6 +228,7 @@ class Members(CheckedFields):
         """Units of the sensors' readings."""
         return tuple(self.sensor_unit(sensor) for sensor in self.sensors)
 
+    @checked_arguments()
     def sensor_unit(self, sensor: Sensor) -> str:
         """Unit of a sensor's readings, which those at joints have of the joint's kind."""
         return sensor.unit(any(self.slides(joint) for _, joint, _ in joints_named(sensor)))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.plots.film_files import find_encoder, write_film
 from paraflex.plots.film_pictures import FOOT, HEAD, Film
@@ -110,6 +111,7 @@ def plan_film(
     return Film(scenes, size, fps, speed, look, kind != ".png", options.point)
 
 
+@checked_arguments()
 def animate(
     data: xr.Dataset,
     file: str | Path,
