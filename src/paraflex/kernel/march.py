@@ -224,9 +224,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
     first = place_samples(tableau, t, h, is_long(system, tableau, controls, h), march, out)
-    # Near a singular position forces have poles.
-    if march.counts[NEAR] == 0:
-        solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
+    solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
     write_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)
     copy(march.stage_v[last], march.v)

@@ -10,12 +10,13 @@ from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.linear import orient, right_hand_side, solve_system
+from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_system
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
     BAUMGARTE,
     CONTRACTION,
+    NEAR,
     PEAK,
     SAMPLE,
     SAMPLE_CHANGE,
@@ -113,7 +114,10 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
     copy(a, march.eq)
     copy(lam, march.guess_lam)
     contraction = march.clock[CONTRACTION]
-    solved = solve_at(system, signals, out.times[i], weights, g, b, contraction, march, work, a, lam, march.torques)
+    # Near a singular position the step's factor has rows that are held.
+    near, solved = march.counts[NEAR] > 0, False
+    if not near:
+        solved = solve_at(system, signals, out.times[i], weights, g, b, contraction, march, work, a, lam, march.torques)
     if not solved:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
@@ -122,9 +126,8 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
         note_all_axial_forces(system, q, v, a, lam, aside, aside.geometric)
         factor_bodies(system, b, q, aside)
         orient(system, q, aside, controls.dependent_part)
-        contraction = WORST_CONTRACTION
-        solved = solve_at(
-            system, signals, out.times[i], weights, g, b, contraction, march, aside, a, lam, march.torques
+        solved = aside.least[0] >= SINGULAR_PART and solve_at(
+            system, signals, out.times[i], weights, g, b, WORST_CONTRACTION, march, aside, a, lam, march.torques
         )
     for r in range(lam.size):
         work.mu[r] = lam[r] - march.guess_lam[r] if solved else 0.0
