@@ -470,3 +470,100 @@ def test_forces_after_a_start_at_a_dead_centre_are_those_of_its_branch(side, met
     assert np.isnan(found[0])
     np.testing.assert_allclose(found[2:], exact, rtol=0, atol=part * 3.97)
     assert not run.doubts
+
+
+FLAT = """
+name = "flat"
+gravity = [0.0, -9.81]
+ground = { O = [0.0, 0.0], D = [1.0, 0.0] }
+[body.crank]
+type = "rigid"
+mass = 1.0
+inertia = 0.05
+centre_of_mass = [0.1, 0.0]
+points = { O = [0.0, 0.0], A = [0.3, 0.0] }
+[body.coupler]
+type = "rigid"
+mass = 1.0
+inertia = 0.05
+centre_of_mass = [0.4, 0.0]
+points = { A = [0.0, 0.0], B = [1.0, 0.0] }
+[body.rocker]
+type = "rigid"
+mass = 1.0
+inertia = 0.05
+centre_of_mass = [0.4, 0.0]
+points = { D = [0.0, 0.0], B = [0.3, 0.0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "coupler.A"]
+B = ["coupler.B", "rocker.B"]
+D = ["ground.D", "rocker.D"]
+[prescribed.drive]
+joint = "O"
+angle = "LAW"
+[assembly.a]
+"""
+PARALLEL = "crank = 0.5\ncoupler = 0.0\nrocker = 0.5\n"
+CROSSED = "crank = 0.5\ncoupler = -0.35\nrocker = -0.85\n"
+
+
+def parallelogram(tmp_path, law, assembly):
+    (tmp_path / "flat.toml").write_text(FLAT.replace("LAW", law) + assembly)
+    return pf.load(tmp_path / "flat.toml")
+
+
+@pytest.mark.parametrize("law", ["0.5 - 0.5 * cos(4 * t)", "2.5 * t**2"])
+def test_a_drive_that_leaves_a_change_point_from_rest_is_refused(tmp_path, law):
+    """Two branches lead on, and no velocity chooses one: forces were those of neither (3.6 N where 61 kN are right)."""
+    model = parallelogram(tmp_path, law, "crank = 0.0\ncoupler = 0.0\nrocker = 0.0\n")
+    with pytest.raises(InconsistentConstraintsError, match="at rest at a change point, from which two branches lead"):
+        pf.simulate_motion(model, 0.1)
+    held = parallelogram(tmp_path, "0.0", "crank = 0.0\ncoupler = 0.0\nrocker = 0.0\n")
+    assert pf.simulate_motion(held, 0.1, samples=2).solution.status == "complete"
+
+
+@pytest.mark.filterwarnings("ignore:prescribed.drive. it starts at -7 rad")
+@pytest.mark.parametrize("start", [4.0, -7.0])
+def test_a_way_through_a_change_point_is_barred(tmp_path, start):
+    """Either branch may lead on there: the rocker began whole turns away, or on the branch of the parallelogram."""
+    with pytest.raises(AssemblyError, match=r"bar the way .* or a change point"):
+        pf.simulate_motion(parallelogram(tmp_path, f"{start} + 5 * t", CROSSED), 0.1)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_way_that_is_barred_is_gone_the_other_way_round(side):
+    """A crank that cannot pass zero, where coupler and rocker are too long, reaches -1.2 rad."""
+    lengths = (1.0, 0.5, 1.2, 0.5)
+    q = consistent_state(build_system(four_bar(lengths, 1.2, side, ConstantSpeed(-1.2, 0.1))), None).q
+    assert off_by_turns(q[2::3], angles_of(lengths, -1.2, side)) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("samples", [101, 1001])
+def test_forces_beside_a_change_point_that_is_passed(tmp_path, samples):
+    """Bodies of a parallelogram turn and move alike: the force in D by Newton and Euler at each.
+
+    Steps near there hold rows of constraints: between their stages forces were 7 % off at the largest sample.
+    """
+    run = pf.simulate_motion(parallelogram(tmp_path, "0.5 + 5 * t", PARALLEL), 1.2, samples=samples, warning=False)
+    data = pf.motion_dataset(run)
+    found = np.abs(data["joint_force"].sel(joint="D").values)
+    exact = np.abs([force_in_rocker(0.5 + 5.0 * t, 5.0) for t in data["time"].values])
+    known = np.isfinite(found[:, 0])
+    assert np.sum(~known) < 0.02 * samples + 2
+    assert np.max(np.abs(found - exact)[known]) < 4e-3 * np.max(exact[known])
+
+
+def force_in_rocker(angle, rate):
+    """Forces on crank, coupler and rocker of the parallelogram, and the torque, at a constant rate: that in D."""
+    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    A, b = np.zeros((9, 9)), np.zeros(9)
+    # Unknown: forces on the crank in O and A, on the rocker in B (reversed on the coupler) and D, and the torque.
+    for row, signs, reach in ((0, (1, 1, 0, 0), 0.1), (3, (0, -1, 1, 0), 0.3), (6, (0, 0, -1, 1), 0.4)):
+        for k, sign in enumerate(signs):
+            A[row : row + 2, 2 * k : 2 * k + 2] = sign * np.eye(2)
+        b[row : row + 2] = -(rate**2) * reach * along + [0.0, 9.81]
+    A[2, 0:2], A[2, 2:4], A[2, 8] = -0.1 * across, 0.2 * across, 1.0
+    A[5, 2:4], A[5, 4:6] = [0.0, 0.4], [0.0, 0.6]
+    A[8, 4:6], A[8, 6:8] = 0.1 * across, -0.4 * across
+    return np.linalg.solve(A, b)[6:8]

@@ -19,6 +19,7 @@ from paraflex.dynamics import System
 from paraflex.dynamics.joint_loads import drive_torques, joint_loads
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
+from paraflex.integrators.limits import StepLimits
 from paraflex.integrators.solution import Solution
 
 # Code of the finding, and its place: the number of samples.
@@ -26,6 +27,8 @@ COARSE = "samples-coarse"
 SAMPLES = "study.samples"
 # How many times as many samples are looked at, and how many at least.
 _FINER, _LEAST = 2, 1401
+# Spacing of those where something given changes fast, as a part of the longest step there.
+_PART_OF_STEP = 0.25
 # Coordinates at all of them together that are at most worth the memory.
 _MOST_NUMBERS = 4_000_000
 # Numbers of one kind of load that are worked on at a time: in a processor's cache.
@@ -60,8 +63,10 @@ class Between(NamedTuple):
         return replace(solution, **{name: getattr(solution, name)[keep] for name in names})
 
 
-def with_between(times: Array, coordinates: int) -> Between | None:
+def with_between(times: Array, coordinates: int, limits: StepLimits | None = None) -> Between | None:
     """Times with others evenly between them; None where there are none between, or these would take too much memory.
+
+    Where something given changes fast, as in a pulse, there are more of them.
 
     Parameters
     ----------
@@ -69,6 +74,8 @@ def with_between(times: Array, coordinates: int) -> Between | None:
         Of samples, ascending [s].
     coordinates : int
         Of the system.
+    limits : StepLimits, optional
+        By what is given in time.
     """
     pieces = times.size - 1
     if pieces < 1:
@@ -78,8 +85,21 @@ def with_between(times: Array, coordinates: int) -> Between | None:
         return None
     fractions = np.arange(finer) / finer
     steps = times[:-1, None] + np.diff(times)[:, None] * fractions
-    asked = np.broadcast_to(fractions == 0.0, steps.shape)
-    return Between(np.append(steps.ravel(), times[-1]), np.append(asked.ravel(), True))
+    found = np.append(steps.ravel(), times[-1])
+    if limits is not None and limits.times.size:
+        more = list(_brief(limits, float(np.min(np.diff(found))), times))
+        if (found.size + sum(part.size for part in more)) * coordinates <= _MOST_NUMBERS:
+            found = np.unique(np.concatenate([found, *more]))
+    return Between(found, np.isin(found, times))
+
+
+def _brief(limits: StepLimits, spacing: float, times: Array) -> Iterator[Array]:
+    """Times in pieces where what is given changes faster than samples at a spacing follow."""
+    ends = np.append(limits.times[1:], times[-1])
+    for first, last, step in zip(limits.times, np.minimum(ends, times[-1]), _PART_OF_STEP * limits.steps, strict=True):
+        first = max(first, times[0])
+        if step < spacing and last > first and (last - first) / step <= _MOST_NUMBERS:
+            yield np.linspace(first, last, math.ceil((last - first) / step) + 1)
 
 
 def samples_too_few(system: System, whole: Solution, kept: Solution, samples: int) -> Finding | None:
@@ -107,7 +127,7 @@ def samples_too_few(system: System, whole: Solution, kept: Solution, samples: in
                 found.append(
                     f"{name} is up to {most_kept:.4g} {unit} in them and {most:.4g} {unit} at t = {when:.4g} s"
                 )
-                enough = (whole.t.size - 1) / _widest(loads, (1.0 - _NEARLY) * most)
+                enough = _pieces(whole.t, loads, (1.0 - _NEARLY) * most)
                 times_as_many = max(times_as_many, enough / max(kept.t.size - 1, 1))
     if not found:
         return None
@@ -153,12 +173,19 @@ def _largest(loads: Callable[..., Array], motion: Sequence[Array], width: int) -
     return np.concatenate(parts)
 
 
-def _widest(loads: Array, enough: float) -> int:
-    """The most samples in one, such that all that are closer still have enough as their largest."""
+def _pieces(t: Array, loads: Array, enough: float) -> float:
+    """Least number of even pieces of a run, such that all shorter ones still have enough as their largest load."""
+    span = t[-1] - t[0]
+    if t.size * np.min(np.diff(t)) < 0.9 * span:
+        # More samples where a pulse is: pieces are no longer than it.
+        low = np.flatnonzero(loads < enough)
+        at = np.searchsorted(low, int(np.argmax(loads)))
+        first, last = t[low[at - 1]] if at > 0 else t[0], t[low[at]] if at < low.size else t[-1]
+        return float(span / (last - first))
     step = 1
     while step + 1 < loads.size and np.max(loads[:: step + 1]) >= enough:
         step += 1
-    return step
+    return (t.size - 1) / step
 
 
 def _round_number(number: float) -> int:

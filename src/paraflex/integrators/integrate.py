@@ -175,9 +175,10 @@ class Integration:
         refuse_tolerance(self._tolerance, system.size)
         self._loose = loose_tolerance(self._tolerance, system.size)
         own = isinstance(options.method, NativeMethod)
-        self._between = with_between(np.asarray(times, dtype=float), system.n) if samples and own else None
-        taken = (times, None) if self._between is None else self._between
-        problem = make_problem(system, signals, initial, taken[0], knots, taken[1])
+        problem = make_problem(system, signals, initial, times, knots)
+        self._between = with_between(problem.times, system.n, problem.limits) if samples and own else None
+        if self._between is not None:
+            problem = replace(problem, times=self._between.times, asked=self._between.asked)
         self._ends = BeamEnds(system, initial)
         self._crossing: Crossing | None = None
         self._functions = (*event_functions(system, initial.q, options.events), *self._ends.functions)

@@ -55,7 +55,7 @@ from paraflex.kernel.run_state import (
     WORK,
 )
 from paraflex.kernel.sampled import CHANGED, FAILED, SLACK, control, next_instant
-from paraflex.kernel.samples import is_long, place_samples, solve_samples, step_work, write_energies
+from paraflex.kernel.samples import is_long, place_samples, solve_samples, solve_samples_anew, step_work, write_energies
 from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
@@ -224,7 +224,10 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
     first = place_samples(tableau, t, h, is_long(system, tableau, controls, h), march, out)
-    solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
+    if march.counts[NEAR] == 0:
+        solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
+    elif first < march.counts[SAMPLE]:
+        solve_samples_anew(system, signals, controls, t, h, first, march, work, out, aside)
     write_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)
     copy(march.stage_v[last], march.v)

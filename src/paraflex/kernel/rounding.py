@@ -17,7 +17,7 @@ from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import SAMPLE, WORK
-from paraflex.kernel.samples import begin_sample, is_long, place_samples, step_work, write_energies
+from paraflex.kernel.samples import explicit_parts, is_long, place_samples, step_work, write_energies
 from paraflex.kernel.stage import equations, note_torques, place
 from paraflex.kernel.step import input_power, stage_start
 from paraflex.kernel.tangent import note_slopes
@@ -196,7 +196,7 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
         )
         for i in range(first, march.counts[SAMPLE]):
             if out.solved[i]:
-                begin_sample(out.q[i], out.v[i], out.a[i], g, g * g, march)
+                explicit_parts(out.q[i], out.v[i], out.a[i], g, g * g, march)
                 note_torques(signals, out.times[i], march.torques)
                 left = solve_to_rounding(
                     system, signals, out.times[i], g, g * g, weights, controls.dependent_part, march, out.a[i],

@@ -16,7 +16,6 @@ from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
     BAUMGARTE,
     CONTRACTION,
-    NEAR,
     PEAK,
     SAMPLE,
     SAMPLE_CHANGE,
@@ -101,34 +100,63 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
 
 
 @routine
+def solve_samples_anew(system, signals, controls, t, h, first, march, work, out, aside):
+    """The same near a singular position, where rows of the step's factor are held: with a factor made at each."""
+    for i in range(first, march.counts[SAMPLE]):
+        if out.times[i] < t + h * (1.0 - SAME_TIME):
+            weights = begin_sample(controls, i, march, out)
+            solved = solve_anew(system, signals, controls, i, weights, march, work, out, aside)
+            out.solved[i] = end_sample(system, i, solved, march, work, out)
+
+
+@routine
 def solve_sample(system, signals, controls, i, march, work, out, aside):
     """Solve one sample with the factor of the step, or with a factor made there where that one does not serve.
 
     Whether the sample is the solution; else it is as it was.
     """
-    q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
-    g, b, weights = march.clock[STAGE_G], march.clock[STAGE_B], INDEX_1
-    if controls.treatment == BAUMGARTE:
-        weights, _ = constraint_weights(controls, march.clock[TRIED])
-    begin_sample(q, v, a, g, b, march)
-    copy(a, march.eq)
-    copy(lam, march.guess_lam)
-    contraction = march.clock[CONTRACTION]
-    # Near a singular position the step's factor has rows that are held.
-    near, solved = march.counts[NEAR] > 0, False
-    if not near:
-        solved = solve_at(system, signals, out.times[i], weights, g, b, contraction, march, work, a, lam, march.torques)
+    g, b, weights = march.clock[STAGE_G], march.clock[STAGE_B], begin_sample(controls, i, march, out)
+    solved = solve_at(
+        system, signals, out.times[i], weights, g, b, march.clock[CONTRACTION], march, work, out.a[i], out.lam[i],
+        march.torques,
+    )  # fmt: skip
     if not solved:
-        copy(march.eq, a)
-        copy(march.guess_lam, lam)
-        copy(work.redundant, aside.redundant)
-        note_friction(system, q, v, aside.mu, aside.compliance)
-        note_all_axial_forces(system, q, v, a, lam, aside, aside.geometric)
-        factor_bodies(system, b, q, aside)
-        orient(system, q, aside, controls.dependent_part)
-        solved = aside.least[0] >= SINGULAR_PART and solve_at(
-            system, signals, out.times[i], weights, g, b, WORST_CONTRACTION, march, aside, a, lam, march.torques
-        )
+        solved = solve_anew(system, signals, controls, i, weights, march, work, out, aside)
+    return end_sample(system, i, solved, march, work, out)
+
+
+@routine
+def begin_sample(controls, i, march, out):
+    """Keep what a sample is; weights of its constraint rows."""
+    explicit_parts(out.q[i], out.v[i], out.a[i], march.clock[STAGE_G], march.clock[STAGE_B], march)
+    copy(out.a[i], march.eq)
+    copy(out.lam[i], march.guess_lam)
+    if controls.treatment == BAUMGARTE:
+        return constraint_weights(controls, march.clock[TRIED])[0]
+    return INDEX_1
+
+
+@routine
+def solve_anew(system, signals, controls, i, weights, march, work, out, aside):
+    """Solve a sample with a factor made there; whether that leads anywhere."""
+    q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
+    g, b = march.clock[STAGE_G], march.clock[STAGE_B]
+    copy(march.eq, a)
+    copy(march.guess_lam, lam)
+    copy(work.redundant, aside.redundant)
+    note_friction(system, q, v, aside.mu, aside.compliance)
+    note_all_axial_forces(system, q, v, a, lam, aside, aside.geometric)
+    factor_bodies(system, b, q, aside)
+    orient(system, q, aside, controls.dependent_part)
+    return aside.least[0] >= SINGULAR_PART and solve_at(
+        system, signals, out.times[i], weights, g, b, WORST_CONTRACTION, march, aside, a, lam, march.torques
+    )
+
+
+@routine
+def end_sample(system, i, solved, march, work, out):
+    """Take what was solved if it changes anything, else what was there; whether it does."""
+    q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
     for r in range(lam.size):
         work.mu[r] = lam[r] - march.guess_lam[r] if solved else 0.0
     known = system.modal.shape[1] == 0 and largest(march.forces[PEAK]) > 0.0
@@ -138,12 +166,12 @@ def solve_sample(system, signals, controls, i, march, work, out, aside):
         copy(march.guess_lam, lam)
         solved = False
     for j in range(q.size):
-        q[j], v[j] = march.qs[j] + b * a[j], march.vs[j] + g * a[j]
+        q[j], v[j] = march.qs[j] + march.clock[STAGE_B] * a[j], march.vs[j] + march.clock[STAGE_G] * a[j]
     return solved
 
 
 @inlined
-def begin_sample(q, v, a, g, b, march):
+def explicit_parts(q, v, a, g, b, march):
     """Explicit parts of a sample into march.qs and march.vs: such that q and v stay where a does."""
     for j in range(q.size):
         march.qs[j], march.vs[j] = q[j] - b * a[j], v[j] - g * a[j]
