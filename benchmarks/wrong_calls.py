@@ -34,12 +34,14 @@ VALUES: Mapping[str, Callable[[], Any]] = {
     "10**400": lambda: 10**400, "1e308": lambda: 1e308, "1e-320": lambda: 1e-320, "nan": lambda: float("nan"),
     "inf": lambda: float("inf"), "1j": lambda: 1j, "text": lambda: "no_such", "empty": lambda: "",
     "NUL": lambda: "a\0b", "bytes": lambda: b"x", "[]": list, "[nan]": lambda: [float("nan")],
-    "mixed": lambda: [1, "a", None], "nested": lambda: [[1.0], [2.0, 3.0]], "{}": dict, "{a: None}": lambda: {"a": None},
+    "mixed": lambda: [1, "a", None], "nested": lambda: [[1.0], [2.0, 3.0]], "{}": dict,
+    "{a: None}": lambda: {"a": None},
     "{1: 2}": lambda: {1: 2.0}, "object": object, "type": lambda: int, "function": lambda: (lambda *a, **k: None),
     "raises": lambda: _raises, "matrix": lambda: np.zeros((3, 3)), "complex array": lambda: np.array([1j, 2.0]),
     "objects": lambda: np.array([None, "a"], dtype=object), "times": lambda: np.array(["2020-01-01"], "datetime64[s]"),
     "float32 nan": lambda: np.float32("nan"), "set": lambda: {"drive", "arm"}, "generator": lambda: (k for k in (1, 2)),
-    "path": lambda: Path("no/such/file"), "frame": pd.DataFrame, "dataset": xr.Dataset, "exception": lambda: ValueError("x"),
+    "path": lambda: Path("no/such/file"), "frame": pd.DataFrame, "dataset": xr.Dataset,
+    "exception": lambda: ValueError("x"),
 }  # fmt: skip
 
 
@@ -166,7 +168,8 @@ def classes() -> list[Subject]:
         collect(pf.load(name), found)
     point = pf.PointRef("link1", "A1")
     for one in (
-        pf.IntegrationOptions(), pf.FilmOptions(), pf.Workers(), pf.Start(), pf.Encoder("e", "A1"), pf.JointLimit("A1", 0.0, 1.0),
+        pf.IntegrationOptions(), pf.FilmOptions(), pf.Workers(), pf.Start(), pf.Encoder("e", "A1"),
+        pf.JointLimit("A1", 0.0, 1.0),
         pf.Tachometer("s", "A1"), pf.SingularDistance(0.1), pf.DeflectionLimit("link1", 1e-3), pf.Actuator("A1"),
         pf.AppliedTorque("a", point, 1.0), pf.PointForce("a", point, (1.0, 0.0)), pf.ConstantSpeed(0.0, 1.0),
         pf.PiecewiseLaw((pf.ConstantSpeed(0.0, 1.0),), ()), pf.TabulatedLaw((0.0, 1.0), (0.0, 1.0)),
@@ -176,7 +179,8 @@ def classes() -> list[Subject]:
     ):  # fmt: skip
         collect(one, found)
     made = [
-        (pf.JointPID, {"stiffness": 1.0}), (pf.ComputedTorque, {"frequency": 10.0}), (pf.CompiledLaw, {"function": _raises}),
+        (pf.JointPID, {"stiffness": 1.0}), (pf.ComputedTorque, {"frequency": 10.0}),
+        (pf.CompiledLaw, {"function": _raises}),
         (pf.RateFeedback, {"gains": {"g": {"A1": 1.0}}}), (pf.SampledController, {"law": _raises, "period": 1e-3}),
         (pf.BackwardDifference, {"period": 1e-3}), (pf.Environment, {"source": "five_bar"}),
         (pf.Differentiator, {"period": 1e-3, "resolution": 1e-3, "acceleration": 10.0}),
@@ -227,8 +231,8 @@ def main() -> None:
                 found[wrong.name] += 1
                 where = traceback.extract_tb(wrong.error.__traceback__)[-1]
                 error = f"{type(wrong.error).__name__}: {str(wrong.error)[:90]!r}"
-                print(f"{wrong.name}({wrong.argument}={wrong.value}): {error} [{Path(where.filename).name}:{where.lineno}]",
-                      flush=True)  # fmt: skip
+                place = f"{Path(where.filename).name}:{where.lineno}"
+                print(f"{wrong.name}({wrong.argument}={wrong.value}): {error} [{place}]", flush=True)
     print(f"{len(calls)} calls, {found.total()} end in other exceptions: {dict(found)}")
 
 

@@ -345,3 +345,42 @@ def test_samples_within_short_steps_solve_the_equations_of_motion(tracking, chos
         (np.array([one.a for one in found]), run.solution.a),
     ):
         np.testing.assert_allclose(of_run, exact, rtol=0, atol=1e-4 * np.abs(exact).max())
+
+
+CANTILEVER = """
+name = "cantilever"
+ground = { O = [0.0, 0.0] }
+[section.bar]
+width = 0.02
+thickness = 0.01
+[material.steel]
+youngs_modulus = 210e9
+density = 7850.0
+[body.beam]
+type = "beam"
+length = 1.0
+section = "bar"
+material = "steel"
+points = { O = 0.0, T = 1.0 }
+elements = ELEMENTS
+damping = { ratios = [0.01] }
+[joint.O]
+type = "weld"
+points = ["ground.O", "beam.O"]
+[assembly.a]
+beam = 0.0
+[load.F]
+type = "force"
+point = "beam.T"
+force = [0.0, "sin(FAST * t)"]
+[study]
+duration = 0.02
+samples = 101
+"""
+
+
+@pytest.mark.parametrize(("elements", "fast", "found"), [(1, 157.5, 0), (1, 1575.0, 1), (8, 1575.0, 0)])
+def test_loads_faster_than_what_elements_resolve_are_a_finding(model, elements, fast, found):
+    """At 30 times its lowest frequency a cantilever of one element has half of the force in its clamp."""
+    given = model(CANTILEVER.replace("ELEMENTS", str(elements)).replace("FAST", str(fast)))
+    assert [one.code for one in motion(given).doubts].count("elements-few") == found

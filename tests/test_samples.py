@@ -113,3 +113,35 @@ def test_times_between_are_left_out_where_they_would_take_too_much_memory():
     assert np.all(np.diff(near.times) > 0.0)
     assert with_between(times, 10_000) is None
     assert with_between(times[:1], 3) is None
+
+
+def test_a_short_pulse_is_seen_between_samples(tmp_path):
+    """Of a millisecond in 100 s, between two of the samples that are looked at: steps follow it."""
+    model = tmp_path / "pulse.toml"
+    model.write_text(
+        """
+name = "arm"
+ground = { O = [0.0, 0.0] }
+[body.arm]
+type = "rigid"
+mass = 2.0
+inertia = 0.3
+points = { O = [0.0, 0.0], T = [0.8, 0.0] }
+[joint]
+O = ["ground.O", "arm.O"]
+[assembly.home]
+arm = 0.0
+[prescribed.drive]
+joint = "O"
+speed = 1.0
+[load.pulse]
+type = "torque"
+point = "arm.T"
+torque = "exp(-((t - 43.21) / 0.001)^2)"
+""".replace("^2", "**2")
+    )
+    run = pf.simulate_motion(pf.load(model), 100.0, samples=101, warning=False)
+    (found,) = coarse(run)
+    assert float(re.search(r"and (\S+) N m at t = 43.21 s", found.text).group(1)) == pytest.approx(1.0, rel=0.01)
+    number = int(re.search(r"samples = (\d+)", found.remedy).group(1))
+    assert 1e5 < number < 1e6

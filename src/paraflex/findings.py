@@ -106,7 +106,7 @@ _DOUBTFUL = {
     "equilibrium-unstable": "A static equilibrium is unstable: the mechanism would move away from it.",
     "motions-grow": "Some motions about the pose grow instead of vibrating.",
     "axis-along-beam": "A slot or prismatic joint has its straight axis along a flexible beam.",
-    "elements-few": "A joint slides along a beam whose elements are too long for it.",
+    "elements-few": "Elements of a beam are too long for what slides along it, or for how fast loads or laws change.",
     "slider-off-beam": "A sliding joint leaves its beam.",
     "frequency-low": "A link vibrates on its own far slower than links do.",
     "torque-large": "Torques or forces are far beyond what mass, size and speed make plausible.",

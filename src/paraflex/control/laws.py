@@ -196,7 +196,7 @@ def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Arr
     P = torque_projectors(task.effort, active)[: len(torques) if torques.ndim else 0]
     if torques.shape != (len(P), len(names)):
         raise InputError("has not one row a sample, a column a motor", field="torques", value=torques.shape,
-                         remedy=f"give at most {len(task.effort)} x {len(names)} numbers")  # fmt: skip
+                         remedy=f"give at most {len(task.motion.t)} x {len(names)} numbers")  # fmt: skip
     out = np.zeros_like(torques)
     out[:, columns] = torques[:, columns] - np.einsum("kij,kj->ki", P, torques[:, columns])
     # Of as many motors as degrees of freedom nothing is left but rounding.

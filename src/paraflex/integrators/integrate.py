@@ -28,6 +28,7 @@ from paraflex.integrators.between import samples_too_few, with_between
 from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
+from paraflex.integrators.limits import elements_too_few
 from paraflex.integrators.method import Family, NativeMethod
 from paraflex.integrators.options import IntegrationOptions, loose_tolerance, refuse_tolerance
 from paraflex.integrators.pace import Pace, too_slow
@@ -273,7 +274,8 @@ class Integration:
         whole = _solution(run, options, elapsed, self.status, self.message, self._crossing)
         solution = whole if self._between is None else self._between.kept(whole)
         few = samples_too_few(system, whole, solution, self._samples) if self._samples else None
-        findings = (*self._ends.findings(solution.q), *filter(None, [self._loose, few]))
+        mesh = elements_too_few(system, run.problem.limits)
+        findings = (*self._ends.findings(solution.q), *filter(None, [self._loose, few]), *mesh)
         solution = replace(solution, findings=findings)
         _refuse_beam_end(solution, self._crossing)
         if self.goes_on or self.status in ("interrupted", "stopped"):

@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import Inputs
+from paraflex.dynamics import Inputs, System
+from paraflex.findings import Finding
 from paraflex.kernel.packed import Signals
+from paraflex.mechanism import FlexibleBeam
 
 # Below this part of the largest value, or of its derivative by the shortest piece, changes are rounding.
 _SMALL, _ROUNDING = 1e-6, 1e-11
@@ -45,6 +47,26 @@ def step_limits(signals: Signals, inputs: Inputs) -> StepLimits:
     steps = np.min([limits.steps[piece] for limits, piece in zip(own, pieces, strict=True)], axis=0)
     first = np.append(True, steps[1:] != steps[:-1])
     return StepLimits(np.ascontiguousarray(times[first]), np.ascontiguousarray(steps[first]))
+
+
+def elements_too_few(system: System, limits: StepLimits) -> list[Finding]:
+    """Findings on beams whose elements resolve only slower vibrations than loads or laws change.
+
+    The upper half of the modes of a mesh is inaccurate: with one element from the third bending mode on.
+    """
+    fastest, found = 1.0 / float(np.min(limits.steps, initial=np.inf)), {}
+    for body in system.bodies:
+        name = system.carrier(body.name)[0]
+        if body.nf and isinstance(system.described.body(name), FlexibleBeam):
+            resolved = float(np.sort(body.modes.omega)[body.nf // 2 - 1])
+            if resolved < fastest:
+                found[name] = Finding(
+                    "elements-few", f"body.{name}.elements",
+                    f"something given changes as fast as a vibration of {fastest:.2g} rad/s, and elements of {name} "
+                    f"resolve those up to {resolved:.2g} rad/s: deflections, forces and stresses may be far off",
+                    "give it more elements",
+                )  # fmt: skip
+    return list(found.values())
 
 
 def _limits_of(signals: Signals, k: int, order: int) -> StepLimits:
