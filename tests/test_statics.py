@@ -511,3 +511,31 @@ def test_a_dataset_names_and_keeps_everything(tmp_path) -> None:
     for name in again.data_vars:
         assert "time" not in again[name].dims
         assert again[name].attrs.get("long_name"), name
+
+
+@pytest.mark.parametrize("angle", ["pi/2", "0.0", "1.0"])
+def test_a_bar_on_a_spring_stands_in_any_direction(tmp_path, angle):
+    """It does not move but for rounding, which counted as its displacement: upright no step led on."""
+    (tmp_path / "bar.toml").write_text(f"""
+name = "bar"
+gravity = [0.0, 0.0]
+ground = {{ O = [0.0, 0.0] }}
+[body.bar]
+type = "rigid"
+mass = 1.0
+inertia = 1.0
+points = {{ A = [0.0, 0.0], B = [1.0, 0.0] }}
+[joint]
+O = ["ground.O", "bar.A"]
+[spring.s]
+joint = "O"
+stiffness = 1000.0
+rest = "{angle}"
+[assembly.a]
+bar = "{angle}"
+""")
+    turn = {"pi/2": np.pi / 2.0, "0.0": 0.0, "1.0": 1.0}[angle]
+    loads = {"bar.B.x": -300.0 * np.cos(turn), "bar.B.y": -300.0 * np.sin(turn)}
+    found = pf.statics(pf.load(tmp_path / "bar.toml"), loads=loads, steps=2)
+    assert found.buckling[-1, 0] == pytest.approx(1000.0 / 300.0, rel=1e-9)
+    assert found.stable.all()

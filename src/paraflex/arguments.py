@@ -257,7 +257,8 @@ def _as_instance(kind: type) -> Take | None:
 def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
     """One of several types: a value of one of them, or convertible to one of them."""
     takes = {kind: take_as(kind) for kind in kinds if kind is not NoneType}
-    if any(isinstance(kind, type) and issubclass(kind, PurePath) for kind in kinds):
+    files = any(isinstance(kind, type) and issubclass(kind, PurePath) for kind in kinds)
+    if files:
         # The name of an object is no name of a file.
         takes.pop(str, None)
     if any(take is None for take in takes.values()):
@@ -270,6 +271,8 @@ def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
     plain = tuple(kind for kind in classes if kind is str or (kind not in _PLAIN and not issubclass(kind, Enum)))
 
     def take(value: Any, field: str) -> Any:
+        if files and isinstance(value, str | PurePath) and "\0" in str(value):
+            raise refused(value, field, "a file name", "leave out the character of code zero")
         if (value is None and optional) or isinstance(value, plain) or type(value) in classes:
             return value
         for each in takes.values():

@@ -16,8 +16,8 @@ from paraflex.results.posed import Posed, posed
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Within which there is room for a drawing beside its margins [mm].
-_NARROWEST = 20.0
+# Of a drawing beside its margins, and of one that fits into memory [mm].
+_NARROWEST, _WIDEST = 20.0, 5000.0
 
 
 def pose_of(
@@ -83,8 +83,9 @@ def draw(
     """
     from paraflex.plots.model_drawing import model_drawing  # Matplotlib takes long to import
 
-    if not width >= _NARROWEST:
-        raise InputError("too narrow", field="width", value=width, remedy=f"at least {_NARROWEST:g} mm")
+    if not _NARROWEST <= width <= _WIDEST:
+        remedy = f"from {_NARROWEST:g} to {_WIDEST:g} mm"
+        raise InputError("no width of a drawing", field="width", value=width, remedy=remedy)
 
     shown = pose_of(model, assembly=assembly, path=path)
     for problem in shown.problems:

@@ -102,7 +102,8 @@ class ClosedLoop:
         upper, added, follow = self._triangular
         eye, one = np.eye(len(upper)), np.eye(added.shape[1])
         z = np.exp(places_in_s(omega, "omega") * self.plant.period)
-        return np.array([one + follow @ scipy.linalg.solve_triangular(at * eye - upper, added) for at in z])
+        found = [one + follow @ scipy.linalg.solve_triangular(at * eye - upper, added) for at in z]
+        return np.array(found).reshape(-1, *one.shape)
 
     def loop(self, omega: ArrayLike) -> Complex:
         """Responses L_i (k, motors) of the loop opened at one motor, with the others closed: 1 + L_i = 1 / S_ii.

@@ -29,6 +29,8 @@ _CONVERGED, _ROUNDED = 1e-10, 1e-7
 _LONGEST_MOVE = 0.3
 # Steps grow with displacements up to these [sizes of the mechanism, rad].
 _WHOLE = 1.0
+# What moves by less under the whole of what is given does so by rounding, as a column that bends only when it buckles.
+_NO_MOVE = 1e-12
 # What a step may leave of constraints [sizes of the mechanism, rad].
 _GAP = 1e-9
 # Steps grow after so few iterations and shrink by these parts; none is longer than this many of the wanted steps.
@@ -114,6 +116,7 @@ class Branch:
             It ends.
         """
         move = self._size(first.tangent._replace(s=0.0)) / max(abs(first.tangent.s), 1e-300)
+        move = move if move > _NO_MOVE else 0.0
         branch = replace(self, weight=self.weight / move**2) if move > 0.0 else self
         here = Point(first.at, branch._tangent(first.at, branch._only_s(first.at)))
         longest = _LONGEST * np.sqrt(2.0) / steps

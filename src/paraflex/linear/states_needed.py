@@ -68,6 +68,8 @@ def states_needed(
         raise InputError("has no outputs whose responses could be compared", field="outputs", value=models[0].mechanism,
                          remedy="give it motors, an end-effector or sensors")  # fmt: skip
     chosen = [as_enum(ReductionMethod, method, "methods") for method in methods]
+    if not chosen:
+        raise InputError("names none", field="methods", remedy="name one, or leave it out")
     s = np.geomspace(_LOWEST * until, until, _FREQUENCIES) * (1j + DAMPING)
     found = np.array([[_needed(model, method, s, error, most) for method in chosen] for model in models])
     names = {

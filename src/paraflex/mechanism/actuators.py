@@ -107,7 +107,7 @@ class Actuator(CheckedFields):
             if asked and getattr(self, other) is None:
                 word = other.replace("_", " ")
                 value = getattr(self, given)
-                said_so = f"{given} = {json.dumps(getattr(value, 'value', value))}"
+                said_so = f"{given} = {json.dumps(getattr(value, 'value', value), default=float)}"
                 raise InputError(
                     "is missing", field=f"actuator.{self.name}.{other}",
                     remedy=f"give the {word}, which {said_so} needs, or leave that out",
