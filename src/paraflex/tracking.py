@@ -115,6 +115,7 @@ class TrackingTask:
         """Feed-forward torques of a mode: minimum norm, smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
 
+    @checked_arguments()
     def driven(self, mode: str, torques: Array, condition: Array, actual: Array | None = None) -> Driven:
         """Data of a run driven by torques or forces (k, motors) of a mode, at the first samples of the task.
 
@@ -138,7 +139,7 @@ class TrackingTask:
             acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
             peaks=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
             units=dict(zip(names, mechanism.motor_units(), strict=True)),
-            condition=float(np.max(condition)),
+            condition=float(np.max(condition, initial=1.0)),
         )
 
     @checked_arguments()

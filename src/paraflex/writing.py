@@ -46,6 +46,8 @@ def whole_file(path: Path, *, remedy: str = ELSEWHERE, field: str = "", parents:
     OutputError
         It cannot be written.
     """
+    if not path.name:
+        raise InputError("names no file", field=field or "path", value=str(path), remedy="give a file's name")
     unfinished = path.with_name(path.name + ".part")
     try:
         if parents:

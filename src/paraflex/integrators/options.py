@@ -117,7 +117,7 @@ class IntegrationOptions(CheckedFields):
 
     def __post_init__(self, parameters: Any) -> None:
         super().__post_init__()
-        if parameters:
+        if not (parameters is None or (isinstance(parameters, dict) and not parameters)):
             raise InputError(
                 "parameters belong to the method", field="parameters", value=parameters,
                 remedy=f"give them to it: method=paraflex.methods.{type(self.method).__name__}(...)",

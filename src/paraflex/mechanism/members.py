@@ -243,7 +243,7 @@ class Members(CheckedFields):
         """
         names = ", ".join(assembly.name for assembly in self.assemblies)
         for assembly in self.assemblies:
-            if name is None or assembly.name == name:
+            if name is None or (isinstance(name, str) and assembly.name == name):
                 return assembly
         if not names:
             remedy = "add an [assembly.NAME] table with estimates of coordinates"
