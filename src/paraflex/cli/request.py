@@ -24,7 +24,9 @@ def asked_model(choice: ModelChoice) -> Model:
     found = {}
     for text in choice.settings:
         name, equals, value = text.partition("=")
-        if not (name.strip() and equals and value.strip()):
+        if name.strip() and equals and not value.strip():
+            raise InputError("has no value", field=f"--set {name.strip()}", remedy=f'say "{name.strip()}=0.3"')
+        if not (name.strip() and equals):
             raise InputError("no field and value", field="--set", value=text, remedy='say "link1.length=0.3"')
         found[name.strip()] = value_of(value.strip())
     return load(choice.name, set=found)

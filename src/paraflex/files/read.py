@@ -19,6 +19,12 @@ from paraflex.files.fields import check_units, field_at
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
 
 # A key of more parts than any has: the parser would take minutes for thousands of them.
+# Numbers with a decimal comma, values in no quotes that TOML has none of, and what brackets do not count in.
+_DECIMAL_COMMA = re.compile(r"=\s*[-+]?\d+,\d")
+_BARE = re.compile(
+    r"[=\[,]\s*(?!true\b|false\b|[-+]?inf\b|[-+]?nan\b)(?=[^\"'#\[\]{},=]*[A-Za-z_])[-+(\w][^\"'#\[\]{},=]*(?=[\],#]|$)"
+)
+_NO_BRACKETS = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
 _DEEP_KEY = re.compile(rf"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{KEY_PARTS}}}""")
 # The field that says of which kind a table is, in every file.
 _TAG = "type"
@@ -106,7 +112,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         try:
             data = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
-            raise _not_toml(str(error)) from error
+            raise _not_toml(str(error), text) from error
         except (ValueError, RecursionError):
             problem = "not valid TOML: a number of too many digits, or too many brackets in one another"
             raise InputError(problem, field="file", remedy="name a model file") from None
@@ -128,16 +134,38 @@ def _check_names(data: dict[str, Any]) -> None:
                 left.append((f"{table}.{name}".strip("."), each))
 
 
-def _not_toml(reason: str) -> InputError:
-    """What the parser says, with the name of a table that stands twice."""
+def _not_toml(reason: str, text: str) -> InputError:
+    """What the parser says, with the name of a table that stands twice, and what is most likely meant."""
     twice = re.match(r"Cannot declare \((.*?),?\) twice \((.*)\)", reason)
     if twice is None:
         problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "mend that line"
+        at = re.search(r"at line (\d+)", reason)
+        number = int(at[1]) if at else text.count("\n") + 1
+        line = text.split("\n")[number - 1][:500]
+        if _DECIMAL_COMMA.search(line):
+            remedy = "write decimals with a point, 0.5"
+        elif _BARE.search(line):
+            remedy = 'put names and expressions in quotes, "2 * l1"'
+        elif reason.startswith("Unclosed") and (opened := _opened(text, number)):
+            problem += f", opened in line {opened}"
+            remedy = "close it there"
         if re.search("overwrite|mutate|uplicate", reason):
             remedy += "; a name may stand only once"
         return InputError(problem, field="file", remedy=remedy)
     table = ".".join(part.strip(" '") for part in twice[1].split(","))
     return InputError(f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out")
+
+
+def _opened(text: str, last: int) -> int:
+    """Line of the last bracket that is open where a parser gave up at a line; zero for none."""
+    opened: list[int] = []
+    for number, line in enumerate(text.split("\n")[:last], 1):
+        for bracket in re.findall(r"[\[{\]}]", _NO_BRACKETS.sub("", line)):
+            if bracket in "[{":
+                opened.append(number)
+            elif opened:
+                opened.pop()
+    return opened[-1] if opened else 0
 
 
 @contextmanager
@@ -159,7 +187,11 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
     """
     table = data.get("parameters", {})
     with naming(source):
-        parameters = evaluate_parameters(table if isinstance(table, dict) else {})
+        try:
+            parameters = evaluate_parameters(table if isinstance(table, dict) else {})
+        except InputError as error:
+            remedy = _above(schema, error.field.rpartition(".")[2]) or error.remedy
+            raise InputError(error.problem, field=error.field, value=error.value, remedy=remedy) from None
         try:
             checked = schema.model_validate(data, context={"parameters": parameters})
         except ValidationError as error:
@@ -183,6 +215,7 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
         known = sorted(model.model_fields) if model is not None else []
         near = get_close_matches(str(location[-1]), known, n=1)
         remedy = f'did you mean "{near[0]}"?' if near else f"known here: {listed(known)}"
+        remedy = _above(schema, str(location[-1])) or remedy
         return InputError("unknown field", field=field, value=value, remedy=remedy)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _tag_problem(_tags(schema, problem["loc"]), field, value)
@@ -200,6 +233,14 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
     message = problem["msg"].removeprefix("Input ").replace(" after validation", "")
     text = message[0].lower() + message[1:]
     return InputError(text, field=field, value=value, remedy=f"give {description}")
+
+
+def _above(schema: type[BaseModel], name: str) -> str:
+    """The remedy for a field of the file itself that stands in a table; empty for other names."""
+    annotation = getattr(schema.model_fields.get(name), "annotation", dict)
+    tables = [annotation, *typing.get_args(annotation)]
+    is_table = any(typing.get_origin(one) is dict or one is dict or hasattr(one, "model_fields") for one in tables)
+    return "" if is_table else "write it at the top of the file, above the first [table]"
 
 
 def _other_kind(schema: type[BaseModel], data: dict[str, Any], source: str) -> InputError | None:
