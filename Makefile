@@ -2,6 +2,8 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
+# All that is installed has its version in constraints.txt, pip and what builds the package too.
+PIP := $(BIN)/python -m pip install --quiet --constraint constraints.txt --build-constraint constraints.txt
 KERNELS := $(wildcard src/paraflex/kernel/*.py)
 
 .PHONY: run test lint types imports tests coverage docs clean
@@ -40,11 +42,12 @@ docs: $(VENV)/.dev
 # Set-up is skipped while these stamps are newer than what they depend on.
 $(VENV)/.run: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
+	$(PIP) --editable .
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,all]'
+	$(PIP) --editable '.[dev,all]'
 	touch $@
 
 $(VENV)/.kernels: $(VENV)/.run $(KERNELS)
