@@ -58,7 +58,7 @@ def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     for place, entry, columns in _entries(data):
         file = entry.get("table")
         if isinstance(file, str):
-            entry["table"] = _read_rows(data, place, folder / file, file, columns)
+            entry["table"] = _read_rows(data, place, folder, file, columns)
     return data
 
 
@@ -69,7 +69,7 @@ def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
     for place, entry, columns in _entries(data):
         file = named.get(place)
         with suppress(InputError):
-            if isinstance(file, str) and _read_rows(data, place, folder / file, file, columns) == entry.get("table"):
+            if isinstance(file, str) and _read_rows(data, place, folder, file, columns) == entry.get("table"):
                 entry["table"] = file
     return data
 
@@ -99,12 +99,27 @@ def _tables(given: Any) -> list[tuple[str, dict[str, Any]]]:
 
 
 def _read_rows(
-    data: dict[str, Any], place: Place, path: Path, name: str, columns: tuple[int, ...]
+    data: dict[str, Any], place: Place, folder: Path, name: str, columns: tuple[int, ...]
 ) -> list[list[float]]:
-    """Rows of a file for the table at a place, in SI units."""
+    """Rows of a file for the table at a place, in SI units; errors quote files in the model's folder alone."""
+    field = ".".join(map(str, (*place, "table")))
+    unread, wrong = "name a file, seen from the model file's folder", f"save {_COUNTS[columns]} columns as CSV"
+    lines = text_of(folder / name, field, name, unread=unread, wrong=wrong).splitlines()
+    try:
+        return _rows_of(data, place, lines, name, columns)
+    except InputError as error:
+        if error.value is None or (folder / name).resolve().is_relative_to(folder.resolve()):
+            raise
+        remedy = "copy it into the folder of the model file, where errors say more"
+        problem = f"not {_COUNTS[columns]} columns of numbers below headings"
+        raise InputError(problem, field=error.field, value=name, remedy=remedy) from None
+
+
+def _rows_of(
+    data: dict[str, Any], place: Place, lines: list[str], name: str, columns: tuple[int, ...]
+) -> list[list[float]]:
+    """Rows of a file's lines for the table at a place, in SI units."""
     field, count = ".".join(map(str, (*place, "table"))), _COUNTS[columns]
-    unread, wrong = "name a file, seen from the model file's folder", f"save {count} columns as CSV"
-    lines = text_of(path, field, name, unread=unread, wrong=wrong).splitlines()
     rows: list[list[float]] = []
     headings, comment = None, ""
     for number, line in enumerate(lines, start=1):
