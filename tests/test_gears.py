@@ -565,3 +565,43 @@ def test_pages_of_designs_draw_the_wheels_of_each():
     page = animation(both).to_dict()
     assert page["looks"]["gear"].dashed
     assert all([look for look, *_ in moving["pieces"]].count("gear") == 2 for _, moving in page["marks"])
+
+
+RACK = """
+name = "rack"
+ground = { O = [0.0, 0.0], R = [0.0, 0.1] }
+[body.pinion]
+type = "rigid"
+mass = 1.0
+inertia = 0.1
+points = { O = [0.0, 0.0] }
+[body.rack]
+type = "rigid"
+mass = 1.0
+inertia = 0.1
+points = { R = [0.0, 0.0] }
+[joint]
+O = ["ground.O", "pinion.O"]
+[joint.slide]
+type = "prismatic"
+points = ["ground.R", "rack.R"]
+direction = 0.0
+angle = 0.0
+[gear.g]
+joints = ["O", "slide"]
+ratio = RATIO
+[assembly.a]
+pinion = 0.0
+rack = 0.0
+"""
+
+
+@pytest.mark.parametrize("ratio", ["0.08", '"80 mm"', '"80 mm/rad"', '"0.08 m"'])
+def test_the_ratio_of_a_rack_is_a_length(tmp_path, ratio):
+    (tmp_path / "rack.toml").write_text(RACK.replace("RATIO", ratio))
+    (gear,) = pf.load(tmp_path / "rack.toml").mechanism.gears
+    assert gear.ratio == 0.08
+    for wrong in ("80 kg", "80 deg/m", "80 N m"):
+        (tmp_path / "rack.toml").write_text(RACK.replace("RATIO", f'"{wrong}"'))
+        with pytest.raises(InputError, match=r"gear.g.ratio: a quantity in .* where one in m/rad or m is asked for"):
+            pf.load(tmp_path / "rack.toml")

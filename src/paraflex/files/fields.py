@@ -80,6 +80,8 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
     if place[0] in _OF_ANY_UNIT or "unit of" in found.description:
         return None
     units = _units_in(found.description, _row(data, place), place[-1])
+    if place[0] == "gear" and place[-1] == "ratio":
+        return _ratio_units(data, place)
     slides = _slides(data, place)
     if slides is None:
         return units
@@ -207,6 +209,13 @@ def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
     of_motor = table in ("study", "statics") and owner == "torques"
     name = _below(_below(data, "motor"), key) if of_motor else _below(_below(_below(data, table), owner), "joint")
     return _joint_slides(data, name)
+
+
+def _ratio_units(data: Mapping[str, Any], place: Place) -> tuple[str, ...]:
+    """Units of the second joint's coordinate by the first's: of a rack the radius of its pinion."""
+    joints = _below(_below(_below(data, place[0]), place[1]), "joints")
+    slide = [_joint_slides(data, name) for name in joints] if isinstance(joints, list) else []
+    return {(False, True): ("m/rad", "m"), (True, False): ("rad/m", "1/m")}.get((*map(bool, slide),), ())
 
 
 def _joint_slides(data: Mapping[str, Any], name: Any) -> bool | None:
