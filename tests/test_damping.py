@@ -317,7 +317,7 @@ arm = 0.0
 def test_damping_has_exact_derivatives(ends):
     def matrix(change):
         body = nominal.mechanism.bodies[0]
-        damping = ModalDamping((0.02 + change, 0.05))
+        damping = with_fields(ModalDamping((0.02, 0.05)), ratios=(0.02 + change, 0.05))
         body = with_fields(
             body, length=0.5 * (1.0 + change), points={"A": 0.0, "B": 0.5 * (1.0 + change)}, damping=damping
         )

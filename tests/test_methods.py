@@ -341,5 +341,5 @@ def test_numbers_of_options_are_converted_once(value):
     options = IntegrationOptions(step=value, alpha=value)
     assert type(options.step) is type(options.alpha) is float
     for wrong in (1j, 10**400):
-        with pytest.raises(InputError, match="step: is no real number"):
+        with pytest.raises(InputError, match="step: not a number"):
             IntegrationOptions(step=wrong)

@@ -124,11 +124,8 @@ class IntegrationOptions(CheckedFields):
             )  # fmt: skip
         for name in ("tolerance", "alpha", "beta", "max_step", "newton_fraction", "step"):
             value = getattr(self, name)
-            try:
-                # Kernels are compiled anew for numbers of other types.
-                object.__setattr__(self, name, None if value is None else float(value))
-            except (TypeError, OverflowError):
-                raise InputError("is no real number", field=name, value=value, remedy="give a number") from None
+            # Kernels are compiled anew for numbers of other types.
+            object.__setattr__(self, name, None if value is None else float(value))
         for name, remedy in _REMEDIES.items():
             value = getattr(self, name)
             if value is not None and not value > 0:
