@@ -214,8 +214,10 @@ def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
 def _ratio_units(data: Mapping[str, Any], place: Place) -> tuple[str, ...]:
     """Units of the second joint's coordinate by the first's: of a rack the radius of its pinion."""
     joints = _below(_below(_below(data, place[0]), place[1]), "joints")
-    slide = [_joint_slides(data, name) for name in joints] if isinstance(joints, list) else []
-    return {(False, True): ("m/rad", "m"), (True, False): ("rad/m", "1/m")}.get((*map(bool, slide),), ())
+    slide = [bool(_joint_slides(data, name)) for name in joints] if isinstance(joints, list) else []
+    if slide == [False, True]:
+        return ("m/rad", "m")
+    return ("rad/m", "1/m") if slide == [True, False] else ()
 
 
 def _joint_slides(data: Mapping[str, Any], name: Any) -> bool | None:
