@@ -1,6 +1,6 @@
 """Wrong values for every argument of the public functions and classes, one at a time: what do they say?
 
-    python benchmarks/wrong_calls.py [--seed N] [--only NAME,NAME] [--list]
+    python benchmarks/wrong_calls.py [--seed N] [--number K] [--only NAME,NAME]
 
 Every public function, every class that is made by its arguments, and the public methods of what the
 functions return are called as they should be, with one argument replaced by something else. A call may work; it may
@@ -9,6 +9,7 @@ end in paraflex's own exceptions. Anything else is a finding, as is a call that 
 
 from __future__ import annotations
 
+import argparse
 import inspect
 import random
 import signal
@@ -24,7 +25,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 import xarray as xr
-from common import command_line
 
 import paraflex as pf
 from paraflex.dynamics import consistent_state
@@ -73,7 +73,7 @@ def tries(subjects: list[Subject]) -> Iterator[tuple[Subject, str, str]]:
         for argument in inspect.signature(subject.call).parameters:
             if argument not in ("args", "kwargs", "settings", "details", "read", "self", "run"):
                 for value in VALUES:
-                    # What a function of the user raises is the user's.
+                    # A callback that raises is the user's.
                     if not (argument == "on_progress" and value == "type"):
                         yield subject, argument, value
 
@@ -113,7 +113,8 @@ def prepare(folder: Path) -> list[Subject]:
     measured = [output.name for output in linear.outputs]
     regulator = pf.lqr(linear, 1e-3, deviations=deviations, effort=1.0)
     design = pf.lqg(linear, 1e-3, measured=measured, deviations=deviations, effort=1.0, noise=1e-4)
-    still = pf.statics(mechanism, held=["A1", "D1", "A2", "D2"], warning=False)
+    held = ["A1", "D1", "A2", "D2"]
+    still = pf.statics(mechanism, held=held, warning=False)
     files = {"output": folder / "out", "file": folder / "film.gif", "path": folder / "data.nc", "folder": folder / "x"}
     given: dict[str, Any] = {
         "model": model, "mechanism": mechanism, "task": task, "mode": "++++", "modes": ["++++"], "source": task,
@@ -128,7 +129,7 @@ def prepare(folder: Path) -> list[Subject]:
     special: dict[str, dict[str, Any]] = {
         "closed_loop": {"model": linear}, "closed_loops": {"models": {"a": linear}}, "margins": {"model": linear},
         "discretise": {"model": linear}, "lqr": {"model": linear}, "lqg": {"model": linear},
-        "rate_feedback_gains": {"model": linear}, "statics": {"source": mechanism, "held": ["A1", "D1", "A2", "D2"]},
+        "rate_feedback_gains": {"model": linear}, "statics": {"source": mechanism, "held": held},
         "load_results": {"path": folder / "saved.nc"}, "open_results": {"path": folder / "saved.nc"},
         "linearise": {"mode": "++++"}, "linearise_along": {"mode": "++++"}, "poses_along": {"mode": "++++"},
         "motion_case": {"start": consistent_state(motion.system, None)},
@@ -214,7 +215,7 @@ def late(*_: Any) -> None:
 
 
 def main() -> None:
-    parser = command_line(__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, help="a random part of the calls, in this order")
     parser.add_argument("--number", type=int, default=500, help="of calls, with --seed")
     parser.add_argument("--only", default="", help="names, with commas between")

@@ -68,7 +68,7 @@ def checked_arguments(**remedies: str) -> Callable[[Callable[P, R]], Callable[P,
                     if name in takes:
                         named[name] = takes[name](value, name)
             except InputError as error:
-                raise _with_remedy(error, remedies) from None
+                raise error.advising(remedies.get(error.field, error.remedy)) from None
             return function(*given, **named)  # type: ignore[reportCallIssue]
 
         return checked
@@ -122,11 +122,6 @@ def refused(value: object, field: object, what: str, remedy: str) -> InputError:
     if value is None:
         return InputError("is not given", field=str(field), remedy=remedy)
     return InputError(f"not {what}", field=str(field), value=value, remedy=remedy)
-
-
-def _with_remedy(error: InputError, remedies: Mapping[str, str]) -> InputError:
-    remedy = remedies.get(error.field, error.remedy)
-    return InputError(error.problem, field=error.field, value=error.value, remedy=remedy, source=error.source)
 
 
 @cache
@@ -215,11 +210,16 @@ def _as_text(value: Any, field: str) -> Any:
     raise refused(value, field, "a text", "give a text in quotes")
 
 
+def _kind(value: Any) -> str:
+    """Kind of the numbers of an array; empty for anything else."""
+    return getattr(getattr(value, "dtype", None), "kind", "")
+
+
 def _is_number(value: Any) -> bool:
     """Whether a value is a real number that a float can be, or an array of one."""
     if isinstance(value, Integral):
         return abs(int(value)) <= sys.float_info.max
-    return isinstance(value, Real) or (getattr(value, "ndim", None) == 0 and value.dtype.kind in _REAL)
+    return isinstance(value, Real) or (getattr(value, "ndim", None) == 0 and _kind(value) in _REAL)
 
 
 def _is_whole(value: Any) -> bool:
@@ -229,7 +229,7 @@ def _is_whole(value: Any) -> bool:
 _PLAIN: dict[Any, Take | None] = {
     float: _plain_of(_is_number, "a number", "give a number"),
     int: _plain_of(_is_whole, "a whole number", "give a whole number"),
-    bool: _plain_of(lambda value: isinstance(value, bool) or getattr(getattr(value, "dtype", 0), "kind", "") == "b",
+    bool: _plain_of(lambda value: isinstance(value, bool) or _kind(value) == "b",
                     "True or False", "give one of the two"),
     str: _as_text, Any: None, object: None, NoneType: None,
 }  # fmt: skip
@@ -320,7 +320,7 @@ def _as_many(hint: Any, kind: Any, collect: Callable[[Iterable[Any]], Any]) -> T
     one = take_as(kind)
 
     def take(value: Any, field: str) -> Any:
-        numbers = getattr(getattr(value, "dtype", None), "kind", "") in _REAL
+        numbers = _kind(value) in _REAL
         alone = (is_dataclass(value) and not isinstance(value, Sequence)) or getattr(value, "ndim", 1) == 0
         if isinstance(value, str | Mapping) or alone or not isinstance(value, Iterable):
             if value is None or one is None:

@@ -75,6 +75,10 @@ class InputError(ParaflexError, ValueError):
         """The same error with another option or field."""
         return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy)
 
+    def advising(self, remedy: str) -> InputError:
+        """The same error with another remedy."""
+        return type(self)(self.problem, field=self.field, value=self.value, remedy=remedy, source=self.source)
+
     def within(self, table: str) -> InputError:
         """The same error with its field inside a table."""
         field = f"{table}.{self.field}"

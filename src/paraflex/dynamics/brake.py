@@ -12,7 +12,7 @@ from paraflex.dynamics.sparse import sparse_mass
 from paraflex.dynamics.state import State, project_velocity
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import PrescribedAngle
-from paraflex.mechanism.laws import HeldAngle as HeldAngle
+from paraflex.mechanism.laws import HeldAngle
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,7 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> Array
     if system.gap(away) <= _NEAR or len(set(joints)) < len(joints):
         return q
     limits = []
-    ways = (_turned(system, signals, t, q, away), q, _turned(system, signals, t, q, away, other_way=True))
-    for begun in ways:
+    for begun in _ways(system, signals, t, q, away):
         found, limit = _follow(system, signals, t, begun)
         if found is not None:
             # Where closing at once leads to the same pose it is left to the caller, with fewer roundings.
@@ -102,11 +101,19 @@ def _away(system: System, signals: Signals, t: float, q: Array) -> Array:
     return np.where(system.packed.rows["signal"] >= 0, system.constraints(signals, t, q)[0], 0.0)
 
 
-def _turned(system: System, signals: Signals, t: float, q: Array, away: Array, *, other_way: bool = False) -> Array:
-    """The pose with whole turns of drives; as it is if other constraints do not allow them.
+def _ways(system: System, signals: Signals, t: float, q: Array, away: Array) -> Iterator[Array]:
+    """Poses from which drives are followed: the shorter way to where they start, all of it, the other way round."""
+    shorter = _turned(system, signals, t, q, away)
+    yield shorter
+    if not np.array_equal(shorter, q):
+        yield q
+    other = _turned(system, signals, t, q, away, other_way=True)
+    if not (np.array_equal(other, q) or np.array_equal(other, shorter)):
+        yield other
 
-    What is left is the shorter way to where they start, or the other way round.
-    """
+
+def _turned(system: System, signals: Signals, t: float, q: Array, away: Array, *, other_way: bool = False) -> Array:
+    """The pose with whole turns of drives, to go on the shorter or the other way; as it is if constraints bar turns."""
     turned = q.copy()
     for motion, row in driven_rows(system):
         joint = system.mechanism.joint(motion.joint)

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.brake import HeldAngle
 from paraflex.dynamics.equilibrium import largest_move, moving_equilibrium, static_equilibrium
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.projection import LeastChange, constraint_change, project, second_rates
@@ -19,6 +18,7 @@ from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import VELOCITY_STIFFNESS, State
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import AngleLaw, Load, PrescribedAngle
+from paraflex.mechanism.laws import HeldAngle
 
 # How far the mechanism moves for a central difference [sizes of the mechanism, rad].
 _DIFFERENCE_MOVE = 1e-3

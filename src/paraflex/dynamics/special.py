@@ -24,14 +24,16 @@ _TWO_BRANCHES = "give one of these rates in [start.velocity.angular], or start b
 
 
 class Special(NamedTuple):
-    """A pose at which the branches of a motion meet: what it is, the remedy, and the velocities (n,) of the branches.
+    """A pose at which the branches of a motion meet.
 
-    All three are empty for any other pose; velocities are empty where no branch leads on.
+    What it is, the remedy, the velocities (n,) of the branches, and the drives at a dead centre. All are empty for any
+    other pose; velocities are empty where no branch leads on.
     """
 
     cause: str = ""
     remedy: str = ""
     velocities: tuple[Array, ...] = ()
+    drives: str = ""
 
 
 def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, wanted: Array) -> Special:
@@ -87,18 +89,20 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
         if abs(first - second) > rounding
     ]
     turns = f": {', '.join(rates[:NAMED])}" if rates else ""
-    return Special(f"{what}, at which two branches meet{turns}", _TWO_BRANCHES if rates else _BESIDE, velocities)
+    return Special(
+        f"{what}, at which two branches meet{turns}", _TWO_BRANCHES if rates else _BESIDE, velocities, drives
+    )
 
 
 def branches_from_rest(system: System, signals: Signals, t: float, q: Array) -> bool:
-    """Whether prescribed motions that move later are at rest at a change point, from which two branches lead on."""
+    """Whether prescribed motions, all at rest, are at a change point from which two branches lead on once they move."""
     moves = np.zeros(system.m)
     for motion, row in driven_rows(system):
-        moves[row] = not isinstance(motion.law, HeldAngle | ConstantSpeed) or getattr(motion.law, "speed", 0.0) != 0.0
+        moves[row] = not isinstance(motion.law, HeldAngle | ConstantSpeed)
     if not np.any(moves):
         return False
     found = special_start(system, signals, t, q, system.jacobian(q), moves)
-    return bool(found.velocities) and not barred_drives(system, q, dependence(system, q))
+    return bool(found.velocities) and not found.drives
 
 
 def barred_drives(system: System, q: Array, found: Dependence) -> str:

@@ -251,7 +251,7 @@ def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Arra
 def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Array, stiffness: float = 0.0) -> Array:
     """The nearest velocities, in the metric of mass, at which Phi' is zero.
 
-    That is what a blow does. With a weight of stiffness, see `link_metric`, links move and do not begin to bend.
+    That is what a blow does. A weight of stiffness, see `link_metric`, keeps links from beginning to bend.
 
     Raises
     ------

@@ -110,9 +110,14 @@ class System:
         return float(np.min(self.row_units, initial=1.0))
 
     @cached_property
+    def lowest(self) -> tuple[float, ...]:
+        """Lowest angular frequency of each flexible body [rad/s]."""
+        return tuple(float(np.min(body.modes.omega)) for body in self.bodies if body.nf)
+
+    @property
     def slowest(self) -> float:
         """Angular frequency of the slowest vibration of a flexible body [rad/s]; without one a usual one."""
-        return min((float(np.min(body.modes.omega)) for body in self.bodies if body.nf), default=_USUAL)
+        return min(self.lowest, default=_USUAL)
 
     @cached_property
     def vibrations_die_out(self) -> bool:

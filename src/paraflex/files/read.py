@@ -18,13 +18,13 @@ from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.fields import check_units, field_at
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
 
-# A key of more parts than any has: the parser would take minutes for thousands of them.
 # Numbers with a decimal comma, values in no quotes that TOML has none of, and what brackets do not count in.
 _DECIMAL_COMMA = re.compile(r"=\s*[-+]?\d+,\d")
 _BARE = re.compile(
     r"[=\[,]\s*(?!true\b|false\b|[-+]?inf\b|[-+]?nan\b)(?=[^\"'#\[\]{},=]*[A-Za-z_])[-+(\w][^\"'#\[\]{},=]*(?=[\],#]|$)"
 )
 _NO_BRACKETS = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
+# A key of more parts than any has: the parser would take minutes for thousands of them.
 _DEEP_KEY = re.compile(rf"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{KEY_PARTS}}}""")
 # The field that says of which kind a table is, in every file.
 _TAG = "type"
@@ -135,7 +135,7 @@ def _check_names(data: dict[str, Any]) -> None:
 
 
 def _not_toml(reason: str, text: str) -> InputError:
-    """What the parser says, with the name of a table that stands twice, and what is most likely meant."""
+    """Error of a text that is no TOML: the parser's reason or the table that stands twice, and the likely remedy."""
     twice = re.match(r"Cannot declare \((.*?),?\) twice \((.*)\)", reason)
     if twice is None:
         problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "mend that line"
@@ -190,8 +190,7 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
         try:
             parameters = evaluate_parameters(table if isinstance(table, dict) else {})
         except InputError as error:
-            remedy = _above(schema, error.field.rpartition(".")[2]) or error.remedy
-            raise InputError(error.problem, field=error.field, value=error.value, remedy=remedy) from None
+            raise error.advising(_above(schema, error.field.rpartition(".")[2]) or error.remedy) from None
         try:
             checked = schema.model_validate(data, context={"parameters": parameters})
         except ValidationError as error:

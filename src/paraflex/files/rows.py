@@ -102,7 +102,7 @@ def _read_rows(
     data: dict[str, Any], place: Place, folder: Path, name: str, columns: tuple[int, ...]
 ) -> list[list[float]]:
     """Rows of a file for the table at a place, in SI units; errors quote files in the model's folder alone."""
-    field = ".".join(map(str, (*place, "table")))
+    field = _field(place)
     unread, wrong = "name a file, seen from the model file's folder", f"save {_COUNTS[columns]} columns as CSV"
     lines = text_of(folder / name, field, name, unread=unread, wrong=wrong).splitlines()
     try:
@@ -115,11 +115,15 @@ def _read_rows(
         raise InputError(problem, field=error.field, value=name, remedy=remedy) from None
 
 
+def _field(place: Place) -> str:
+    return ".".join(map(str, (*place, "table")))
+
+
 def _rows_of(
     data: dict[str, Any], place: Place, lines: list[str], name: str, columns: tuple[int, ...]
 ) -> list[list[float]]:
     """Rows of a file's lines for the table at a place, in SI units."""
-    field, count = ".".join(map(str, (*place, "table"))), _COUNTS[columns]
+    field, count = _field(place), _COUNTS[columns]
     rows: list[list[float]] = []
     headings, comment = None, ""
     for number, line in enumerate(lines, start=1):
@@ -144,7 +148,7 @@ def _rows_of(
 def _in_si(data: dict[str, Any], place: Place, file: str, headings: str, rows: list[list[float]]) -> list[list[float]]:
     """Rows in SI units, of those that the headings give in brackets."""
     schema = PathFile if place == ("path",) else ModelTable
-    field = ".".join(map(str, (*place, "table")))
+    field = _field(place)
     found = [list(column) for column in zip(*rows, strict=True)]
     for k, (heading, text) in enumerate(_units(headings, len(found), file, field)):
         if text is None:

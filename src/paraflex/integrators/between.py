@@ -66,7 +66,7 @@ class Between(NamedTuple):
 def with_between(times: Array, coordinates: int, limits: StepLimits | None = None) -> Between | None:
     """Times with others evenly between them; None where there are none between, or these would take too much memory.
 
-    Where something given changes fast, as in a pulse, there are more of them.
+    More of them stand where something given changes fast, as in a pulse.
 
     Parameters
     ----------

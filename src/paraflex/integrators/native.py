@@ -254,8 +254,7 @@ def _long_from(system: System) -> float:
 
     Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them.
     """
-    fastest = max((float(np.min(body.modes.omega)) for body in system.bodies if body.nf), default=np.inf)
-    return _FOLLOWS / fastest
+    return _FOLLOWS / max(system.lowest, default=np.inf)
 
 
 def _least_step(problem: Problem) -> float:

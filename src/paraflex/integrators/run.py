@@ -159,9 +159,8 @@ def make_problem(
     initial: State,
     times: Array,
     knots: Array | None = None,
-    asked: NDArray[np.bool_] | None = None,
 ) -> Problem:
-    """A problem, its times checked: see `integrate` for the arguments.
+    """A problem, its times checked and all kept: see `integrate` for the arguments.
 
     Raises
     ------
@@ -175,8 +174,7 @@ def make_problem(
     inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
     inputs = inputs_of(system.mechanism)
     jumps = jump_times(signals, inputs, inner)
-    asked = np.ones(times.size, dtype=bool) if asked is None else asked
-    limits = step_limits(signals, inputs)
+    asked, limits = np.ones(times.size, dtype=bool), step_limits(signals, inputs)
     return Problem(system, signals, initial, times, np.append(inner, times[-1]), jumps, limits, asked)
 
 

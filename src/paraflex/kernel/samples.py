@@ -88,8 +88,8 @@ def place_samples(tableau, t, h, long, march, out):
 def solve_samples(system, signals, controls, t, h, first, march, work, out, aside):
     """Solve the equations of motion at the samples within the step that are not at its end.
 
-    Of samples that only serve to find the largest loads those are left that the last one solved lets expect to be near,
-    or that are in a step short beside vibrations. Each is a stage of its own, with the g and b of the last one and such
+    Samples that only serve to find the largest loads stay as they are where the last one solved lets expect them to be
+    near, and in a step short beside vibrations. Each is a stage of its own, with the g and b of the last one and such
     explicit parts that q and v are those between the stages where the acceleration is. Deflections of flexible bodies
     are not between stages where forces are: they are solved whatever the last one said.
     """
