@@ -329,6 +329,8 @@ def test_deflections_follow_a_slow_load(method):
     tip = data["point_position"].sel(point="arm.tip", axis="y").to_numpy()
     # It starts at rest, which leaves a vibration of 0.1 %.
     assert np.max(np.abs(tip - force * L**3 / (3.0 * EI))) < 0.003 * 500.0 * L**3 / (3.0 * EI)
+    # Work of forces on deflections hardly above the tolerance is uncertain, which the tolerance explains.
+    assert all(one.code != "energy-unbalanced" for one in run.doubts)
 
 
 @pytest.mark.parametrize(

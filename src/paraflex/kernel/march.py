@@ -55,7 +55,15 @@ from paraflex.kernel.run_state import (
     WORK,
 )
 from paraflex.kernel.sampled import CHANGED, FAILED, SLACK, control, next_instant
-from paraflex.kernel.samples import is_long, place_samples, solve_samples, solve_samples_anew, step_work, write_energies
+from paraflex.kernel.samples import (
+    is_long,
+    place_samples,
+    power_along_curve,
+    solve_samples,
+    solve_samples_anew,
+    step_work,
+    write_energies,
+)
 from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
@@ -223,7 +231,12 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
         note_crossing(system, t, h, march, work)
     if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
-    first = place_samples(tableau, t, h, is_long(system, tableau, controls, h), march, out)
+    long = is_long(system, tableau, controls, h)
+    if long:
+        power_along_curve(
+            system, signals, tableau, t, h, march.stage_q, march.stage_lam, march.power, march.torques, work
+        )
+    first = place_samples(tableau, t, h, long, march, out)
     if march.counts[NEAR] == 0:
         solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
     elif first < march.counts[SAMPLE]:

@@ -17,7 +17,14 @@ from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import orient, right_hand_side, solve_system
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import SAMPLE, WORK
-from paraflex.kernel.samples import explicit_parts, is_long, place_samples, step_work, write_energies
+from paraflex.kernel.samples import (
+    explicit_parts,
+    is_long,
+    place_samples,
+    power_along_curve,
+    step_work,
+    write_energies,
+)
 from paraflex.kernel.stage import equations, note_torques, place
 from paraflex.kernel.step import input_power, stage_start
 from paraflex.kernel.tangent import note_slopes
@@ -184,16 +191,18 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             copy(work.q, march.stage_q[i])
             copy(work.v, march.stage_v[i])
             march.power[i] = input_power(system, signals, time, work.q, work.v, march.stage_lam[i], march.torques, work)
+        long = is_long(system, tableau, controls, h)
+        if long:
+            power_along_curve(
+                system, signals, tableau, t, h, march.stage_q, march.stage_lam, march.power, march.torques, work
+            )
         for i in range(last + 1):
             copy(march.stage_q[i], history.q[k, i])
             copy(march.stage_v[i], history.v[k, i])
             copy(march.stage_a[1, i], history.a[k, i])
             copy(march.stage_lam[i], history.lam[k, i])
             history.power[k, i] = march.power[i]
-        first, g = (
-            place_samples(tableau, t, h, is_long(system, tableau, controls, h), march, out),
-            tableau.A[last, last] * h,
-        )
+        first, g = place_samples(tableau, t, h, long, march, out), tableau.A[last, last] * h
         for i in range(first, march.counts[SAMPLE]):
             if out.solved[i]:
                 explicit_parts(out.q[i], out.v[i], out.a[i], g, g * g, march)

@@ -26,7 +26,7 @@ from paraflex.kernel.run_state import (
     WORK,
 )
 from paraflex.kernel.stage import ROUNDING, WORST_CONTRACTION, largest_part, note_torques, place, residuals
-from paraflex.kernel.step import constraint_weights
+from paraflex.kernel.step import constraint_weights, input_power
 
 # A sample this part of a step before its end is its end.
 SAME_TIME = 1e-9
@@ -226,6 +226,37 @@ def step_work(tableau, h, march):
     for s in range(last + 1):
         work += h * tableau.A[last, s] * march.power[s]
     return work
+
+
+@routine
+def power_along_curve(system, signals, tableau, t, h, q, lam, power, torques, work):
+    """Power at the stages of a long step, whose velocities there are those of the curve through q (stages, n).
+
+    Those of its stages say little of deflections that follow loads, as at its ends.
+    """
+    for i in range(power.size):
+        time = t + tableau.c[i] * h
+        fill(work.v, 0.0)
+        for k in tableau.nodes:
+            slope = node_slope(tableau, k, tableau.c[i]) / h
+            for j in range(work.v.size):
+                work.v[j] += slope * q[k, j]
+        note_torques(signals, time, torques)
+        power[i] = input_power(system, signals, time, q[i], work.v, lam[i], torques, work)
+
+
+@inlined
+def node_slope(tableau, k, x):
+    """Derivative at fraction x of the polynomial that is one at node k and zero at the others."""
+    slope = 0.0
+    for skipped in tableau.nodes:
+        if skipped != k:
+            product = 1.0 / (tableau.c[k] - tableau.c[skipped])
+            for l in tableau.nodes:
+                if l != k and l != skipped:
+                    product *= (x - tableau.c[l]) / (tableau.c[k] - tableau.c[l])
+            slope += product
+    return slope
 
 
 @routine

@@ -37,6 +37,7 @@ from paraflex.kernel.sensitivity_samples import (
     PLACES,
     WEIGHTS,
     sensitivity_at_sample,
+    velocity_along_curve,
     work_sensitivity,
 )
 from paraflex.kernel.signals import piece_at
@@ -139,11 +140,11 @@ def respond_to_parameter(
 
 
 @inlined
-def moved_power(system, signals, t, place, i, q, v, lam, torques, sensitivity, work):
+def moved_power(system, signals, t, place, i, q, v, dv, lam, torques, sensitivity, work):
     """Power of the motors and all other forces at one point of the difference."""
     for j in range(q.size):
         sensitivity.moved_q[j] = q[j] + place * DIFFERENCE_STEP * sensitivity.q[i, j]
-        sensitivity.moved_v[j] = v[j] + place * DIFFERENCE_STEP * sensitivity.v[i, j]
+        sensitivity.moved_v[j] = v[j] + place * DIFFERENCE_STEP * dv[j]
     for r in range(lam.size):
         sensitivity.moved_lam[r] = lam[r] + place * DIFFERENCE_STEP * sensitivity.lam[i, r]
     note_torques(signals, t, torques)
@@ -153,14 +154,14 @@ def moved_power(system, signals, t, place, i, q, v, lam, torques, sensitivity, w
 
 
 @routine
-def power_sensitivity(moved, signals, times, i, q, v, lam, torques, sensitivity, work):
-    """Derivative of the power at stage i."""
+def power_sensitivity(moved, signals, times, i, q, v, dv, lam, torques, sensitivity, work):
+    """Derivative of the power at stage i, with a velocity v whose derivative is dv."""
     p0, p1, p2, p3 = moved
     s0, s1, s2, s3 = signals
-    total = WEIGHTS[0] * moved_power(p0, s0, times[0], PLACES[0], i, q, v, lam, torques, sensitivity, work)
-    total += WEIGHTS[3] * moved_power(p3, s3, times[3], PLACES[3], i, q, v, lam, torques, sensitivity, work)
-    total += WEIGHTS[1] * moved_power(p1, s1, times[1], PLACES[1], i, q, v, lam, torques, sensitivity, work)
-    total += WEIGHTS[2] * moved_power(p2, s2, times[2], PLACES[2], i, q, v, lam, torques, sensitivity, work)
+    total = WEIGHTS[0] * moved_power(p0, s0, times[0], PLACES[0], i, q, v, dv, lam, torques, sensitivity, work)
+    total += WEIGHTS[3] * moved_power(p3, s3, times[3], PLACES[3], i, q, v, dv, lam, torques, sensitivity, work)
+    total += WEIGHTS[1] * moved_power(p1, s1, times[1], PLACES[1], i, q, v, dv, lam, torques, sensitivity, work)
+    total += WEIGHTS[2] * moved_power(p2, s2, times[2], PLACES[2], i, q, v, dv, lam, torques, sensitivity, work)
     sensitivity.power[i] = total / DIFFERENCE_STEP
 
 
@@ -240,14 +241,22 @@ def sensitivity_steps(
                 history.least, i, torques, sensitivity, direction, space, work,
             )  # fmt: skip
             sensitivity.left[k] = max(sensitivity.left[k], left)
-            power_sensitivity(moved, pieces, moved_times(t, d_t), i, q, v, lam, torques, sensitivity, work)
+            dv, times = sensitivity.v[i], moved_times(t, d_t)
+            power_sensitivity(moved, pieces, times, i, q, v, dv, lam, torques, sensitivity, work)
+        long = is_long(system, tableau, controls, h)
+        for i in range(last + 1 if long else 0):
+            t, d_t = history.t[k] + tableau.c[i] * h, dt + tableau.c[i] * dh
+            q, v, dv, lam, times = history.q[k, i], work.v, work.x, history.lam[k, i], moved_times(t, d_t)
+            velocity_along_curve(tableau, k, i, history, sensitivity, v, dv)
+            take_pieces(signals, t, moved_signals, pieces)
+            power_sensitivity(moved, pieces, times, i, q, v, dv, lam, torques, sensitivity, work)
         if sensitivity.taken[0] == 0 and sensitivity.times[0] <= history.t[k]:
             keep_sample(0, 0, sensitivity)
             sensitivity.taken[0] = 1
         g, dg, sample = tableau.A[last, last] * h, tableau.A[last, last] * dh, last + 1
         i = sensitivity.taken[0]
         while i < sensitivity.times.size and sensitivity.times[i] <= history.t[k] + h * (1.0 + 1e-12):
-            sensitivity_at_sample(tableau, k, i, is_long(system, tableau, controls, h), history, sensitivity)
+            sensitivity_at_sample(tableau, k, i, long, history, sensitivity)
             if out.solved[i]:
                 for j in range(sensitivity.f.size):
                     da, jump = sensitivity.sample_a[i, j], out.a[i, j] - sensitivity.moved_v[j]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, fill
 from paraflex.kernel.compiling import by_reference, inlined, routine
-from paraflex.kernel.samples import interpolate
+from paraflex.kernel.samples import interpolate, node_slope
 
 # Central differences of fourth order over this part of a parameter's size, and their places and weights.
 DIFFERENCE_STEP = 1e-3
@@ -88,6 +88,19 @@ def work_sensitivity(tableau, k, history, sensitivity):
 
 
 @routine
+def velocity_along_curve(tableau, k, i, history, sensitivity, v, dv):
+    """Velocity at stage i of long step k, see `power_along_curve`, and its derivative, into v and dv."""
+    h = history.h[k]
+    fill(v, 0.0)
+    fill(dv, 0.0)
+    for s in tableau.nodes:
+        slope = node_slope(tableau, s, tableau.c[i]) / h
+        for j in range(v.size):
+            v[j] += slope * history.q[k, s, j]
+            dv[j] += slope * (sensitivity.q[s, j] - sensitivity.h[k] / h * history.q[k, s, j])
+
+
+@routine
 def node_sensitivity(tableau, fraction, d_fraction, stages, derivatives, out):
     """Derivative of values of stages at a fraction of a step that moves itself, as by `interpolate_nodes`."""
     fill(out, 0.0)
@@ -96,14 +109,7 @@ def node_sensitivity(tableau, fraction, d_fraction, stages, derivatives, out):
         for l in tableau.nodes:
             if l != s:
                 weight *= (fraction - tableau.c[l]) / (tableau.c[s] - tableau.c[l])
-        slope = 0.0
-        for skipped in tableau.nodes:
-            if skipped != s:
-                product = 1.0 / (tableau.c[s] - tableau.c[skipped])
-                for l in tableau.nodes:
-                    if l != s and l != skipped:
-                        product *= (fraction - tableau.c[l]) / (tableau.c[s] - tableau.c[l])
-                slope += product
+        slope = node_slope(tableau, s, fraction)
         for r in range(out.size):
             out[r] += weight * derivatives[s, r] + slope * d_fraction * stages[s, r]
 
