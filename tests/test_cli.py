@@ -79,14 +79,14 @@ def test_results_agree_with_the_summary(results):
 
 def test_second_run_gives_the_same_numbers(results, tmp_path):
     _, out = results
-    again = paraflex("run", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
+    again = paraflex("run", "--no-figures", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
     assert again.returncode == 0
     first, second = json.loads((out / "summary.json").read_text()), json.loads(again.stdout)
     assert first["modes"]["++++"]["tracking_rms"] == second["modes"]["++++"]["tracking_rms"]
 
 
 def test_json_is_all_that_is_on_stdout(tmp_path):
-    done = paraflex("run", "--mode", "++++", "--rigid", *FAST, "--out", str(tmp_path), "--json")
+    done = paraflex("run", "--no-figures", "--mode", "++++", "--rigid", *FAST, "--out", str(tmp_path), "--json")
     summary = json.loads(done.stdout)
     assert summary["modes"]["++++"]["tracking_rms"] < 1e-3
     assert summary["parameters"]["run"]["rigid"] is True
@@ -148,7 +148,7 @@ def test_unreachable_path_names_file_time_and_place(tmp_path):
 
 
 def test_mode_that_cannot_drive_is_reported_and_the_others_go_on(tmp_path):
-    done = paraflex("run", "--mode", "tau1", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
+    done = paraflex("run", "--no-figures", "--mode", "tau1", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
     assert done.returncode == 1
     assert 'mode "+---" cannot drive the mechanism: 1 active motor for 2 degrees of freedom' in done.stderr
     modes = json.loads(done.stdout)["modes"]
@@ -157,7 +157,9 @@ def test_mode_that_cannot_drive_is_reported_and_the_others_go_on(tmp_path):
 
 
 def test_too_many_steps_keep_what_there_is(tmp_path):
-    done = paraflex("run", "--mode", "++++", *FAST, "--max-steps", "20", "--out", str(tmp_path), "--json")
+    done = paraflex(
+        "run", "--no-figures", "--mode", "++++", *FAST, "--max-steps", "20", "--out", str(tmp_path), "--json"
+    )
     assert done.returncode == 1
     assert 'mode "++++": the run has not ended after 20 steps, at t = ' in done.stderr
     data = load_results(tmp_path / "results.nc")

@@ -261,8 +261,11 @@ def test_run_takes_controllers(robot, tmp_path):
 def test_the_study_names_controllers_and_none_is_none_of_them(robot, tmp_path):
     text = ROBOT.replace("[study]", '[study]\ncontrollers = ["pd"]')
     robot.write_text(text, encoding="utf-8")
-    assert paraflex("run", robot, *SHORT, "--out", tmp_path / "study").returncode == 0
-    assert paraflex("run", robot, *SHORT, "--controller", "none", "--out", tmp_path / "none").returncode == 0
+    assert paraflex("run", "--no-figures", robot, *SHORT, "--out", tmp_path / "study").returncode == 0
+    assert (
+        paraflex("run", "--no-figures", robot, *SHORT, "--controller", "none", "--out", tmp_path / "none").returncode
+        == 0
+    )
     assert list(told(tmp_path / "study")["controllers"]) == ["pd"]
     assert "controllers" not in told(tmp_path / "none")
     assert "--controller none" in run_command_line(asked(pf.open_results(tmp_path / "none")))

@@ -68,6 +68,7 @@ def test_frames_are_chosen_on_the_command_line(tmp_path):
         out = tmp_path / str(len(arguments))
         done = paraflex(
             "run",
+            "--no-figures",
             "--mode",
             "++++",
             "--duration",
@@ -88,7 +89,7 @@ def test_frames_are_chosen_on_the_command_line(tmp_path):
         (("--reference", "pined"), "--reference: unknown reference"),
         (("--rigid", "--curvature", "shared"), "--curvature: means nothing with --rigid"),
     ):
-        refused = paraflex("run", "--out", str(tmp_path / "none"), *arguments)
+        refused = paraflex("run", "--no-figures", "--out", str(tmp_path / "none"), *arguments)
         assert refused.returncode == 2
         assert says in refused.stderr
 

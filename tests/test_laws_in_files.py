@@ -550,7 +550,7 @@ def test_a_design_in_python_starts_anew(task):
 def test_run_and_summary(file, tmp_path):
     short = ("--duration", "0.02", "--samples", "21", "--rigid", "--mode", "++++", "--mode", "+-+-", "--no-report")
     for name, law in (("ct", "computed torque"), ("lq", "LQG of 4 states")):
-        ran = paraflex("run", file, "--controller", name, *short, "--out", tmp_path / name)
+        ran = paraflex("run", "--no-figures", file, "--controller", name, *short, "--out", tmp_path / name)
         assert ran.returncode == 0, ran.stderr
         assert law in ran.stdout
         modes = json.loads((tmp_path / name / "summary.json").read_text())["modes"]

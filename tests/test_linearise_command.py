@@ -264,7 +264,9 @@ def test_about_motions():
 def test_about_the_runs_of_a_folder(tmp_path):
     """With a path and without: the same as about the run in Python."""
     few = ["--samples", "51", "--no-report"]
-    done = paraflex("run", "-m", "five_bar", "--path", "line", "--duration", "0.1", *few, "--out", tmp_path / "path")
+    done = paraflex(
+        "run", "--no-figures", "-m", "five_bar", "--path", "line", "--duration", "0.1", *few, "--out", tmp_path / "path"
+    )
     assert done.returncode == 0, done.stderr
     numbers = json.loads(paraflex("linearise", tmp_path / "path", "--at", "0.05", "--json").stdout)
     model = pf.load("five_bar")
@@ -275,13 +277,13 @@ def test_about_the_runs_of_a_folder(tmp_path):
     assert np.array_equal(poles, found.poles())
     assert numbers["parameters"]["run"]["results"] == str(tmp_path / "path")
     own = ["-m", "slider_crank_flexible", "--duration", "0.05"]
-    assert paraflex("run", *own, *few, "--out", tmp_path / "own").returncode == 0
+    assert paraflex("run", "--no-figures", *own, *few, "--out", tmp_path / "own").returncode == 0
     said = paraflex("linearise", tmp_path / "own" / "results.nc", "--at", "0.02")
     assert "about the run at t = 0.02 s: 10 states" in said.stdout, said.stderr
     file, changed = tmp_path / "mine.toml", tmp_path / "changed"
     file.write_text(library_text("five_bar"))
     line = ["-m", file, "--path", "line", "--duration", "0.02"]
-    assert paraflex("run", *line, "--samples", "5", "--no-report", "--out", changed).returncode == 0
+    assert paraflex("run", "--no-figures", *line, "--samples", "5", "--no-report", "--out", changed).returncode == 0
     file.write_text(library_text("five_bar").replace("mass = 0.100", "mass = 0.200", 1))
     for words, problem in (
         ([tmp_path / "path", "--pose", "start"], "--pose: means nothing for results"),
@@ -297,7 +299,9 @@ def test_about_the_runs_of_a_folder(tmp_path):
 
 def test_a_run_from_equilibrium_is_made_again_from_there(tmp_path):
     few = ("--duration", "0.01", "--samples", "3", "--no-report")
-    ran = paraflex("run", "five_bar", "--set", "gravity=[0,-9.81]", "--balanced", *few, "--out", tmp_path)
+    ran = paraflex(
+        "run", "--no-figures", "five_bar", "--set", "gravity=[0,-9.81]", "--balanced", *few, "--out", tmp_path
+    )
     assert ran.returncode == 0
     energy = pf.open_results(tmp_path)["strain_energy"].values[0]
     _, runs = repeated_runs(str(tmp_path))

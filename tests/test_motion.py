@@ -214,7 +214,7 @@ def test_a_path_may_start_from_equilibrium(tmp_path):
     file.write_text(source)
     steps = {}
     for extra in ([], ["--balanced"]):
-        done = paraflex("run", "-m", str(file), *extra, "--duration", "0.1", "--samples", "11", "--json",
+        done = paraflex("run", "--no-figures", "-m", str(file), *extra, "--duration", "0.1", "--samples", "11", "--json",
                         "--out", str(tmp_path / "out"))  # fmt: skip
         assert done.returncode == 0, done.stderr
         summary = json.loads(done.stdout)

@@ -78,7 +78,7 @@ def write(folder, *changes):
 def test_the_study_says_how_the_tool_is_held(tmp_path):
     file = write(tmp_path)
     assert load(file).study.orientation == 1.3
-    done = paraflex("run", "-m", str(file), "--tol", "1e-6", "--out", str(tmp_path / "out"), "--json")
+    done = paraflex("run", "--no-figures", "-m", str(file), "--tol", "1e-6", "--out", str(tmp_path / "out"), "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["modes"]["+++"]["tracking_rms"] < 1e-5
     angle = load_results(tmp_path / "out" / "results.nc")["angle_desired"].sel(body="tool")

@@ -226,7 +226,7 @@ def signals_at(system):
 
 
 def test_the_command_says_how_far_off_it_is(tmp_path):
-    done = paraflex("run", "five_bar", "--reduced", "14", "--out", "r", cwd=tmp_path)
+    done = paraflex("run", "--no-figures", "five_bar", "--reduced", "14", "--out", "r", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "14 of 52 flexible coordinates, 32 of 108 states" in " ".join(done.stdout.split())
     numbers = json.loads((tmp_path / "r" / "summary.json").read_text())["modes"]["++"]
@@ -260,9 +260,11 @@ def reduced_file(tmp_path_factory):
 
 
 def test_a_study_may_say_it(reduced_file):
-    done = paraflex("run", "few.toml", "--json", "--no-report", "--out", "a", cwd=reduced_file)
+    done = paraflex("run", "--no-figures", "few.toml", "--json", "--no-report", "--out", "a", cwd=reduced_file)
     assert json.loads(done.stdout)["modes"]["++"]["reduction"]["flexible_coordinates"] == 10
-    done = paraflex("run", "few.toml", "--reduced", "0", "--json", "--no-report", "--out", "b", cwd=reduced_file)
+    done = paraflex(
+        "run", "--no-figures", "few.toml", "--reduced", "0", "--json", "--no-report", "--out", "b", cwd=reduced_file
+    )
     assert "reduction" not in json.loads(done.stdout)["modes"]["++"]
 
 

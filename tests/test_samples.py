@@ -59,7 +59,7 @@ def test_a_stress_that_samples_miss_is_found_with_the_number_that_has_it(shaper)
 
 
 def test_terminal_report_and_summary_say_so(shaper, tmp_path):
-    ran = paraflex("run", shaper, "--balanced", "--samples", 51, "--out", tmp_path / "few")
+    ran = paraflex("run", "--no-figures", shaper, "--balanced", "--samples", 51, "--out", tmp_path / "few")
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout.count(f"[{CODE}]") == 1
     assert CODE in (tmp_path / "few" / "report.html").read_text(encoding="utf-8")

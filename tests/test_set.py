@@ -105,7 +105,7 @@ def test_texts_of_a_shell_stand_for_values(text, value):
 def test_commands_set_values_and_results_tell_them(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     given = ["--set", "bar.thickness=6 mm", "--set", "study.samples=11"]
-    out = paraflex("run", "five_bar", *given, "--duration", "0.05", "--mode", "++", "--out", "set")
+    out = paraflex("run", "--no-figures", "five_bar", *given, "--duration", "0.05", "--mode", "++", "--out", "set")
     assert out.returncode == 0, out.stderr
     data = pf.load_results("set")
     told = json.loads(data.attrs["parameters"])

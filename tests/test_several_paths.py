@@ -66,13 +66,15 @@ def test_one_table_has_all_paths_and_modes(two):
 
 
 def test_where_results_are_comes_last(tmp_path):
-    done = paraflex("run", "five_bar", *PATHS, "--mode", "++", *FAST, "--out", tmp_path, mixed=True)
+    done = paraflex("run", "--no-figures", "five_bar", *PATHS, "--mode", "++", *FAST, "--out", tmp_path, mixed=True)
     last = done.stdout.splitlines()[-2:]
     assert [line.rpartition(" ")[2] for line in last] == [str(tmp_path / path) for path in ("line", "square")]
 
 
 def test_json_lists_both(tmp_path):
-    done = paraflex("run", "five_bar", *PATHS, "--mode", "++", "--mode", "left", *FAST, "--out", tmp_path, "--json")
+    done = paraflex(
+        "run", "--no-figures", "five_bar", *PATHS, "--mode", "++", "--mode", "left", *FAST, "--out", tmp_path, "--json"
+    )
     assert done.returncode == 1  # one motor cannot drive it
     told = json.loads(done.stdout)["paths"]
     assert [*told] == ["line", "square"]
@@ -91,11 +93,11 @@ def test_the_study_names_paths(tmp_path):
     assert model.duration("line") == pytest.approx(0.7 * model.path("line").duration / model.path("square").duration)
     model.save(tmp_path / "again.toml")
     assert pf.load(tmp_path / "again.toml").study == model.study
-    done = paraflex("run", file, "--rigid", *FAST, "--out", tmp_path / "out", "--json")
+    done = paraflex("run", "--no-figures", file, "--rigid", *FAST, "--out", tmp_path / "out", "--json")
     assert done.returncode == 0, done.stderr
     assert [*json.loads(done.stdout)["paths"]] == ["square", "line"]
     # What is asked for goes before what the study has, and one path has the folder for itself.
-    one = paraflex("run", file, "--rigid", "--path", "line", *FAST, "--out", tmp_path / "one", "--json")
+    one = paraflex("run", "--no-figures", file, "--rigid", "--path", "line", *FAST, "--out", tmp_path / "one", "--json")
     assert json.loads(one.stdout)["parameters"]["run"]["path"] == "line"
     assert (tmp_path / "one" / "results.nc").is_file()
 
@@ -197,10 +199,12 @@ def test_names_are_made_portable_and_two_of_one_folder_refused(tmp_path):
     table = FAR.replace("9.0", "0.05").replace("0.0, 0.3", "-0.05, 0.3")
     more = "".join(table.replace("path.far", f'path."{name}"') for name in ("a:b", "A?B"))
     file = model_file(tmp_path, 'modes = ["++"]', more)
-    done = paraflex("run", file, "--path", "a:b", "--path", "A?B", *FAST, "--out", tmp_path / "out")
+    done = paraflex("run", "--no-figures", file, "--path", "a:b", "--path", "A?B", *FAST, "--out", tmp_path / "out")
     assert done.returncode == 2
     assert "results of a:b and A?B would lie in one folder" in done.stderr
-    done = paraflex("run", file, "--path", "a:b", "--path", "line", "--rigid", *FAST, "--out", tmp_path / "out")
+    done = paraflex(
+        "run", "--no-figures", file, "--path", "a:b", "--path", "line", "--rigid", *FAST, "--out", tmp_path / "out"
+    )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "out" / "a_b" / "summary.json").is_file()
 

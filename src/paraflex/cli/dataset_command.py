@@ -50,9 +50,9 @@ class DatasetCommand:
             from paraflex.cli.writing import write_drawn, write_numbers
 
             write_numbers(data, self.summary(data), folder, self.files)
-            write_drawn(data, folder, report=chosen.report)
+            write_drawn(data, folder, chosen.drawn)
         if not chosen.json:
-            say_where(began, "numbers, figures", folder.path, report=chosen.report)
+            say_where(began, "numbers", folder.path, chosen.drawn)
         return data
 
     def _tell(self, chosen: FilesChoice, data: xr.Dataset) -> xr.Dataset:

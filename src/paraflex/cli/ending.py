@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 
 from paraflex.cli import COMPLETE, TROUBLE, signals
+from paraflex.cli.commands.options import DrawnChoice
 from paraflex.cli.tables import plain_console, warn_of
 from paraflex.findings import Finding
 
@@ -47,12 +48,14 @@ def tell(
         show(out)
 
 
-def say_where(began: float, what: str, folder: Path, *, report: bool = False) -> None:
+def say_where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> None:
     """Print the last line of a command."""
-    plain_console(stderr=True).print(where(began, what, folder, report=report), soft_wrap=True)
+    plain_console(stderr=True).print(where(began, what, folder, drawn), soft_wrap=True)
 
 
-def where(began: float, what: str, folder: Path, *, report: bool = False) -> str:
+def where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> str:
     """How long something took until now, and where things are."""
-    more = " and report.html" if report else ""
-    return f"{time.perf_counter() - began:.1f} s; {what}{more} in {folder}"
+    if drawn is not None:
+        what += ", figures" if drawn.figures else ""
+        what += " and report.html" if drawn.report else ""
+    return f"{time.perf_counter() - began:.1f} s; {what} in {folder}"

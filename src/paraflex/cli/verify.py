@@ -72,9 +72,9 @@ def _verify(
     tell(summary, show, as_json=request.json)
     try:
         if data is not None:
-            write_drawn(data, folder, report=request.report)
+            write_drawn(data, folder, request.drawn)
             if not request.json:
-                say_where(began, "numbers, figures", folder.path, report=request.report)
+                say_where(began, "numbers", folder.path, request.drawn)
     finally:
         for mode, by_model in verification.runs.items():
             for name, runs in by_model.items():

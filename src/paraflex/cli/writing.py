@@ -7,6 +7,7 @@ from typing import Any
 
 import xarray as xr
 
+from paraflex.cli.commands.options import DrawnChoice
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import where
 from paraflex.errors import OutputError
@@ -15,6 +16,7 @@ from paraflex.results import save_results
 from paraflex.writing import write_json
 
 _LATER = "paraflex plot and paraflex report draw them"
+_FIGURES = DrawnChoice(report=False)
 
 
 def write_numbers(
@@ -31,18 +33,19 @@ def write_numbers(
 
 def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest, began: float) -> str:
     """Add the figures of a run, and the report if it is wanted; a line that says where all is."""
-    write_drawn(data, folder, report=request.report)
-    return where(began, "results, figures", folder.path, report=request.report)
+    write_drawn(data, folder, request.drawn)
+    return where(began, "results", folder.path, request.drawn)
 
 
-def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, *, report: bool = False) -> None:
+def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, drawn: DrawnChoice = _FIGURES) -> None:
     """Add figures, and the report of a dataset, to results that are written: an interruption costs these alone."""
     from paraflex.plots import save_figures
 
     try:
         with folder.amended() as new:
-            save_figures(results, new / "figures")
-            if report and isinstance(results, xr.Dataset):
+            if drawn.figures:
+                save_figures(results, new / "figures")
+            if drawn.report and isinstance(results, xr.Dataset):
                 from paraflex.cli.report import page_of, save_page  # it takes a second
 
                 save_page(page_of(results, folder.path), new / "report.html")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from paraflex.fem import (
     modal_basis,
     node_weights,
 )
+from paraflex.fem.element import transverse_shape
 from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
@@ -226,13 +226,12 @@ def transverse_pieces(body: BodyCoordinates) -> Array:
     """
     mesh = body.mesh
     assert mesh is not None
-    z = np.linspace(0.0, 1.0, 6)
-    pieces = []
-    for a, b in pairwise(mesh.nodes):
-        # Six values determine a quintic; at a node the shape is the same from either side.
-        rows = np.array([mesh.shape_at(a + x * (b - a))[0][1] for x in z])
+    # Six values determine a quintic.
+    z, pieces = np.linspace(0.0, 1.0, 6), []
+    for e, length in enumerate(np.diff(mesh.nodes)):
+        rows = mesh.scatter(e, transverse_shape(z * length, length))
         powers = np.linalg.solve(np.vander(z, increasing=True), rows)
-        pieces.append(powers / ((b - a) ** np.arange(6))[:, None] @ body.integrals.D)
+        pieces.append(powers / (length ** np.arange(6))[:, None] @ body.integrals.D)
     return np.array(pieces)
 
 

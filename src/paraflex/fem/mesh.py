@@ -117,7 +117,7 @@ class BeamMesh:
         elements = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.n_elements - 1)
         kind = np.result_type(x, self.nodes)
         N, slope = np.zeros((x.size, 2, self.n_nodal), kind), np.zeros((x.size, self.n_nodal), kind)
-        for element in range(self.n_elements):
+        for element in np.unique(elements):
             own = elements == element
             length = self.nodes[element + 1] - self.nodes[element]
             local = x[own] - self.nodes[element]

@@ -58,6 +58,14 @@ ReportOption = Annotated[bool, Option("--report/--no-report", help="Write report
 
 
 @dataclass(frozen=True)
+class DrawnChoice:
+    """What is drawn of results."""
+
+    figures: Annotated[bool, Option("--figures/--no-figures", help="Draw figures, or leave them out.")] = True
+    report: ReportOption = True
+
+
+@dataclass(frozen=True)
 class ModelChoice:
     """A model, named by an argument or by --mechanism.
 
@@ -129,7 +137,7 @@ class FilesChoice:
         Option("--out", "--output", metavar="DIR", help="Folder for data, their summary as JSON, figures and report."),
     ] = None
     force: ReplaceOption = False
-    report: ReportOption = True
+    drawn: DrawnChoice = field(default_factory=DrawnChoice)
     json: Json = False
 
 

@@ -11,6 +11,7 @@ from paraflex.cli.commands.options import (
     METRES,
     PER_SECOND,
     SECONDS,
+    DrawnChoice,
     FramesChoice,
     Json,
     MethodOption,
@@ -18,7 +19,6 @@ from paraflex.cli.commands.options import (
     PathOption,
     PlanChoice,
     ReplaceOption,
-    ReportOption,
     ToleranceOption,
 )
 
@@ -127,7 +127,7 @@ class RunRequest:
     ] = None
     out: Annotated[str, Option(metavar="DIR", help="Folder for results and figures.")] = "results"
     force: ReplaceOption = False
-    report: ReportOption = True
+    drawn: DrawnChoice = field(default_factory=DrawnChoice)
     json: Json = False
 
 
@@ -161,7 +161,7 @@ class VerifyRequest:
     plan: PlanChoice = field(default_factory=PlanChoice)
     out: Annotated[str, Option(metavar="DIR", help="Folder for numbers and figures.")] = "verification"
     force: ReplaceOption = False
-    report: ReportOption = True
+    drawn: DrawnChoice = field(default_factory=DrawnChoice)
     json: Json = False
 
 
