@@ -22,15 +22,18 @@ class OwnStatics:
     model : Model
     assembly : str, optional
         By default its own start, else the assembly of its study.
+    buckling : bool
+        Whether factors of buckling are asked for: they take half of the time.
     """
 
     model: Model
     assembly: str | None
+    buckling: bool
 
     def found(self) -> Statics:
         """The equilibria; see `equilibria.statics` for the errors."""
         own = None if self.model.start is not None else self.model.study.assembly
-        return statics(self.model, assembly=self.assembly or own, warning=False)
+        return statics(self.model, assembly=self.assembly or own, buckling=None if self.buckling else 0, warning=False)
 
 
 def check_of_statics(given: Collection[str]) -> None:

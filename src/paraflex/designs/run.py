@@ -130,7 +130,9 @@ def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
         return under_control(_planned(setting, model, task), model.acting()), options
     _compile(model.mechanism)
     if setting.statics:
-        return OwnStatics(model, setting.assembly), options
+        return OwnStatics(
+            model, setting.assembly, setting.trajectories or "buckling_factor" in setting.metrics
+        ), options
     motion = own_motion(model, setting.duration, setting.samples, setting.assembly, balanced=setting.balanced)
     return motion, options
 
