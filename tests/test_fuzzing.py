@@ -16,7 +16,7 @@ import fuzz_models
 import mutations
 
 
-@pytest.mark.parametrize(("through", "cases"), [("info", 150), ("run", 80), ("study", 150)])
+@pytest.mark.parametrize(("through", "cases"), [("info", 100), ("run", 80), ("study", 100)])
 def test_wrong_files_end_in_results_or_in_errors_of_ours(through, cases):
     found = fuzz_models.fuzz(range(cases), through)
     assert found.failures == {}

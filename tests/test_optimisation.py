@@ -523,8 +523,7 @@ def test_command_line(tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_control_c_keeps_what_is_done(tmp_path):
-    text = STUDY.replace("duration = 0.15", "duration = 0.7").replace("line", "square") + OBJECTIVE
-    text = text.replace("1e-4", "1e-5") + '[search]\nevaluations = 5000\nmethod = "differential-evolution"\n'
+    text = STUDY + OBJECTIVE + '[search]\nevaluations = 5000\nmethod = "differential-evolution"\n'
     file, out = write_study(tmp_path, text), tmp_path / "out"
     command = [sys.executable, "-W", "error", "-m", "paraflex", "optimise", file, "--output", out]
     with started(*command) as child:
