@@ -454,6 +454,18 @@ def test_a_run_without_a_path_has_a_report(tmp_path):
     assert animation(data.drop_vars("shape"), ()) is None
 
 
+def test_figures_and_report_are_left_out_where_they_are_not_wanted(tmp_path):
+    """Those of the results before go with them."""
+    command = ("run", "pendulum", "--duration", "0.1", "--samples", "11", "--out", tmp_path / "out")
+    for options, kept in (((), {"figures", "report.html"}), (("--no-figures",), {"report.html"}),
+                          (("--no-figures", "--no-report"), set())):  # fmt: skip
+        done = paraflex(*command, *options)
+        assert done.returncode == 0, done.stderr
+        assert {name for name in ("figures", "report.html") if (tmp_path / "out" / name).exists()} == kept
+        named = {name for name in ("figures", "report.html") if name in done.stderr.splitlines()[-1]}
+        assert named == kept
+
+
 def test_verify_has_a_report(tmp_path):
     done = paraflex("verify", "--model", "rigid", "--model", "linear", "--duration", "0.02", "--samples", "11",
                     "--tol", "1e-4", "--out", str(tmp_path))  # fmt: skip
