@@ -264,8 +264,8 @@ def test_where_info_recommends_a_balanced_start_there_is_one(name, tmp_path):
     if model.start is not None and model.start.places:
         return
     done = paraflex(
-        "run", "--no-figures", "-m", name, "--balanced", "--duration", "0.01", "--samples", "3", "--no-report", "--json",
-        "--tol", "1e-4", "--out", str(tmp_path / "out"),
+        "run", "-m", name, "--balanced", "--duration", "0.01", "--samples", "3", "--no-report", "--json",
+        "--no-figures", "--tol", "1e-4", "--out", str(tmp_path / "out"),
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     json.loads(done.stdout)

@@ -214,8 +214,8 @@ def test_a_path_may_start_from_equilibrium(tmp_path):
     file.write_text(source)
     steps = {}
     for extra in ([], ["--balanced"]):
-        done = paraflex("run", "--no-figures", "-m", str(file), *extra, "--duration", "0.1", "--samples", "11", "--json",
-                        "--out", str(tmp_path / "out"))  # fmt: skip
+        done = paraflex("run", "-m", str(file), *extra, "--duration", "0.1", "--samples", "11", "--json",
+                        "--no-figures", "--out", str(tmp_path / "out"))  # fmt: skip
         assert done.returncode == 0, done.stderr
         summary = json.loads(done.stdout)
         steps[bool(extra)] = summary["modes"]["++"]["steps"]

@@ -454,7 +454,7 @@ def test_a_run_without_a_path_has_a_report(tmp_path):
     assert animation(data.drop_vars("shape"), ()) is None
 
 
-def test_figures_and_report_are_left_out_where_they_are_not_wanted(tmp_path):
+def test_what_is_drawn_is_left_out_where_they_are_not_wanted(tmp_path):
     """Those of the results before go with them."""
     command = ("run", "pendulum", "--duration", "0.1", "--samples", "11", "--out", tmp_path / "out")
     for options, kept in (((), {"figures", "report.html"}), (("--no-figures",), {"report.html"}),

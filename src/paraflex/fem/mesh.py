@@ -117,8 +117,10 @@ class BeamMesh:
         elements = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.n_elements - 1)
         kind = np.result_type(x, self.nodes)
         N, slope = np.zeros((x.size, 2, self.n_nodal), kind), np.zeros((x.size, self.n_nodal), kind)
-        for element in np.unique(elements):
+        for element in range(self.n_elements):
             own = elements == element
+            if not own.any():
+                continue
             length = self.nodes[element + 1] - self.nodes[element]
             local = x[own] - self.nodes[element]
             N[own, 0] = self.scatter(element, axial_shape(local, length))
