@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import isfinite
 
+import numpy as np
+
 from paraflex.kernel.arrays import add, copy, fill, largest
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import stored_energy
@@ -36,6 +38,9 @@ FORCES, MOST = 1e-6, 12
 NO_CHANGE = 1e-5
 # And between samples that are kept, interpolated ones may be off by this part.
 FORCES_BETWEEN = 2e-2
+# Integrals over the first part of a step, of polynomials through powers at its stages.
+GAUSS_X, GAUSS_W = (0.5 * values for values in np.polynomial.legendre.leggauss(4))
+GAUSS_X += 0.5
 
 
 @inlined
@@ -60,7 +65,8 @@ def is_long(system, tableau, controls, h):
 def place_samples(tableau, t, h, long, march, out):
     """Interpolate the state, accelerations and multipliers at every sample time in the step; the first of them.
 
-    In a step that is long beside vibrations deflections follow loads, and velocities at its ends say little of them.
+    In a step that is long beside vibrations deflections follow loads, and velocities of its stages say little of them:
+    positions are those of a curve through all stages, and velocities its derivative.
     """
     piece, first = 0, march.counts[SAMPLE]
     i = first
@@ -79,6 +85,7 @@ def place_samples(tableau, t, h, long, march, out):
         interpolate_nodes(tableau, (time - t) / h, march.stage_lam, out.lam[i])
         if long:
             interpolate_nodes(tableau, (time - t) / h, march.stage_q, out.q[i])
+            differentiate_nodes(tableau, (time - t) / h, h, march.stage_q, out.v[i])
         i += 1
     march.counts[SAMPLE] = i
     return first
@@ -211,12 +218,27 @@ def write_energies(system, tableau, t, h, first, march, work, out):
     for i in range(first, march.counts[SAMPLE]):
         kinetic, strain, weight = stored_energy(system, out.q[i], out.v[i], out.lam[i], work.scratch)
         out.energy[i, 0], out.energy[i, 1] = kinetic, strain
-        # Within the step by the cubic with the power at its ends; over the whole step by the scheme's own quadrature.
-        done, last = min(max((out.times[i] - t) / h, 0.0), 1.0), march.power.size - 1
-        left = 1.0 - done
-        out.energy[i, 2] = march.clock[WORK] + done * done * (3.0 - 2.0 * done) * step_work(tableau, h, march)
-        out.energy[i, 2] += h * done * left * (left * march.power[0] - done * march.power[last])
+        out.energy[i, 2] = march.clock[WORK]
+        done = min(max((out.times[i] - t) / h, 0.0), 1.0)
+        for s in range(march.power.size):
+            out.energy[i, 2] += h * work_weight(tableau, s, done)[0] * march.power[s]
         out.energy[i, 2] += weight - march.clock[WEIGHT_0]
+
+
+@routine
+def work_weight(tableau, s, x):
+    """Weight of the power at stage s in the work done until fraction x of a step, over its length; its derivative by x.
+
+    The polynomial through the powers at the nodes is integrated; a cubic brings the whole to the scheme's quadrature.
+    """
+    part, value, left = 0.0, 0.0, tableau.A[tableau.c.size - 1, s]
+    for k in tableau.nodes:
+        if k == s:
+            value = node_value(tableau, s, x)
+            for g in range(GAUSS_X.size):
+                part += x * GAUSS_W[g] * node_value(tableau, s, x * GAUSS_X[g])
+                left -= GAUSS_W[g] * node_value(tableau, s, GAUSS_X[g])
+    return part + x * x * (3.0 - 2.0 * x) * left, value + 6.0 * x * (1.0 - x) * left
 
 
 @routine
@@ -230,19 +252,22 @@ def step_work(tableau, h, march):
 
 @routine
 def power_along_curve(system, signals, tableau, t, h, q, lam, power, torques, work):
-    """Power at the stages of a long step, whose velocities there are those of the curve through q (stages, n).
-
-    Those of its stages say little of deflections that follow loads, as at its ends.
-    """
+    """Power at the stages of a long step, whose velocities there are those of the curve through q (stages, n)."""
     for i in range(power.size):
         time = t + tableau.c[i] * h
-        fill(work.v, 0.0)
-        for k in tableau.nodes:
-            slope = node_slope(tableau, k, tableau.c[i]) / h
-            for j in range(work.v.size):
-                work.v[j] += slope * q[k, j]
+        differentiate_nodes(tableau, tableau.c[i], h, q, work.v)
         note_torques(signals, time, torques)
         power[i] = input_power(system, signals, time, q[i], work.v, lam[i], torques, work)
+
+
+@inlined
+def node_value(tableau, k, x):
+    """Value at fraction x of the polynomial that is one at node k and zero at the others."""
+    value = 1.0
+    for l in tableau.nodes:
+        if l != k:
+            value *= (x - tableau.c[l]) / (tableau.c[k] - tableau.c[l])
+    return value
 
 
 @inlined
@@ -264,9 +289,16 @@ def interpolate_nodes(tableau, x, stages, out):
     """Values at fraction x of the step: the polynomial through those of the stages (stages, k) at the nodes."""
     fill(out, 0.0)
     for k in tableau.nodes:
-        weight = 1.0
-        for l in tableau.nodes:
-            if l != k:
-                weight *= (x - tableau.c[l]) / (tableau.c[k] - tableau.c[l])
+        weight = node_value(tableau, k, x)
         for r in range(out.size):
             out[r] += weight * stages[k, r]
+
+
+@routine
+def differentiate_nodes(tableau, x, h, stages, out):
+    """Derivatives by time of what `interpolate_nodes` finds, in a step of length h."""
+    fill(out, 0.0)
+    for k in tableau.nodes:
+        slope = node_slope(tableau, k, x) / h
+        for r in range(out.size):
+            out[r] += slope * stages[k, r]

@@ -247,7 +247,7 @@ def sensitivity_steps(
         for i in range(last + 1 if long else 0):
             t, d_t = history.t[k] + tableau.c[i] * h, dt + tableau.c[i] * dh
             q, v, dv, lam, times = history.q[k, i], work.v, work.x, history.lam[k, i], moved_times(t, d_t)
-            velocity_along_curve(tableau, k, i, history, sensitivity, v, dv)
+            velocity_along_curve(tableau, k, tableau.c[i], 0.0, history, sensitivity, v, dv)
             take_pieces(signals, t, moved_signals, pieces)
             power_sensitivity(moved, pieces, times, i, q, v, dv, lam, torques, sensitivity, work)
         if sensitivity.taken[0] == 0 and sensitivity.times[0] <= history.t[k]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, fill
 from paraflex.kernel.compiling import by_reference, inlined, routine
-from paraflex.kernel.samples import interpolate, node_slope
+from paraflex.kernel.samples import differentiate_nodes, interpolate, node_slope, work_weight
 
 # Central differences of fourth order over this part of a parameter's size, and their places and weights.
 DIFFERENCE_STEP = 1e-3
@@ -88,16 +88,19 @@ def work_sensitivity(tableau, k, history, sensitivity):
 
 
 @routine
-def velocity_along_curve(tableau, k, i, history, sensitivity, v, dv):
-    """Velocity at stage i of long step k, see `power_along_curve`, and its derivative, into v and dv."""
+def velocity_along_curve(tableau, k, x, d_x, history, sensitivity, v, dv):
+    """Velocity at fraction x of long step k, by `differentiate_nodes`, and its derivative, into v and dv."""
     h = history.h[k]
-    fill(v, 0.0)
-    fill(dv, 0.0)
+    differentiate_nodes(tableau, x, h, history.q[k], v)
+    differentiate_nodes(tableau, x, h, sensitivity.q, dv)
+    for j in range(v.size):
+        dv[j] -= sensitivity.h[k] / h * v[j]
     for s in tableau.nodes:
-        slope = node_slope(tableau, s, tableau.c[i]) / h
+        bend = 0.0
+        for e in range(4):
+            bend += WEIGHTS[e] * node_slope(tableau, s, x + PLACES[e] * DIFFERENCE_STEP) / DIFFERENCE_STEP
         for j in range(v.size):
-            v[j] += slope * history.q[k, s, j]
-            dv[j] += slope * (sensitivity.q[s, j] - sensitivity.h[k] / h * history.q[k, s, j])
+            dv[j] += d_x * bend / h * history.q[k, s, j]
 
 
 @routine
@@ -117,7 +120,7 @@ def node_sensitivity(tableau, fraction, d_fraction, stages, derivatives, out):
 @routine
 def sensitivity_at_sample(tableau, k, i, long, history, sensitivity):
     """Derivatives at sample i, within step k, of the curves there; their accelerations into sensitivity.moved_v."""
-    t, h, last = history.t[k], history.h[k], tableau.c.size - 1
+    t, h = history.t[k], history.h[k]
     time, d_time = sensitivity.times[i], sensitivity.sample_times[i] - sensitivity.t[k]
     piece = 0
     while piece < tableau.dense.size - 2 and time > t + tableau.c[tableau.dense[piece + 1]] * h:
@@ -142,19 +145,18 @@ def sensitivity_at_sample(tableau, k, i, long, history, sensitivity):
                 sensitivity.sample_a[i, j] += WEIGHTS[e] * a / DIFFERENCE_STEP
     fraction = (time - t) / h
     done = min(max(fraction, 0.0), 1.0)
-    d_done, left = (d_time - fraction * sensitivity.h[k]) / h, 1.0 - done
+    d_done = (d_time - fraction * sensitivity.h[k]) / h
     node_sensitivity(tableau, fraction, d_done, history.lam[k], sensitivity.lam, sensitivity.sample_lam[i])
     if long:
         node_sensitivity(tableau, fraction, d_done, history.q[k], sensitivity.q, sensitivity.sample_q[i])
-    work, d_work = work_sensitivity(tableau, k, history, sensitivity)
-    first, end = history.power[k, 0], history.power[k, last]
-    sensitivity.sample_work[i] = (
-        sensitivity.work[1] + done * done * (3.0 - 2.0 * done) * d_work + 6.0 * done * left * d_done * work
-    )
-    bend = done * left * (left * first - done * end)
-    d_bend = (left - done) * (left * first - done * end) - done * left * (first + end)
-    sensitivity.sample_work[i] += sensitivity.h[k] * bend + h * d_done * d_bend
-    sensitivity.sample_work[i] += h * done * left * (left * sensitivity.power[0] - done * sensitivity.power[last])
+        velocity_along_curve(
+            tableau, k, fraction, d_done, history, sensitivity, sensitivity.moved_q, sensitivity.sample_v[i]
+        )
+    sensitivity.sample_work[i] = sensitivity.work[1]
+    for s in range(history.power.shape[1]):
+        weight, slope = work_weight(tableau, s, done)
+        sensitivity.sample_work[i] += weight * (h * sensitivity.power[s] + sensitivity.h[k] * history.power[k, s])
+        sensitivity.sample_work[i] += h * slope * d_done * history.power[k, s]
 
 
 @inlined
