@@ -269,6 +269,8 @@ def test_torques_of_a_file_hold_an_arm_level(tmp_path):
     file = tmp_path / "arm.toml"
     file.write_text(SHORT)
     assert load(file).study.torques == {"drive": 4.905}
+    assert abs(simulate_motion(load(file), 1.0, samples=3).solution.q[-1, 2]) < 1e-9
+    assert simulate_motion(load(file), 1.0, samples=3, torques={}).solution.q[-1, 2] < -1.0
     done = paraflex("run", "-m", str(file), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
     assert "--duration: the model has no path, and nothing says how long it is to run" in done.stderr

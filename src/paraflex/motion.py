@@ -110,13 +110,15 @@ def simulate_motion(
     Parameters
     ----------
     mechanism : Mechanism or Model
-        A model stands for its mechanism, its [start] and the duration of its [study]; nothing else is taken from that.
+        A model stands for its mechanism, its [start], and the duration and torques of its [study]; nothing else is
+        taken from that.
     duration : float, optional
         [s]; by default that of the model's study.
     samples : int
         Times at which results are kept, evenly spaced, both ends among them.
     torques : mapping of str to float or AngleLaw, optional
-        Torque of each motor by name [N m], constant or a law in time, which may jump; zero for the others.
+        Torque of each motor by name [N m], constant or a law in time, which may jump; zero for the others. By default
+        those of the model's study.
     start : State, Start or str, optional
         Where it starts: the name of an assembly, at rest and undeformed; a `mechanism.Start` near the first assembly
         (near another, see `dynamics.start_state`); or a `dynamics.consistent_state`. The first assembly by default.
@@ -149,11 +151,13 @@ def simulate_motion(
     given, mechanism = mechanism, Mechanism.made_of(mechanism)
     options = choose(method, options)
     names = [motor.name for motor in mechanism.motors]
-    for name, torque in (torques or {}).items():
+    if torques is None:
+        torques = getattr(getattr(given, "study", None), "torques", {})
+    for name, torque in torques.items():
         known(name, names, "torques", "motor")
         if not isinstance(torque, AngleLaw) and not np.isfinite(torque):
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
-    values = {name: (torques or {}).get(name, 0.0) for name in names}
+    values = {name: torques.get(name, 0.0) for name in names}
     system, state, times = motion_start(given, duration, samples, start, balanced=balanced, warning=warning)
     end = float(times[-1])
     motors, own = _motor_signals(values, end)

@@ -387,7 +387,8 @@ _ALL = (
                 lambda x: x.stiffness[-1], each=DIRECTION),
     _of_statics("stiffness_min", "least stiffness of each coordinate asked for, of all steps", "N m/rad",
                 lambda x: np.min(x.stiffness, axis=0), "least stiffness", each=DIRECTION),
-    _of_statics("compliance", "displacement by a unit force of each coordinate asked for at the last step", "rad/N/m",
+    _of_statics("compliance", "displacement by a unit force of each coordinate asked for at the last step; infinite "
+                "past buckling", "rad/N/m",
                 lambda x: x.compliance[-1], each=DIRECTION, judged=True),
     _of_statics("compliance_max", "largest compliance of each coordinate asked for, of all steps", "rad/N/m",
                 lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, judged=True),

@@ -231,9 +231,9 @@ class StaticsTraces(SolutionTraces[Statics]):
 
     @property
     def compliance(self) -> Trace:
-        """Compliance (k, directions) [m/N, rad/(N m)]."""
+        """Compliance (k, directions) [m/N, rad/(N m)]; infinite where none resists, past buckling say."""
         with np.errstate(divide="ignore"):
-            return 1.0 / self.stiffness
+            return np.where(self.stiffness <= 0.0, np.inf, 1.0 / self.stiffness)
 
     @property
     def frequency(self) -> Trace:

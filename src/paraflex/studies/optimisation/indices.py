@@ -239,7 +239,7 @@ def _columns(names: list[str], base: SweepStudy) -> tuple[str, ...]:
 def _check_samples(number: int) -> None:
     if number < _FEWEST_BASE_SAMPLES or number & (number - 1):
         raise InputError(
-            "Sobol's sequence wants a power of two", field="--samples", value=number,
+            f"Sobol's sequence wants a power of two, {_FEWEST_BASE_SAMPLES} at least", field="--samples", value=number,
             remedy=f"say {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
         )  # fmt: skip
 
