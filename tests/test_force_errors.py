@@ -161,6 +161,66 @@ def test_errors_stand_beside_the_numbers(tmp_path):
     assert "±" in (out / "report.html").read_text()
 
 
+SLOW_CRANK = """
+name = "slow crank"
+gravity = [0.0, 0.0]
+[ground]
+O = [0.0, 0.0]
+[section.bar]
+width = 0.06
+thickness = 0.02
+[material.steel]
+youngs_modulus = 1.2e11
+density = 3200.0
+[body.crank]
+type = "rigid"
+mass = 3.6
+inertia = 1.7
+points = { O = [0.0, 0.0], A = [0.66, 0.0] }
+[body.rod]
+type = "beam"
+length = 2.8
+section = "bar"
+material = "steel"
+points = { A = 0.0, B = 2.8 }
+[body.slider]
+type = "rigid"
+mass = 22.0
+inertia = 0.8
+points = { B = [0.0, 0.0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "rod.A"]
+B = ["rod.B", "slider.B"]
+[joint.rail]
+type = "prismatic"
+points = ["ground.O", "slider.B"]
+direction = 0.0
+angle = 0.0
+[prescribed.drive]
+joint = "O"
+angle = "-0.6 + 0.8 * t"
+[assembly.a]
+crank = -0.6
+rod = 0.13
+slider = 0.0
+points = { "slider.B" = [3.32, 0.0] }
+"""
+
+
+def test_stresses_of_undamped_beams_have_an_error_beside_them(model):
+    """Where steps do not resolve vibrations, against a run with a thousandth of the tolerance."""
+    runs = (
+        pf.simulate_motion(model(SLOW_CRANK), 7.0, balanced=True, warning=False, options=pf.IntegrationOptions(**more))
+        for more in ({}, {"tolerance": 1e-7})
+    )
+    found, exact = (load_figures(pf.motion_dataset(run))["beams"]["rod"] for run in runs)
+    off = abs(found["stress_max"] - exact["stress_max"])
+    assert off > 0.03 * exact["stress_max"]
+    assert off < 3.5 * found["stress_error"] < 1.5 * exact["stress_max"]
+    assert exact["stress_error"] < 0.003 * exact["stress_max"]
+
+
 @pytest.mark.parametrize("size", [3e-4, 1e-2, 1.0, 50.0])
 def test_forces_are_as_exact_in_mechanisms_of_any_size(model, size):
     """A four-bar turned at a speed for which inertia matters at every size."""

@@ -76,6 +76,8 @@ _PHASES = {1: 0.15, 2: 0.15, 3: 0.4, 4: 0.7}
 _SAME_PLACE = 1e-9
 # Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
 _BAUMGARTE_GAIN = 0.1
+# Driven and damped motions have forgotten what errors made of forces so many cycles ago.
+_FORCE_CYCLES = 3.0
 _TREATMENTS = {
     Treatment.BAUMGARTE: BAUMGARTE,
     Treatment.PROJECTION: PROJECTION,
@@ -288,6 +290,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         by_cycle=int(options.step is None and options.per is TolerancePer.CYCLE),
         force_part=options.force_part(system),
         force_control=int(options.control_for(system) is Control.FORCES),
+        force_cycles=_FORCE_CYCLES if system.vibrations_die_out else np.inf,
         long_from=_long_from(system),
         newton_fraction=options.newton_fraction or method.newton_fraction,
         alpha=options.alpha,

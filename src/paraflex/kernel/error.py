@@ -32,8 +32,6 @@ SLOW_AGE = 25
 # A velocity error of a step that nothing turns round moves the mechanism for half of a cycle, on average: by the error
 # times this fraction of it.
 MEMORY_PART = 0.25
-# Errors of forces add up over so many cycles; before that, driven and damped motions have forgotten them.
-CYCLES = 3.0
 # In a step forces are controlled no closer than to this part of the largest, well above rounding.
 LEAST_PART = 1e-6
 
@@ -122,9 +120,9 @@ def allowed_part(controls, h, march):
 
 
 @routine
-def note_forces(h, march):
+def note_forces(controls, h, march):
     """Keep the largest multipliers, and what local errors have changed them by within some cycles."""
-    forgotten = exp(-h / (CYCLES * march.clock[CYCLE]))
+    forgotten = exp(-h / (controls.force_cycles * march.clock[CYCLE]))
     for r in range(march.guess_lam.size):
         march.forces[PEAK, r] = max(march.forces[PEAK, r], abs(march.stage_lam[0, r]))
         if march.counts[NEAR] == 0:

@@ -262,7 +262,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     march.counts[DRIFTED] = march.counts[HELD_END]
     if march.counts[NEAR] == 0:
         march.counts[PREPARED] = 0
-    note_forces(h, march)
+    note_forces(controls, h, march)
     note_cycle(system, controls, march)
     kinetic, strain, weight = stored_energy(system, march.q, march.v, march.stage_lam[0], work.scratch)
     done = march.clock[WORK] + weight - march.clock[WEIGHT_0]

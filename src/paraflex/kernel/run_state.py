@@ -91,6 +91,7 @@ class Controls(NamedTuple):
     by_cycle: int  # whether the cycle is that of the motion where that is shorter than the run
     force_part: float  # error allowed in forces within a cycle, as a part of the largest; zero where none are looked at
     force_control: int  # whether steps are chosen by that, too
+    force_cycles: float  # cycles in which a motion forgets errors of forces; infinite where vibrations do not die out
     long_from: float  # length of steps from which on they are long beside vibrations [s]
     newton_fraction: float  # of the error allowed in a step, the part left to Newton
     alpha: float

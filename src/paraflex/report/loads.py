@@ -69,7 +69,9 @@ def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str,
         most, run, body, one = stresses[0]
         factor = "" if one["safety_factor"] is None else f", safety factor {number(one['safety_factor'])}"
         where = f"{_whose(run)}{text_symbol(body)} at {number(one['place'])} m, t = {one['time']:.4g} s{factor}"
-        tiles.append(("largest stress", f"{_stress(most)} {STRESS.name}", where))
+        tiles.append(
+            ("largest stress", f"{_stress(most)}{error_text(one, 'stress', STRESS.factor)} {STRESS.name}", where)
+        )
     for most, run, name, one in ranked(figures, "drives", "torque_max")[:_MOST_TILES]:
         unit = one["torque_unit"] or ""
         kind = {"N m": "torque", "N": "force"}.get(unit, "effort")

@@ -24,7 +24,8 @@ _NAMES = {"stress_place": "place", "stress_time": "time"}
 def load_figures(run: xr.Dataset) -> dict[str, Any]:
     """Largest magnitudes of one run; None for what a model does not give, and no group that results do not hold.
 
-    A run that failed has none: its largest loads may be those of the failure.
+    A run that failed has none: its largest loads may be those of the failure. Stresses of beams are taken to be as
+    uncertain as the forces.
 
     Returns
     -------
@@ -33,9 +34,9 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
         `joints.<joint>` with least, most, their unit (rad or m), speed_max, force_max [N] and moment_max [N m];
         `motors.<motor>` and `drives.<prescribed motion>` with torque_max, its unit and that of speed_max (None of both
         kinds in results of earlier versions), speed_max, power_max [W] and energy [J]; `frame` with force_max and
-        moment_max of the mechanism on the ground. Of joints and drives force_error, moment_error and torque_error say
-        how far the loads may be off by errors of integration, where that is known. Times of the largest values are
-        torque_time, force_time, ... [s].
+        moment_max of the mechanism on the ground. Of beams, joints and drives stress_error, force_error, moment_error
+        and torque_error say how far the loads may be off by errors of integration, where that is known. Times of the
+        largest values are torque_time, force_time, ... [s].
     """
     out: dict[str, Any] = {}
     if "status" in run and run["status"].item() == "failed":
@@ -67,6 +68,9 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
                 }
                 for name, unit in zip(run[dim].values, _units(run[torque], run.sizes[dim]), strict=True)
             }
+    if (part := _uncertain(out)) is not None:
+        for one in out.get("beams", {}).values():
+            one["stress_error"] = None if one["stress_max"] is None else part * one["stress_max"]
     if "frame_force" in run:
         out["frame"] = _most("force", run, "frame_force") | _most("moment", run, "frame_moment")
     return out
@@ -91,10 +95,22 @@ def _most(name: str, run: xr.Dataset, variable: str, place: Mapping[str, str] | 
     return {f"{name}_max": most, f"{name}_time": when, **error}
 
 
-def error_text(figures: Mapping[str, Any], load: str) -> str:
+def _uncertain(found: Mapping[str, Mapping[str, Figures]]) -> float | None:
+    """By what part forces of joints or efforts of drives may be off, the larger of the two, of the largest of each."""
+    parts = []
+    for group, load in (("joints", "force"), ("drives", "torque")):
+        most, error = (
+            max((one.get(f"{load}_{kind}") or 0.0 for one in found.get(group, {}).values()), default=0.0)
+            for kind in ("max", "error")
+        )
+        parts += [error / most] if error and most else []
+    return max(parts, default=None)
+
+
+def error_text(figures: Mapping[str, Any], load: str, factor: float = 1.0) -> str:
     """How far a largest load may be off, to be put beside it, where that is more than a hundredth of it."""
     most, error = figures[f"{load}_max"], figures.get(f"{load}_error")
-    return f" ± {error:.1g}" if most and error is not None and error > RESOLVED * most else ""
+    return f" ± {float(f'{factor * error:.1g}'):g}" if most and error is not None and error > RESOLVED * most else ""
 
 
 def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
@@ -160,7 +176,8 @@ def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
         return ""
     most, name, body, one = known[0]
     whose = f"mode {name}: " if name else ""
-    text = f"{whose}largest stress {STRESS.factor * most:.4g} {STRESS.name} in {body} at {one['place']:.3g} m"
+    off = error_text(one, "stress", STRESS.factor)
+    text = f"{whose}largest stress {STRESS.factor * most:.4g}{off} {STRESS.name} in {body} at {one['place']:.3g} m"
     text += f", t = {one['time']:.4g} s"
     factors = [(beam["safety_factor"], where) for _, _, where, beam in known if beam["safety_factor"] is not None]
     if not factors:
