@@ -152,7 +152,7 @@ def simulate_motion(
     options = choose(method, options)
     names = [motor.name for motor in mechanism.motors]
     if torques is None:
-        torques = getattr(getattr(given, "study", None), "torques", {})
+        torques = dict(getattr(getattr(given, "study", None), "torques", {}))
     for name, torque in torques.items():
         known(name, names, "torques", "motor")
         if not isinstance(torque, AngleLaw) and not np.isfinite(torque):

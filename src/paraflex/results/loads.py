@@ -95,7 +95,7 @@ def _most(name: str, run: xr.Dataset, variable: str, place: Mapping[str, str] | 
     return {f"{name}_max": most, f"{name}_time": when, **error}
 
 
-def _uncertain(found: Mapping[str, Mapping[str, Figures]]) -> float | None:
+def _uncertain(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> float | None:
     """By what part forces of joints or efforts of drives may be off, the larger of the two, of the largest of each."""
     parts = []
     for group, load in (("joints", "force"), ("drives", "torque")):
