@@ -39,14 +39,14 @@ def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest
 
 def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, drawn: DrawnChoice = _FIGURES) -> None:
     """Add figures, and the report of a dataset, to results that are written: an interruption costs these alone."""
-    from paraflex.plots import save_figures
-
     try:
         with folder.amended() as new:
             if drawn.figures:
+                from paraflex.plots import save_figures  # it takes a second
+
                 save_figures(results, new / "figures")
             if drawn.report and isinstance(results, xr.Dataset):
-                from paraflex.cli.report import page_of, save_page  # it takes a second
+                from paraflex.cli.report import page_of, save_page  # so does it
 
                 save_page(page_of(results, folder.path), new / "report.html")
     except KeyboardInterrupt as interrupt:
