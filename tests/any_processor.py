@@ -17,9 +17,9 @@ under each of `SETTINGS`, with the plugin `margins.py`, which records every asse
 A line in a loop asserts several times. The largest part used counts; inequalities are compared occurrence by
 occurrence, as far as all settings reach.
 
-The script prints a Markdown table and exits with 1 if a test fails or an assertion is reported. The whole suite takes a
-quarter of an hour per setting on two cores, and some minutes more where kernels are compiled for another processor
-(Numba keeps these apart in its cache). `--folder` keeps the records, and `--table` evaluates those without running
+The script prints a Markdown table and exits with 1 if a test fails or an assertion is reported. The whole suite takes
+twenty minutes per setting on two cores, and some minutes more where kernels are compiled for another processor (Numba
+keeps these apart in its cache). `--folder` keeps the records, and `--table` evaluates those without running
 anything. `--by-commit`, for CI, runs the numerical files under one setting other than the first, which depends on the
 commit, so that all of them are used in turn.
 """
