@@ -162,7 +162,8 @@ def test_held_motors_stand_still_and_energy_is_accounted_for(geometry, mode):
     assert abs(balance[first] - balance[first - 1]) < 0.1 * solution.brake_energy
     # The method damps some of the fast vibration that the blow leaves: with a fifth of the tolerance a quarter of it.
     assert np.ptp(balance) < 0.25 * solution.brake_energy
-    assert np.ptp(balance) / solution.energy_balance_max <= 2.0
+    # At the ends of steps it varies by no more than twice its largest magnitude, and between them hardly by more.
+    assert np.ptp(balance) / solution.energy_balance_max < 3.0
 
 
 @pytest.mark.parametrize("method", [*(name for name, one in METHODS.items() if isinstance(one, NativeMethod)), "radau"])
