@@ -71,7 +71,8 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
         return Special(
             f"a dead centre, the limit of reach, with {drives}, where prescribed motions are not at rest", _BESIDE
         )
-    roots = np.roots([curvature[k], 0.5 * (missing(1.0) - missing(-1.0))[k], missing(0.0)[k]])
+    terms = np.array([curvature[k], 0.5 * (missing(1.0) - missing(-1.0))[k], missing(0.0)[k]])
+    roots = np.roots(np.where(np.abs(terms) <= _ROUNDING * np.max(np.abs(terms)), 0.0, terms))
     if np.iscomplexobj(roots):
         return Special(
             f"a dead centre, the limit of reach, with {drives}, beyond which prescribed motions lead", _BESIDE
