@@ -26,8 +26,14 @@ _TWO_BRANCHES = "give one of these rates in [start.velocity.angular], or start b
 class Special(NamedTuple):
     """A pose at which the branches of a motion meet.
 
-    What it is, the remedy, the velocities (n,) of the branches, and the drives at a dead centre. All are empty for any
-    other pose; velocities are empty where no branch leads on.
+    Attributes
+    ----------
+    cause, remedy : str
+        A description of the pose, and the remedy; all fields are empty for any other pose.
+    velocities : tuple of (n,) arrays
+        Of the branches; empty where none leads on.
+    drives : str
+        Prescribed motions at a dead centre, with the values of their joints.
     """
 
     cause: str = ""

@@ -50,7 +50,8 @@ class Solution:
         failed where a point came to the end of its beam.
     multiplier_errors : (m,) array, optional
         How far multipliers may be off by errors of integration [N, N m]: the sum of what the errors of single steps
-        make of them within three cycles, times two. None where steps are not chosen by such errors.
+        make of them within three cycles, or the whole run where vibrations do not die out, times two. None where steps
+        are not chosen by such errors.
     brake_energy : float
         Kinetic energy that brakes took as they engaged [J]: `work` is less by it from then on.
     findings : tuple of Finding

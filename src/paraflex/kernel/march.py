@@ -233,9 +233,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
     long = is_long(system, tableau, controls, h)
     if long:
-        power_along_curve(
-            system, signals, tableau, t, h, march.stage_q, march.stage_lam, march.power, march.torques, work
-        )
+        power_along_curve(system, signals, tableau, t, h, march, work)
     first = place_samples(tableau, t, h, long, march, out)
     if march.counts[NEAR] == 0:
         solve_samples(system, signals, controls, t, h, first, march, work, out, aside)

@@ -193,9 +193,7 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             march.power[i] = input_power(system, signals, time, work.q, work.v, march.stage_lam[i], march.torques, work)
         long = is_long(system, tableau, controls, h)
         if long:
-            power_along_curve(
-                system, signals, tableau, t, h, march.stage_q, march.stage_lam, march.power, march.torques, work
-            )
+            power_along_curve(system, signals, tableau, t, h, march, work)
         for i in range(last + 1):
             copy(march.stage_q[i], history.q[k, i])
             copy(march.stage_v[i], history.v[k, i])

@@ -251,13 +251,15 @@ def step_work(tableau, h, march):
 
 
 @routine
-def power_along_curve(system, signals, tableau, t, h, q, lam, power, torques, work):
-    """Power at the stages of a long step, whose velocities there are those of the curve through q (stages, n)."""
-    for i in range(power.size):
+def power_along_curve(system, signals, tableau, t, h, march, work):
+    """Power at the stages of a long step, whose velocities there are those of the curve through all of them."""
+    for i in range(march.power.size):
         time = t + tableau.c[i] * h
-        differentiate_nodes(tableau, tableau.c[i], h, q, work.v)
-        note_torques(signals, time, torques)
-        power[i] = input_power(system, signals, time, q[i], work.v, lam[i], torques, work)
+        differentiate_nodes(tableau, tableau.c[i], h, march.stage_q, work.v)
+        note_torques(signals, time, march.torques)
+        march.power[i] = input_power(
+            system, signals, time, march.stage_q[i], work.v, march.stage_lam[i], march.torques, work
+        )
 
 
 @inlined

@@ -226,7 +226,7 @@ def sensitivity_steps(
     work.step[0] = -1.0
     for k in range(count):
         h, sensitivity.left[k] = history.h[k], 0.0
-        dt, dh = sensitivity.t[k], sensitivity.h[k]
+        dt, dh, long = sensitivity.t[k], sensitivity.h[k], is_long(system, tableau, controls, h)
         for i in range(0 if history.restart[k] != 0 else 1, last + 1):
             length, d_length = (h, dh) if i > 0 else (0.0, 0.0)
             t, d_t = history.t[k] + tableau.c[i] * length, dt + tableau.c[i] * d_length
@@ -241,9 +241,9 @@ def sensitivity_steps(
                 history.least, i, torques, sensitivity, direction, space, work,
             )  # fmt: skip
             sensitivity.left[k] = max(sensitivity.left[k], left)
-            dv, times = sensitivity.v[i], moved_times(t, d_t)
-            power_sensitivity(moved, pieces, times, i, q, v, dv, lam, torques, sensitivity, work)
-        long = is_long(system, tableau, controls, h)
+            if not long:
+                dv, times = sensitivity.v[i], moved_times(t, d_t)
+                power_sensitivity(moved, pieces, times, i, q, v, dv, lam, torques, sensitivity, work)
         for i in range(last + 1 if long else 0):
             t, d_t = history.t[k] + tableau.c[i] * h, dt + tableau.c[i] * dh
             q, v, dv, lam, times = history.q[k, i], work.v, work.x, history.lam[k, i], moved_times(t, d_t)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.arrays import apart, fill
 from paraflex.kernel.compiling import by_reference, inlined, routine
-from paraflex.kernel.samples import differentiate_nodes, interpolate, node_slope, work_weight
+from paraflex.kernel.samples import differentiate_nodes, interpolate, node_slope, node_value, work_weight
 
 # Central differences of fourth order over this part of a parameter's size, and their places and weights.
 DIFFERENCE_STEP = 1e-3
@@ -108,11 +108,7 @@ def node_sensitivity(tableau, fraction, d_fraction, stages, derivatives, out):
     """Derivative of values of stages at a fraction of a step that moves itself, as by `interpolate_nodes`."""
     fill(out, 0.0)
     for s in tableau.nodes:
-        weight = 1.0
-        for l in tableau.nodes:
-            if l != s:
-                weight *= (fraction - tableau.c[l]) / (tableau.c[s] - tableau.c[l])
-        slope = node_slope(tableau, s, fraction)
+        weight, slope = node_value(tableau, s, fraction), node_slope(tableau, s, fraction)
         for r in range(out.size):
             out[r] += weight * derivatives[s, r] + slope * d_fraction * stages[s, r]
 

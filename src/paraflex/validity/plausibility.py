@@ -234,16 +234,20 @@ def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[F
     largest = max(float(np.nanmax(each, initial=0.0)) for each in (energy, np.abs(solution.work)))
     largest = max(largest, _turned_over(system, solution))
     least = NO_ENERGY * system.total_mass * STANDARD_GRAVITY * system.size
-    force = max((load for (_, unit), load in _peaks(system, solution).items() if unit == "N"), default=0.0)
-    # What forces do on positions that are as far off as the default tolerance lets them be.
-    explained = IntegrationOptions().tolerance_for(system) * force
-    if largest > least and solution.energy_balance_max > max(UNBALANCED * largest, explained):
+    off = solution.energy_balance_max
+    if largest > least and off > UNBALANCED * largest and off > _explained(system, solution):
         yield Finding(
             "energy-unbalanced", where.place,
-            f"energy and work do not balance: {100.0 * solution.energy_balance_max / largest:.2g} % of the largest "
+            f"energy and work do not balance: {100.0 * off / largest:.2g} % of the largest "
             "energy or work is missing or too much, and motion and stresses may be as far off",
             "give a smaller tolerance or shorter steps; damping of the material helps where stiff links vibrate",
         )  # fmt: skip
+
+
+def _explained(system: System, solution: Solution) -> float:
+    """Work of the largest force on positions that are as far off as the default tolerance lets them be [J]."""
+    force = max((load for (_, unit), load in _peaks(system, solution).items() if unit == "N"), default=0.0)
+    return IntegrationOptions().tolerance_for(system) * force
 
 
 def _turned_over(system: System, solution: Solution) -> float:

@@ -59,7 +59,7 @@ ReportOption = Annotated[bool, Option("--report/--no-report", help="Write report
 
 @dataclass(frozen=True)
 class DrawnChoice:
-    """What is drawn of results."""
+    """Figures and report of results."""
 
     figures: Annotated[bool, Option("--figures/--no-figures", help="Draw figures, or leave them out.")] = True
     report: ReportOption = True
