@@ -7,6 +7,7 @@ import signal
 import sys
 
 import pytest
+import xarray as xr
 
 from paraflex.errors import InputError, OutputError
 from paraflex.folders import (
@@ -24,6 +25,7 @@ from paraflex.folders import (
     lock_folder,
     read_manifest,
 )
+from paraflex.results.storage import write_results
 from paraflex.writing import write_json
 
 BEFORE = {"results.nc": "old", "summary.json": "old", "figures/a.png": "old", "figures/b.png": "old"}
@@ -174,6 +176,26 @@ def test_figures_are_added_where_there_are_results_and_written_where_there_are_n
         assert new == tmp_path / "elsewhere"
 
 
+@pytest.mark.parametrize("same", [True, False])
+def test_equal_runs_have_one_identity_and_keep_what_was_drawn(tmp_path, same):
+    def write_run(name, wall_time, torque):
+        folder = tmp_path / name
+        with hold_folder(folder, RUN) as held, held.replaced() as new:
+            values = {"torque": ("time", [0.0, torque]), "wall_time": ("mode", [wall_time]), "mode": ["++"]}
+            write_results(xr.Dataset(values, attrs={"tolerance": 1e-5}), new / "results.nc")
+            write_json(new / "summary.json", {"modes": {"++": {"wall_time": wall_time, "peak": torque}}})
+        return folder
+
+    first, second = write_run("a", 0.1, 1.0), write_run("b", 0.2, 1.0 if same else 1.0 + 1e-15)
+    assert (read_manifest(first).identity == read_manifest(second).identity) == same
+    with added_to(first / "figures") as new:
+        write(new, {"a.png": "drawn"})
+    write_run("a", 0.3, 1.0 if same else 2.0)
+    assert (first / "figures" / "a.png").exists() == same
+    assert json.loads((first / "summary.json").read_text())["modes"]["++"]["wall_time"] == 0.3
+    check_listed(first / "results.nc", "again")
+
+
 def test_while_the_runs_of_a_study_go_on_a_report_is_written_beside_them(tmp_path):
     replace(tmp_path / "out", {"results.csv": "old"}, STUDY_OF_RUNS)
     with hold_folder(tmp_path / "out", STUDY_OF_RUNS) as held:
@@ -258,7 +280,7 @@ def test_no_list_reaches_out_of_its_folder(folder, name):
     mine = folder.parent / "mine.txt"
     mine.write_text("mine")
     name = str(mine) if name == "/mine.txt" else name
-    forged = Manifest.of(RUN, files_of(folder) | {name: "0"})
+    forged = Manifest.of(RUN, files_of(folder) | {name: "0"}, {})
     write_json(folder / MANIFEST, vars(forged))
     with pytest.raises(InputError, match=r"manifest\.json: damaged: not a list of the folder's files"):
         check_listed(folder / "results.nc", "again")
@@ -287,7 +309,7 @@ def foreign(place, names, removed=(), links=()):
     """A folder as another may have made it: with results that are ready to be moved, and links."""
     ready = place / ".ready"
     write(ready, dict.fromkeys(names, "theirs"))
-    write_json(ready / "manifest.json", vars(Manifest.of(RUN, {})) | {"files": {}})
+    write_json(ready / "manifest.json", vars(Manifest.of(RUN, {}, {})) | {"files": {}})
     write_json(ready / "removed.json", list(removed))
     for name, target in links:
         (place / name).symlink_to(target)

@@ -15,7 +15,7 @@ from paraflex.dynamics import acting_loads, balanced_state, build_system, consis
 from paraflex.dynamics.signals import law_signal, pack_signals
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
-from paraflex.files import ExpressionLaw, library_file, load
+from paraflex.files import ExpressionLaw, allowing_outside, library_file, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.jumps import jump_times
 from paraflex.integrators.sensitivity import run_derivatives
@@ -47,6 +47,7 @@ from paraflex.motion import simulate_motion
 from paraflex.studies import load_sensitivities
 from paraflex.tracking import path_stops, plan_tracking
 from paraflex.validity.actions import doubtful_actions
+from shell import paraflex
 from test_loads import INERTIA, MASS, REACH, five_bar, pendulum
 from test_sensitivities import PLACES
 from twins import feed_forward_like
@@ -603,14 +604,37 @@ def test_constants_of_loads_that_are_not_finite(tmp_path, constant, form):
         load(tmp_path / "model.toml")
 
 
-def test_what_stands_in_a_file_outside_of_the_model_s_folder_is_not_quoted(tmp_path):
+def test_tables_outside_of_the_model_s_folder_are_read_by_permission_and_not_quoted(tmp_path):
     (tmp_path / "secret").write_text("hush:x:0:0\nhush:y:1:1\n")
     (tmp_path / "model").mkdir()
     file = written(tmp_path / "model", "torques = { drive = { table = '../secret' } }\n[motor]\ndrive = 'O'\n")
-    with pytest.raises(InputError, match="not two columns of numbers") as caught:
+    outside = r"study\.torques\.drive\.table: lies outside the folder of the model .*--allow-outside"
+    with pytest.raises(InputError, match=outside):
+        load(file)
+    with allowing_outside(), pytest.raises(InputError, match="not two columns of numbers") as caught:
         load(file)
     assert "hush" not in str(caught.value)
-    (tmp_path / "model" / "own").write_text("hush:x:0:0\nhush:y:1:1\n")
-    file.write_text(file.read_text().replace("../secret", "own"))
-    with pytest.raises(InputError, match="hush"):
+    # A link does not lead out either; an absolute path is as good as any, unless the user gives it.
+    (tmp_path / "model" / "own").symlink_to(tmp_path / "secret")
+    with pytest.raises(InputError, match=outside):
+        load(file, set={"study.torques.drive.table": "own"})
+    (tmp_path / "secret").write_text("0, 1\n1, 2\n")
+    file.write_text(file.read_text().replace("../secret", str(tmp_path / "secret")))
+    with pytest.raises(InputError, match=outside):
         load(file)
+    rows = [[0.0, 1.0], [1.0, 2.0]]
+    for model in (load(file, set={"study.torques.drive.table": str(tmp_path / "secret")}), allowed(file)):
+        assert model.parameters["study"]["torques"]["drive"]["table"] == rows
+    assert "outside the folder" in paraflex("modes", file).stderr
+    assert "outside the folder" not in paraflex("modes", file, "--allow-outside").stderr
+
+
+def allowed(file):
+    with allowing_outside():
+        return load(file)
+
+
+def test_files_in_the_model_s_folder_are_quoted(tmp_path):
+    (tmp_path / "own").write_text("hush:x:0:0\nhush:y:1:1\n")
+    with pytest.raises(InputError, match="hush"):
+        load(written(tmp_path, "torques = { drive = { table = 'own' } }\n[motor]\ndrive = 'O'\n"))

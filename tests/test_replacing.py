@@ -124,7 +124,10 @@ def test_figures_and_reports_made_later_belong_to_the_results(paraflex, monkeypa
     new = set(after["files"]) - set(before["files"])
     assert "report.html" in new
     assert new == {"report.html", f"figures/{drawn.name}", "export/results.mat"}
+    # The same numbers have the same figures, other numbers others.
     paraflex(*RUN, "--out", "here")
+    assert Path("here/export").exists()
+    paraflex(*RUN, "--out", "here", "--set", "material.aluminium.density=2600")
     assert not Path("here/export").exists()
 
 

@@ -64,7 +64,13 @@ from .kinematics import (
 )
 
 # Models: read, checked, planned, run
-from .files import Model as Model, load as load, load_path as load_path, plan as plan
+from .files import (
+    Model as Model,
+    allowing_outside as allowing_outside,
+    load as load,
+    load_path as load_path,
+    plan as plan,
+)
 from .checks import check as check
 from .checks.drawing import draw as draw
 from .tracking import simulate as simulate

@@ -15,5 +15,6 @@ from paraflex.files.model import (
     model_from as model_from,
     plan as plan,
 )
+from paraflex.files.outside import allowing_outside as allowing_outside
 from paraflex.files.schema import model_schema as model_schema
 from paraflex.files.study import StudyDefaults as StudyDefaults

@@ -356,7 +356,7 @@ def model_from(data: dict[str, Any], source: str, text: str = "") -> Model:
 
 def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any]) -> dict[str, Any]:
     with naming(source):
-        return with_rows(with_values(parse_toml(text, source), settings), folder)
+        return with_rows(with_values(parse_toml(text, source), settings), folder, list(settings.values()))
 
 
 def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import suppress
 from math import isfinite
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.files.fields import Place, units_at
+from paraflex.files.outside import check_outside, is_outside
 from paraflex.files.overlay import overlaid
 from paraflex.files.read import text_of
 from paraflex.files.schema import ModelTable, PathFile
@@ -36,7 +37,7 @@ _SQUARE_ANYWHERE = re.compile(r"\[([^\[\]]*)\]")
 _SQUARE, _ROUND = re.compile(r"\[([^\[\]]*)\]\W*$"), re.compile(r"\(([^()]*)\)\W*$")
 
 
-def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
+def with_rows(data: dict[str, Any], folder: Path, asked: Container[Any] = ()) -> dict[str, Any]:
     """A model's data with the rows of the files its prescribed motions and loads name in place of the names.
 
     Parameters
@@ -45,12 +46,14 @@ def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
         As parsed.
     folder : Path
         Where the model file is; names are relative to it.
+    asked : container of values
+        Absolute ones may lie outside the folder: the user named them, not the file.
 
     Raises
     ------
     InputError
-        A file that cannot be read or has anything but so many columns of numbers below one line of headings, or a unit
-        in these that is not the column's.
+        A file that lies outside the folder without permission, cannot be read, or has anything but so many columns of
+        numbers below one line of headings, or a unit in these that is not the column's.
     """
     if not any(isinstance(entry.get("table"), str) for _, entry, _ in _entries(data)):
         return data
@@ -58,6 +61,8 @@ def with_rows(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     for place, entry, columns in _entries(data):
         file = entry.get("table")
         if isinstance(file, str):
+            if not (Path(file).is_absolute() and file in asked):
+                check_outside(folder, file, _field(place))
             entry["table"] = _read_rows(data, place, folder, file, columns)
     return data
 
@@ -108,7 +113,7 @@ def _read_rows(
     try:
         return _rows_of(data, place, lines, name, columns)
     except InputError as error:
-        if error.value is None or (folder / name).resolve().is_relative_to(folder.resolve()):
+        if error.value is None or not is_outside(folder, name):
             raise
         remedy = "copy it into the folder of the model file, where errors say more"
         problem = f"not {_COUNTS[columns]} columns of numbers below headings"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from fnmatch import fnmatch
 from importlib.metadata import version
@@ -12,7 +12,15 @@ from pathlib import Path
 from paraflex.errors import InputError, OutputError
 from paraflex.folders.changes import MANIFEST, NEW, READY, REMOVED, check_place, files_in, finish_moves
 from paraflex.folders.lock import LOCK, FolderInUseError, lock_folder
-from paraflex.folders.manifest import STUDY_OF_RUNS, Manifest, digest_of, files_of, kind_of_folder
+from paraflex.folders.manifest import (
+    STUDY_OF_RUNS,
+    Manifest,
+    contents_of,
+    digest_of,
+    files_of,
+    kind_of_folder,
+    whole_manifest,
+)
 from paraflex.writing import ELSEWHERE, unwritable, write_json
 
 
@@ -40,7 +48,7 @@ class ResultsFolder:
     def replaced(self, *, but: Sequence[str] = ()) -> Iterator[Path]:
         """A folder to write results to that take the place of all that paraflex wrote; other files stay.
 
-        Where every file is as before, all stays: figures that were drawn later too.
+        Where all but wall times is as before, nothing is removed: figures that were drawn later stay too.
 
         Parameters
         ----------
@@ -74,11 +82,19 @@ class ResultsFolder:
                 return
             for name in files:
                 check_place(self.path, Path(name))
-            removed = [name for name in before if is_replaced(name) and name not in files]
-            kept = {name: digest for name, digest in before.items() if digest and name not in removed}
-            manifest = Manifest.of(self.kind, kept | files)
+            removed = {name for name in before if is_replaced(name) and name not in files}
+            old = whole_manifest(self.path)
+            contents = dict(old.contents if old else {}) | contents_of({name: new / name for name in files})
+
+            def listed(removed: Container[str]) -> Manifest:
+                kept = {name: digest for name, digest in before.items() if digest and name not in removed}
+                return Manifest.of(self.kind, kept | files, contents)
+
+            if old is not None and listed(removed).identity == old.identity:
+                removed = set()  # figures are of these numbers
+            manifest = listed(removed)
             write_json(new / MANIFEST, {"paraflex_version": version("paraflex")} | vars(manifest))
-            write_json(new / REMOVED, removed)
+            write_json(new / REMOVED, sorted(removed))
             new.replace(ready)
         except KeyboardInterrupt as interrupt:
             interrupt.args = interrupt.args or (f"nothing was written; {self.path} is as it was",)

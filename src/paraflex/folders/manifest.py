@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.folders.changes import MANIFEST, NEW, READY, files_in, is_inside
 from paraflex.folders.lock import LOCK, finish_change
+from paraflex.interrupts import uninterrupted
 from paraflex.seals import damaged
 from paraflex.writing import read_json
 
@@ -43,6 +47,8 @@ _OF_STUDY = (
     "best.toml", "indices.*", "report.html",
 )  # fmt: skip
 _REPORT = "report.html"
+# Values of JSON and variables of netCDF that equal runs do not share.
+_CLOCK = {"wall_time", "full_wall_time"}
 
 
 @dataclass(frozen=True)
@@ -54,20 +60,25 @@ class Manifest:
     kind : str
         Of KINDS.
     identity : str
-        A digest of the results without figures, report and exports: the same wherever they are copied to.
+        A digest of the results without figures, report and exports, and without wall times: the same of equal runs,
+        wherever they are copied to.
     files : mapping of str to str
         Digests of the bytes of all files, by their names within the folder ("figures/desired_path.png").
+    contents : mapping of str to str
+        Of files that may hold wall times: digests of all else in them.
     """
 
     kind: str
     identity: str
     files: Mapping[str, str]
+    contents: Mapping[str, str]
 
     @classmethod
-    def of(cls, kind: str, files: Mapping[str, str]) -> Manifest:
-        """The manifest of some files."""
-        numbers = [f"{name} {files[name]}" for name in sorted(files) if not _is_derived(name)]
-        return cls(kind, _hash("\n".join(numbers).encode()).hexdigest(), dict(sorted(files.items())))
+    def of(cls, kind: str, files: Mapping[str, str], contents: Mapping[str, str]) -> Manifest:
+        """The manifest of some files; `contents` may name others, which are left out."""
+        contents = {name: contents[name] for name in sorted(files) if name in contents}
+        numbers = [f"{name} {contents.get(name, files[name])}" for name in sorted(files) if not _is_derived(name)]
+        return cls(kind, _hash("\n".join(numbers).encode()).hexdigest(), dict(sorted(files.items())), contents)
 
 
 def read_manifest(folder: Path) -> Manifest | None:
@@ -84,7 +95,7 @@ def read_manifest(folder: Path) -> Manifest | None:
     remedy = "run the same command again; or delete this file, and others are read without it"
     found = read_json(file, remedy)
     try:
-        manifest = Manifest.of(found["kind"], found["files"])
+        manifest = Manifest.of(found["kind"], found["files"], found.get("contents", {}))
         whole = manifest.identity == found["identity"] and manifest.kind in KINDS
         if whole and all(map(is_inside, manifest.files)):
             return manifest
@@ -96,10 +107,10 @@ def read_manifest(folder: Path) -> Manifest | None:
 def kind_of_folder(folder: Path) -> str:
     """Which kind of results a folder holds; empty where none of ours."""
     finish_change(folder)
-    return _kind(folder, _whole_manifest(folder))
+    return _kind(folder, whole_manifest(folder))
 
 
-def _whole_manifest(folder: Path) -> Manifest | None:
+def whole_manifest(folder: Path) -> Manifest | None:
     """The manifest of a folder; None where there is none, or it is damaged."""
     try:
         return read_manifest(folder)
@@ -136,7 +147,7 @@ def check_listed(file: Path, remedy: str) -> None:
 def files_of(folder: Path) -> dict[str, str]:
     """The files of a folder that paraflex wrote, with the digests of its manifest; empty where it lists none."""
     finish_change(folder)
-    manifest = _whole_manifest(folder)
+    manifest = whole_manifest(folder)
     kind = _kind(folder, manifest)
     found = {} if manifest is not None else dict.fromkeys((*KINDS.get(kind, ()), *([_REPORT] if kind else ())), "")
     if kind == STUDY_OF_RUNS:
@@ -164,6 +175,32 @@ def digest_of(file: Path, *, sync: bool = False) -> str:
         return hashlib.file_digest(opened, _hash).hexdigest()
 
 
+def contents_of(files: Mapping[str, Path]) -> dict[str, str]:
+    """Digests of what files hold but for wall times, by name; of those alone that may hold any."""
+    found = {}
+    for name, file in files.items():
+        if file.suffix in (".json", ".nc"):
+            with suppress(OSError, ValueError):  # not of that format
+                found[name] = _content(file)
+    return found
+
+
+def _content(file: Path) -> str:
+    if file.suffix == ".json":
+        return _hash(json.dumps(_timeless(json.loads(file.read_text(encoding="utf-8")))).encode()).hexdigest()
+    import xarray as xr
+
+    found = _hash()
+    with uninterrupted(), xr.open_dataset(file, engine="netcdf4", decode_cf=False, cache=False) as data:
+        for name in sorted(set(map(str, data.variables)) - _CLOCK):
+            values = data.variables[name]
+            plain = values.values if values.dtype != object else values.values.astype(str)
+            found.update(repr((name, values.dims, plain.dtype.str, plain.shape, values.attrs)).encode())
+            found.update(plain.tobytes())
+        found.update(repr(data.attrs).encode())
+    return found.hexdigest()
+
+
 def _is_listed(file: Path) -> bool:
     for folder in file.absolute().parents[:2]:
         finish_change(folder)
@@ -177,6 +214,13 @@ def _is_listed(file: Path) -> bool:
 def _is_derived(name: str) -> bool:
     """Whether a file is made of the files of numbers, and can be made again."""
     return name == _REPORT or name.startswith(("figures/", "export/"))
+
+
+def _timeless(found: Any) -> Any:
+    """Values of JSON without wall times, and without the digest of all of them."""
+    if isinstance(found, dict):
+        return {name: _timeless(each) for name, each in sorted(found.items()) if name not in {*_CLOCK, "digest"}}
+    return [_timeless(each) for each in found] if isinstance(found, list) else found
 
 
 def _hash(data: bytes = b"") -> hashlib.blake2b:

@@ -55,6 +55,7 @@ OutputOption = Annotated[
 ]
 ReplaceOption = Annotated[bool, Option("--force", help="Replace results of another kind that the folder holds.")]
 ReportOption = Annotated[bool, Option("--report/--no-report", help="Write report.html, or leave it out.")]
+OutsideOption = Annotated[bool, Option("--allow-outside", help="Read tables that the model names outside its folder.")]
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,7 @@ class ModelChoice:
         list[str],
         Option("--set", metavar="FIELD=VALUE", help='In place of the file\'s, "link1.length=80 mm"; repeatable.'),
     ] = field(default_factory=list)
+    allow_outside: OutsideOption = False
 
     def __post_init__(self) -> None:
         if self.source is not None and self.mechanism is not None and self.source != self.mechanism:

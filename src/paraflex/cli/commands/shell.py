@@ -5,6 +5,7 @@ That is imported only when the command is called.
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -48,7 +49,7 @@ class ListedCommand(NamedTuple):
         module, _, function = self.function.partition(".")
         do = getattr(import_module(f"paraflex.cli.{module}"), function)
         try:
-            with raised():
+            with raised(), _outside(request):
                 return do(request)
         except BaseException as error:
             # A library that is interrupted may make an error of its own of it.
@@ -56,6 +57,15 @@ class ListedCommand(NamedTuple):
                 raise
             typer.echo(_GOES_ON if self.request in _STUDIES else _BEGINS, err=True)
             return exit_code()
+
+
+def _outside(request: Any) -> AbstractContextManager[None]:
+    """What lets models name files outside their folders, where the request does."""
+    if not any(getattr(each, "allow_outside", False) for each in (request, getattr(request, "model", None))):
+        return nullcontext()
+    from paraflex.files import allowing_outside
+
+    return allowing_outside()
 
 
 # Groups of commands by name, and what they are about.

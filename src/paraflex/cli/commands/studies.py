@@ -11,6 +11,7 @@ from typer import Argument, Option
 from paraflex.cli.commands.options import (
     Json,
     OutputOption,
+    OutsideOption,
     ReplaceOption,
     ReportOption,
     StudyArgument,
@@ -24,6 +25,7 @@ class StudyRequest:
 
     study: StudyArgument
     output: OutputOption = None
+    allow_outside: OutsideOption = False
 
     @property
     def folder(self) -> Path:
