@@ -325,3 +325,11 @@ def test_a_unit_is_no_use_of_a_parameter_of_its_name():
     data["section"]["bar"] |= {"width": "0.03 m", "thickness": "half * 10 mm"}
     found = [finding.place for finding in file_findings(model_from(data, source)) if finding.code == "unused"]
     assert found == ["parameters.m"]
+
+
+def test_gravity_among_the_points_of_the_ground_is_told_where_it_belongs():
+    data, source = load_data("pendulum")
+    data["ground"]["gravity"] = data.pop("gravity")
+    (found,) = (one for one in file_findings(model_from(data, source)) if one.code == "unused")
+    assert found.place == "ground.gravity"
+    assert "before the first table" in found.remedy

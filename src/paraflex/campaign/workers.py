@@ -5,6 +5,7 @@ Each runs any function of a task, and what comes back does not depend on which o
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
 import multiprocessing
@@ -172,6 +173,8 @@ class Dask(Engine):
                     lambda: distributed.LocalCluster(n_workers=workers, threads_per_worker=1, **alone)
                 )
         try:
+            if address is not None:
+                _apart(lambda: asyncio.run(_reach(address)))  # a notebook has a loop of its own
             self._client = distributed.Client(address or self._cluster, timeout=_REACHED_WITHIN, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             reason = str(error).partition("\n")[0] or type(error).__name__
@@ -209,6 +212,15 @@ class Dask(Engine):
         self._client.close(timeout=5)
         if self._cluster is not None:
             self._cluster.close(timeout=5)
+
+
+async def _reach(address: str) -> None:
+    """Connect to a scheduler: a client that cannot would wait long for its own end, and complain."""
+    from distributed import Security
+    from distributed.comm.core import connect
+
+    comm = await connect(address, timeout=_REACHED_WITHIN, **Security().get_connection_args("client"))
+    comm.abort()
 
 
 def open_engine(engine: str | Engine, workers: int | None = None, cluster: str | None = None) -> Engine:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from paraflex.files import Model
+from paraflex.files.schema import ModelTable
 from paraflex.findings import Finding
 from paraflex.units import without_quantities
 
@@ -49,10 +50,10 @@ def _unused(data: Mapping[str, Any]) -> Iterator[Finding]:
         for name in entries if isinstance(entries, Mapping) else ():
             if not is_used(name):
                 what = "no expression uses it" if table == "parameters" else "nothing in the file names it"
-                yield Finding(
-                    "unused", f"{table}.{name}", what,
-                    "leave it out, or look for where it was to be used: what stands there instead?",
-                )  # fmt: skip
+                remedy = "leave it out, or look for where it was to be used: what stands there instead?"
+                if table == "ground" and name in ModelTable.model_fields:
+                    remedy = f"put it before the first table of the file, if {name} of the mechanism is meant"
+                yield Finding("unused", f"{table}.{name}", what, remedy)
 
 
 def _texts(value: Any, *, key: str = "") -> Iterator[str]:
