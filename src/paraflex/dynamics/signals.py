@@ -18,6 +18,8 @@ from paraflex.mechanism import AngleLaw, Mechanism, TabulatedLaw
 # often as it takes, within these numbers, until their middles are as near to the law, relative to its largest value.
 _LAW_PIECES, _MOST_PIECES, _HALVINGS = 2000, 500_000, 20
 _NEAR_LAW, _NEARLY_LAW, _FALLING = 1e-10, 1e-3, 0.25
+# What rounding leaves of terms of a prescribed motion that cancel [rad or m].
+LEFT = 1e-15
 _SHORTEST_PIECE = 1e-6
 _DEGREE = 5
 
@@ -89,13 +91,13 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
     """
     signals, knots = list(torques), []
     for place, law in _laws(mechanism):
-        signal, inner = law_signal(place, law, end)
+        signal, inner = law_signal(place, law, end, LEFT if place.startswith("prescribed.") else 0.0)
         signals.append(signal)
         knots += inner
     return _pack(signals), knots
 
 
-def law_signal(place: str, law: AngleLaw, end: float) -> tuple[InputSignals, list[float]]:
+def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tuple[InputSignals, list[float]]:
     """A law in time on [0, end] as a signal, and the times between which it is smooth.
 
     Parameters
@@ -105,6 +107,8 @@ def law_signal(place: str, law: AngleLaw, end: float) -> tuple[InputSignals, lis
     law : AngleLaw
     end : float
         [s]
+    left : float
+        What rounding leaves of its values: they are not followed more closely.
 
     Raises
     ------
@@ -118,11 +122,11 @@ def law_signal(place: str, law: AngleLaw, end: float) -> tuple[InputSignals, lis
     # The law or a derivative may jump at a knot: pieces on either side take its one-sided limits.
     parts = []
     for a, b in pairwise([0.0, *inner, end]):
-        parts.append(_refined(place, law, _grid(law, a, b, end)))
+        parts.append(_refined(place, law, _grid(law, a, b, end), left))
     return _join(parts), inner
 
 
-def _refined(place: str, law: AngleLaw, t: Array) -> InputSignals:
+def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
     """Quintic pieces of a law between breaks, halved where it changes too fast for them.
 
     Raises
@@ -143,9 +147,10 @@ def _refined(place: str, law: AngleLaw, t: Array) -> InputSignals:
         powers = half[:, None] ** np.arange(_DEGREE + 1)
         off = np.abs(np.sum(powers * pieces.coefficients, axis=1) - value)
         size, worst = np.max(np.abs(value)), np.max(off)
-        coarse = off > _NEAR_LAW * size
+        near = max(_NEAR_LAW * size, left)
+        coarse = off > near
         # Rounding, and kinks, do not fall with the length of pieces.
-        if worst <= _NEAR_LAW * size or (worst <= _NEARLY_LAW * size and worst > _FALLING * last):
+        if worst <= near or (worst <= _NEARLY_LAW * size and worst > _FALLING * last):
             return pieces
         last = worst
         t = np.sort(np.append(t, t[:-1][coarse] + half[coarse]))

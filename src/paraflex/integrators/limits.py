@@ -8,12 +8,14 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import Inputs, System
+from paraflex.dynamics.signals import LEFT
 from paraflex.findings import Finding
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import FlexibleBeam
 
-# Below this part of the largest value, or of its derivative by the shortest piece, changes are rounding.
-_SMALL, _ROUNDING = 1e-6, 1e-11
+# Below this part of the largest value, or of its derivative by the shortest piece, changes are rounding. Of motions so
+# is what is left of terms that cancel, which derivatives of quintic pieces enlarge by such a number.
+_SMALL, _ROUNDING, _ENLARGED = 1e-6, 1e-11, 400.0
 # StepLimits are rounded down to powers of this, and one is kept where many pieces have the same.
 _GRADES = 2.0**0.5
 
@@ -77,7 +79,9 @@ def _limits_of(signals: Signals, k: int, order: int) -> StepLimits:
     places = lengths[:, None] * np.array([0.0, 0.5, 1.0])
     value, curvature = (_derivative(coefficients, n, places) for n in (order, order + 2))
     shortest = float(np.min(lengths))
-    rounding = _ROUNDING * float(np.max(np.abs(coefficients[:, 0]), initial=0.0))
+    rounding = _ROUNDING * float(
+        np.max(np.abs(coefficients[:, 0]), initial=_ENLARGED * LEFT / _ROUNDING if order else 0.0)
+    )
     scale = max(0.5 * float(np.ptp(value)), _SMALL * float(np.max(np.abs(value))), rounding / shortest**order)
     noise = rounding / shortest ** (order + 2)
     bending = np.maximum(np.max(np.abs(curvature), axis=1) - noise, 0.0)
