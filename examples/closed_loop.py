@@ -5,9 +5,9 @@ the change of torques that a linear model along the motion finds best for the er
 What learning does not know, here a payload 20 % too heavy, is left to feedback: an LQG controller at 1 kHz that reads
 encoders and strain gauges, and whose torques act one sample late, within 20 N m. It estimates a slowly varying force
 at the payload. Its model has 44 states: all vibrations up to 1042 Hz, which sampling folds back. With undamped links it
-needs those up to 2.5 kHz as well, 100 states, and a simulation with steps that are fine enough for vibrations that only
-feedback holds. Readings are exact, then quantised: that adds noise, of which every processor gives another sample, as
-rounding decides between two steps of a reading.
+needs those up to 2.5 kHz as well, 100 states, and then still does not hold one beyond 1 kHz. Readings are exact, then
+quantised: that adds noise, of which every processor gives another sample, as rounding decides between two steps of a
+reading.
 """
 
 from __future__ import annotations
@@ -26,22 +26,12 @@ ENCODERS, GAUGES = ["A1", "D1", "A2", "D2"], ["root1", "root3", "root5", "root7"
 RESOLUTION = {**dict.fromkeys(ENCODERS, 2 * np.pi / 40000), **dict.fromkeys(GAUGES, 1e-6)}
 
 
-class Case(NamedTuple):
-    """Damping of the links, states of the design's model, step of the simulation [s]."""
-
-    damping: float
-    states: int
-    step: float = PERIOD
-
-    def options(self, step=None):
-        """Of the integration."""
-        return pf.IntegrationOptions(method="esdirk5", step=step or self.step)
+# Damping of the links, states of the design's model; steps of the simulation go from sample to sample.
+DAMPING, STATES, STATES_UNDAMPED = 0.01, 44, 100
+OPTIONS = pf.IntegrationOptions(method="esdirk5", step=PERIOD)
 
 
-DAMPED, UNDAMPED = Case(0.01, 44), Case(0.0, 100, PERIOD / 4)
-
-
-def manipulator(payload: float, damping: float = DAMPED.damping) -> pf.Mechanism:
+def manipulator(payload: float, damping: float = DAMPING) -> pf.Mechanism:
     """RAParM-I in second-order geometry, all links damped, gauges on the driven ones, with a payload [kg]."""
     robot = pf.library.raparm_i().with_geometry("second-order")
     gauges = tuple(pf.StrainGauge(f"root{k}", f"link{k}", at=0.02) for k in (1, 3, 5, 7))
@@ -91,7 +81,7 @@ def best_change(model, error, deviation=1e-4, effort=1.0):
 def learned(task, simulation, runs=3):
     """Torques that bring the flexible mechanism onto the path, and what sensors then read."""
     small = pf.reduced_mechanism(task, 16)
-    coarse = pf.plan(small, task.path, duration=float(task.motion.t[-1]), samples=141)
+    coarse = pf.plan(small, task.path, duration=float(task.motion.t[-1]), samples=71)
     model = pf.linearise_along(coarse, mode=MODE).discretised(PERIOD, hold="zero")
     torques = np.zeros((len(model.Phi), len(task.mechanism.motors)))
     for _ in range(runs):
@@ -102,7 +92,7 @@ def learned(task, simulation, runs=3):
     return torques, np.array(table.read)
 
 
-def design_of(task, states=DAMPED.states):
+def design_of(task, states=STATES):
     """LQG about the start of a motion, against forces at the payload of 0.7 N up to 15 Hz."""
     model = pf.reduce(pf.linearise(task, mode=MODE, at=0.0, forces=[TIP]), states)
     below = scipy.signal.butter(2, 2 * np.pi * 15.0, analog=True)
@@ -144,51 +134,61 @@ def figures(run):
 
 
 class Compared(NamedTuple):
-    """Error and vibration [mm] by law and payload, largest spectral radius; the plan and the design they are of."""
+    """Error and vibration [mm] by law and payload, largest spectral radius, least margins; the plan they are of."""
 
     found: dict
     radius: float
+    margins: tuple
     task: object
-    design: object
 
 
-def compared(case):
+def planned(damping=DAMPING):
+    """The square with the payload that laws know."""
+    return pf.plan(manipulator(PAYLOAD, damping), pf.load("raparm_i").paths["square"], duration=0.7)
+
+
+def compared():
     """Laws with the payload they know and with 20 % more."""
-    square = pf.load("raparm_i").paths["square"]
-    task = pf.plan(manipulator(PAYLOAD, case.damping), square, duration=0.7)
-    heavy = task.remodelled(manipulator(1.2 * PAYLOAD, case.damping))
-    torques, read = learned(task, pf.Simulation(task, mode=MODE, feed_forward=True, options=case.options(PERIOD)))
-    design = design_of(task, case.states)
+    task = planned()
+    heavy = task.remodelled(manipulator(1.2 * PAYLOAD))
+    plants = {
+        name: pf.Simulation(one, mode=MODE, feed_forward=True, options=OPTIONS)
+        for name, one in (("as designed", task), ("20 % more payload", heavy))
+    }
+    torques, read = learned(task, plants["as designed"])
+    design = design_of(task)
     laws = {
         "rigid torques": [],
         "learned torques": [Learned(torques)],
         "learned and LQG": [Learned(torques), feedback(design, read)],
         "quantised": [Learned(torques), feedback(design, read, RESOLUTION)],
     }
-    plants = {
-        name: pf.Simulation(one, mode=MODE, feed_forward=True, options=case.options())
-        for name, one in (("as designed", task), ("20 % more payload", heavy))
-    }
     found = {
         (law, name): figures(plant.run(list(laws[law]), warning=False))
         for law in laws
         for name, plant in plants.items()
     }
-    return Compared(found, largest_radius(task, design, case.damping), task, design)
+    return Compared(found, largest_radius(task, design, DAMPING), least_margins(task, design), task)
+
+
+def radius_undamped():
+    """Largest spectral radius of the design for undamped links."""
+    task = planned(0.0)
+    return largest_radius(task, design_of(task, STATES_UNDAMPED), 0.0)
 
 
 def main():
-    """Print the tables; what laws reach, by damping."""
-    every = {case.damping: compared(case) for case in (DAMPED, UNDAMPED)}
-    for damping, (found, radius, _, _) in every.items():
-        print(f"links damped by {100 * damping:g} %: error, vibration after the path [mm]")
-        for law in dict.fromkeys(law for law, _ in found):
-            values = (f"{name}: {found[law, name][0]:.4f}, {found[law, name][1]:.4f};" for _, name in list(found)[:2])
-            print(f"{law:16s}", *values)
-        print(f"spectral radius up to {radius:.4f}")
-    gain, delay = least_margins(*every[DAMPED.damping][2:])
-    print(f"with damping: gain margin {gain:.2f}, delay margin {delay:.2f} samples")
-    return every
+    """Print the table, margins and spectral radii; what laws reach, and the radius without damping."""
+    every, undamped = compared(), radius_undamped()
+    found = every.found
+    print(f"links damped by {100 * DAMPING:g} %: error, vibration after the path [mm]")
+    for law in dict.fromkeys(law for law, _ in found):
+        values = (f"{name}: {found[law, name][0]:.4f}, {found[law, name][1]:.4f};" for _, name in list(found)[:2])
+        print(f"{law:16s}", *values)
+    gain, delay = every.margins
+    print(f"spectral radius up to {every.radius:.4f}, gain margin {gain:.2f}, delay margin {delay:.2f} samples")
+    print(f"undamped links, {STATES_UNDAMPED} states: spectral radius up to {undamped:.4f}")
+    return every, undamped
 
 
 if __name__ == "__main__":

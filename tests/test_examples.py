@@ -123,52 +123,50 @@ def test_second_order_spin_up(run):
 def page_of_control():
     """Cells of the table of the closed loop on the page, by the name of the row."""
     page = (EXAMPLES.parent / "docs" / "control.md").read_text(encoding="utf-8")
-    _, _, *rows = page[page.index("| | links damped by 1 %") :].split("\n\n")[0].splitlines()
+    _, _, *rows = page[page.index("| | as designed | 20 % more payload |") :].split("\n\n")[0].splitlines()
     return {row.split("|")[1].strip(): [cell.strip() for cell in row.strip("|").split("|")[1:]] for row in rows}
 
 
 def test_closed_loop(run):
     """What feedback is there for: a payload that learning did not know of. Errors and vibrations in mm."""
-    example, every, printed = run("closed_loop")
+    example, (every, undamped), printed = run("closed_loop")
     page = page_of_control()
-    names = ("as designed", "20 % more payload")
-    for column, (damping, (found, radius, _, _)) in enumerate(every.items()):
-        rigid, learned, fed_back, quantised = (
-            [found[law, name] for name in names] for law in dict.fromkeys(law for law, _ in found)
-        )
-        # With readings that are exact nothing in the loop enlarges rounding: the page has all digits.
-        rows = page["rigid feed-forward"], page["learned torques"], page["learned torques and LQG"]
-        for shown, values in zip(rows, (rigid, learned, fed_back), strict=True):
-            shown = [float(number) for cell in shown[2 * column : 2 * column + 2] for number in cell.split(", ")]
-            assert np.ravel(values) == pytest.approx(np.array(shown), abs=0.6e-4)
-        assert fed_back[1][0] < 0.06 * learned[1][0]
-        assert fed_back[1][1] < 0.04 * rigid[1][1]  # 28 dB
-        # Quantised readings add noise of some 0.005 mm, another sample on every processor; 0.1 mm is asked for with
-        # more payload.
-        for (exact, still), (error, vibration) in zip(fed_back, quantised, strict=True):
-            assert error < exact + 0.02
-            assert vibration < still + 0.04
-        assert quantised[1][0] < 0.1
-        assert f"{fed_back[1][0]:.4f}, {fed_back[1][1]:.4f}" in printed
-        assert f"{radius:.4f}" in printed
-        # Without damping some vibration beyond 1 kHz grows slowly in some poses.
-        assert radius < 0.9953 if damping else 1.0 < radius < 1.0009
-    gain, delay = example.least_margins(*every[0.01][2:])
+    found, names = every.found, ("as designed", "20 % more payload")
+    rigid, learned, fed_back, quantised = (
+        [found[law, name] for name in names] for law in dict.fromkeys(law for law, _ in found)
+    )
+    # With readings that are exact nothing in the loop enlarges rounding: the page has all digits.
+    rows = page["rigid feed-forward"], page["learned torques"], page["learned torques and LQG"]
+    for shown, values in zip(rows, (rigid, learned, fed_back), strict=True):
+        shown = [float(number) for cell in shown for number in cell.split(", ")]
+        assert np.ravel(values) == pytest.approx(np.array(shown), abs=0.6e-4)
+    assert fed_back[1][0] < 0.06 * learned[1][0]
+    assert fed_back[1][1] < 0.04 * rigid[1][1]  # 28 dB
+    # Quantised readings add noise of some 0.005 mm, another sample on every processor; 0.1 mm is asked for with
+    # more payload.
+    for (exact, still), (error, vibration) in zip(fed_back, quantised, strict=True):
+        assert error < exact + 0.02
+        assert vibration < still + 0.04
+    assert quantised[1][0] < 0.1
+    assert f"{fed_back[1][0]:.4f}, {fed_back[1][1]:.4f}" in printed
+    assert f"{every.radius:.4f}" in printed
+    assert every.radius < 0.9953
+    # Without damping some vibration beyond 1 kHz grows slowly in some poses.
+    assert 1.0 < undamped < 1.0009
+    assert f"{undamped:.4f}" in printed
+    gain, delay = every.margins
     assert gain == pytest.approx(2.857, abs=2e-3)
     assert delay == pytest.approx(2.468, abs=2e-3)
     # Steps of 1 ms are fine enough for damped links: error control agrees.
-    task = pf.plan(example.manipulator(0.12), pf.load("raparm_i").paths["square"], duration=0.7)
-    planned = pf.plan(example.manipulator(0.1), task.path, duration=0.7)
-    finely = planned.remodelled(task.mechanism).simulate("++++", method="esdirk4")
-    rigid = every[0.01].found["rigid torques", "20 % more payload"]
-    assert example.figures(finely)[0] == pytest.approx(rigid[0], rel=2e-3)
+    finely = every.task.remodelled(example.manipulator(0.12)).simulate("++++", method="esdirk4")
+    assert example.figures(finely)[0] == pytest.approx(rigid[1][0], rel=2e-3)
 
 
 @pytest.mark.parametrize(("damping", "states", "stable"), [(5e-4, 44, False), (1e-3, 44, True), (2e-4, 100, True)])
 def test_closed_loop_with_little_damping(damping, states, stable):
     """How little suffices in every pose and with 0 to 0.5 kg depends on how many vibrations the design knows."""
     example = load_example("closed_loop")
-    task = pf.plan(example.manipulator(0.1, damping), pf.load("raparm_i").paths["square"], duration=0.7)
+    task = example.planned(damping)
     radius = example.largest_radius(task, example.design_of(task, states), damping)
     assert (radius < 1.0) == stable
 
@@ -176,7 +174,7 @@ def test_closed_loop_with_little_damping(damping, states, stable):
 @pytest.fixture(scope="module")
 def laws(tmp_path_factory):
     """What the command on the page of control gives, by row and mode."""
-    along = ["--path", "square", "--path", "shaped"]
+    along = ["--path", "square", "--path", "shaped", "--mode", "++++", "--mode=-+-+"]
     done = paraflex("control", "compare", EXAMPLES / "laws.toml", *along, "--json", cwd=tmp_path_factory.mktemp("laws"))
     assert done.returncode == 0, done.stderr
     return {name: law["modes"] for name, law in json.loads(done.stdout)["laws"].items()}

@@ -1,5 +1,6 @@
 """What the page on extending says is done in a copy of the package, and gives what the page says."""
 
+import json
 import re
 import shutil
 import sys
@@ -17,22 +18,34 @@ PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 def test_all_seven_kinds_of_additions_are_made_as_the_page_says(tmp_path):
     # With the compiled kernels, which do not change.
     package = Path(shutil.copytree(Path(paraflex.__file__).parent, tmp_path / "paraflex"))
-    printed, ran = "", 0
+    ran, waiting = 0, []
     for block in blocks_of(PAGE):
         file = package / block.title if block.title else None
+        if file is None:
+            waiting.append(block)
+            continue
+        # Blocks between two edits run in one process, those after an edit in one that sees it.
+        ran, waiting = ran + check(waiting, tmp_path), []
         if block.language == "diff":
-            assert file is not None
             # Neighbours would go astray with the next name that is added.
             assert all(DEFINED.match(line) for line in block.text.splitlines() if line[0] != "+")
             apply_diff(file, block.text)
-        elif file is not None:
+        else:
             assert not file.exists()
             file.write_text(block.text, encoding="utf-8")
-        elif block.language == "text":
-            check_output(block.text, printed)
+    assert ran + check(waiting, tmp_path) == 14
+
+
+def check(blocks, folder):
+    """Run blocks, hold what each prints against the text below it; how many were run."""
+    runs = [block for block in blocks if block.language != "text"]
+    printed, last = iter(run(runs, folder)), None
+    for block in blocks:
+        if block.language == "text":
+            check_output(block.text, last)
         else:
-            printed, ran = run(block, tmp_path), ran + 1
-    assert ran == 14
+            last = next(printed)
+    return len(runs)
 
 
 OWN_FIELD = """
@@ -65,7 +78,8 @@ print(model_schema()["$defs"]["JointTable"]["properties"]["width"]["description"
 
 
 def test_a_joint_with_a_field_of_its_own_is_read_and_checked_by_what_the_field_says(tmp_path):
-    assert run(Block("python", "", OWN_FIELD, ""), tmp_path, Path(paraflex.__file__).parents[1]).splitlines() == [
+    (printed,) = run([Block("python", "", OWN_FIELD, "")], tmp_path, Path(paraflex.__file__).parents[1])
+    assert printed.splitlines() == [
         "BushJoint 2.0 pin",
         "own.toml: joint.NAME.width: is missing; give the width in mm",
         "own.toml: joint.NAME.width: must be positive (got -1.0); give it in mm",
@@ -75,15 +89,34 @@ def test_a_joint_with_a_field_of_its_own_is_read_and_checked_by_what_the_field_s
     ]
 
 
-def run(block, folder, package=None):
-    """What a block prints, run by a Python that finds the copy in a folder, or the package, first."""
-    if block.language == "python":
-        commands = [[sys.executable, "-c", block.text]]
-    else:
-        assert block.language == "sh", block
-        commands = [[sys.executable, "-m", *line.split()] for line in block.text.splitlines()]
+# Each Python block has names of its own, each line of a shell block ends with exit code 0.
+RUN = """
+import contextlib, io, json, sys
+from pathlib import Path
+from paraflex.cli.app import main
+
+printed = []
+for language, text in json.loads(Path("blocks.json").read_text(encoding="utf-8")):
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        if language == "python":
+            exec(compile(text, "extending.md", "exec"), {"__name__": "__main__"})
+        for line in text.splitlines() if language == "sh" else ():
+            sys.argv = line.split()
+            try:
+                main()
+            except SystemExit as end:
+                assert not end.code, (line, end.code)
+    printed.append(out.getvalue())
+Path("printed.json").write_text(json.dumps(printed), encoding="utf-8")
+"""
+
+
+def run(blocks, folder, package=None):
+    """What blocks print, run by one Python that finds the copy in a folder, or the package, first."""
+    if not blocks:
+        return []
+    assert {block.language for block in blocks} <= {"python", "sh"}
+    (folder / "blocks.json").write_text(json.dumps([(block.language, block.text) for block in blocks]))
     environment = {"PYTHONPATH": str(package or folder), "COLUMNS": "80"}
-    printed = ""
-    for command in commands:
-        printed += processes.run(*command, cwd=folder, env=environment, check=True).stdout
-    return printed
+    processes.run(sys.executable, "-c", RUN, cwd=folder, env=environment, check=True)
+    return json.loads((folder / "printed.json").read_text(encoding="utf-8"))

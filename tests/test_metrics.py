@@ -101,7 +101,7 @@ def test_a_metric_of_the_table_is_an_objective_a_limit_and_a_target(tmp_path):
 
 def test_a_metric_of_the_table_has_indices(tmp_path):
     pytest.importorskip("SALib")
-    found = pf.indices(write(tmp_path, STUDY + RANGE), tmp_path / "out", samples=32, workers=1)
+    found = pf.indices(write(tmp_path, STUDY + RANGE), tmp_path / "out", samples=16, workers=1)
     assert found.data["metric"].values[0] == METRIC
     assert found.data["total"].values[0].item() == pytest.approx(1.0, abs=0.2)
 
