@@ -1,13 +1,13 @@
 """`paraflex verify` as a user meets it, and the fidelities of `paraflex run`."""
 
 import json
+import sys
 
 import pytest
 
 from paraflex.files import load
 from paraflex.kinematics import length_fraction
 from paraflex.results import load_results
-from processes import python
 from shell import interrupted, paraflex
 from test_cli import FAST
 
@@ -60,9 +60,9 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path, arguments, says):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_engine_that_is_not_there_names_the_extra(tmp_path):
-    hidden = "import sys; sys.modules['exudyn'] = None; from paraflex.cli.app import main; main()"
-    done = python("-c", hidden, "verify", "--engine", "exudyn", cwd=tmp_path)
+def test_an_engine_that_is_not_there_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "exudyn", None)
+    done = paraflex("verify", "--engine", "exudyn", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr == (
         "error: engine: not installed (got 'exudyn'); install it with pip install 'paraflex[engines]'\n"

@@ -1,6 +1,7 @@
 """Damaged files of results are named, not read: a bit flipped in every kind; old folders with rows twice or foreign."""
 
 import json
+import os
 import shutil
 import sqlite3
 import sys
@@ -51,8 +52,10 @@ def flip(file, place, bit=1):
     file.write_bytes(content)
 
 
-def test_no_flipped_bit_is_read_as_other_numbers(tmp_path):
+def test_no_flipped_bit_is_read_as_other_numbers(tmp_path, monkeypatch):
     """The short form of benchmarks/bit_flips.py: of each file that numbers are read from some bits."""
+    # Of an unfinished one four are done: whoever goes on with it has one left to do.
+    monkeypatch.setattr(bit_flips, "SOBOL", bit_flips.SOBOL.replace("6", "5"))
     (tmp_path / "files").mkdir()
     cases = list(bit_flips.flips(tmp_path, 50, 3, bit_flips.kinds(tmp_path / "files")))
     assert [case for case in cases if case.outcome in ("raw", "silent")] == []
@@ -77,14 +80,17 @@ def test_a_seal_finds_every_flipped_bit_and_others_read_the_file(tmp_path, name)
     np.testing.assert_array_equal(read, values)
     sealed, passed = file.read_bytes(), []
     check_seal(file, "make it again")
-    for place in range(len(sealed)):
-        flip(file, place, 1 << place % 8)
-        try:
-            check_seal(file, "make it again")
-            passed.append(place)
-        except InputError:
-            pass
-        file.write_bytes(sealed)
+    with file.open("r+b", buffering=0) as opened:
+        for place, byte in enumerate(sealed):
+            # In place: the file is not written anew thousands of times.
+            os.pwrite(opened.fileno(), bytes([byte ^ (1 << place % 8)]), place)
+            try:
+                check_seal(file, "make it again")
+                passed.append(place)
+            except InputError:
+                pass
+            os.pwrite(opened.fileno(), bytes([byte]), place)
+    assert file.read_bytes() == sealed
     if name == "data.nc":
         assert passed == []
         return
@@ -228,7 +234,7 @@ def test_a_damaged_metric_of_a_part_is_called_so(study, whole, tmp_path):
 
 
 def test_a_trajectory_that_was_deleted_is_made_again(tmp_path):
-    more = {"end": bit_flips.SOBOL, "more": "trajectories = true"}
+    more = {"end": bit_flips.SOBOL.replace("6", "3"), "more": "trajectories = true"}
     study = load_sweep(bit_flips._file(tmp_path, "sweep", **more))
     result = sweep(study, tmp_path / "out", workers=1)
     kept = sorted((tmp_path / "out" / "trajectories").iterdir())

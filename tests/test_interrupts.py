@@ -20,6 +20,14 @@ from processes import started, wait_until
 if os.name != "posix":
     pytest.skip("signals", allow_module_level=True)
 PARAFLEX = (sys.executable, "-m", "paraflex")
+# A sweep that writes every row at once, not those of two seconds together: signals need not wait for it.
+AT_ONCE = """
+import runpy
+from paraflex.campaign import journal
+journal._SECONDS = 0.0
+runpy.run_module("paraflex", run_name="__main__", alter_sys=True)
+"""
+SWEEP = (sys.executable, "-c", AT_ONCE, "sweep")
 STUDY = """
 mechanism = "raparm_i"
 paths = ["line"]
@@ -54,9 +62,15 @@ sys.meta_path.insert(0, Slow())
 from paraflex.__main__ import main
 main()
 """
+# What stands in for `paraflex info`: without all that the command imports.
+ANSWER = """
+import sys, types
+def answer(work):
+    sys.modules["paraflex.cli.inspect"] = types.SimpleNamespace(info_command=work)
+"""
 # One that imports while it works, and what it imports does not like to be left alone.
 LATE = """
-import sys, types
+import sys
 class Slow:
     def find_spec(self, name, *_):
         if name == "paraflex.late":
@@ -74,8 +88,7 @@ def work(request):
     except ImportError:
         pass
     __import__("time").sleep(600)
-import paraflex.cli.inspect
-paraflex.cli.inspect.info_command = work
+answer(work)
 sys.argv = ["paraflex", "info"]
 from paraflex.__main__ import main
 main()
@@ -90,8 +103,7 @@ class Gone:
 def work(request):
     Gone()
     __import__("time").sleep(600)
-import paraflex.cli.inspect
-paraflex.cli.inspect.info_command = work
+answer(work)
 sys.argv = ["paraflex", "info"]
 from paraflex.__main__ import main
 main()
@@ -105,8 +117,7 @@ def work(request):
         __import__("time").sleep(600)
     except KeyboardInterrupt:
         raise ImportError("a library was left half imported")
-import paraflex.cli.inspect
-paraflex.cli.inspect.info_command = work
+answer(work)
 sys.argv = ["paraflex", "info"]
 from paraflex.__main__ import main
 main()
@@ -121,16 +132,25 @@ def study(tmp_path):
     return file
 
 
-@pytest.mark.parametrize(("number", "code"), ENDING)
-@pytest.mark.parametrize("engine", ["threads", "processes", "dask"])
-def test_a_sweep_ends_with_its_rows_and_all_its_processes(study, tmp_path, number, code, engine):
+# Workers are kept from SIGINT and SIGHUP by one mask, which SIGTERM passes; of threads `test_sweep_engines` has Ctrl-C.
+@pytest.mark.parametrize(
+    ("engine", "workers", "number"),
+    [
+        ("threads", 2, signal.SIGHUP),
+        ("processes", 1, signal.SIGHUP),
+        ("processes", 2, signal.SIGTERM),
+        ("dask", 1, signal.SIGINT),
+        ("dask", 2, signal.SIGTERM),
+    ],
+)
+def test_a_sweep_ends_with_its_rows_and_all_its_processes(study, tmp_path, engine, workers, number):
     out = tmp_path / "out"
-    with started(*PARAFLEX, "sweep", study, "--output", out, "--engine", engine, "--workers", 2) as child:
+    with started(*SWEEP, study, "--output", out, "--engine", engine, "--workers", workers) as child:
         child.until(lambda: rows_in(out))
         child.send(number, group=True)
         done = child.end()
         wait_until(lambda: not child.descendants(), within=30.0, what="the end of workers")
-    assert done.returncode == code, done.stderr
+    assert done.returncode == 128 + number, done.stderr
     assert "interrupted; " in done.stderr
     assert "the same command goes on from there" in done.stderr
     assert "Traceback" not in done.stderr
@@ -140,8 +160,9 @@ def test_a_sweep_ends_with_its_rows_and_all_its_processes(study, tmp_path, numbe
 
 @pytest.mark.parametrize("engine", ["processes", "dask"])
 def test_workers_end_with_a_parent_that_was_killed(study, tmp_path, engine):
+    """Each sees to it by itself: one is enough, beside the process that keeps count of locks."""
     out = tmp_path / "out"
-    with started(*PARAFLEX, "sweep", study, "--output", out, "--engine", engine, "--workers", 2) as child:
+    with started(*SWEEP, study, "--output", out, "--engine", engine, "--workers", 1) as child:
         child.until(lambda: rows_in(out))
         assert len(child.descendants()) >= 2
         child.send(signal.SIGKILL)
@@ -150,7 +171,8 @@ def test_workers_end_with_a_parent_that_was_killed(study, tmp_path, engine):
         assert "Traceback" not in child.err
 
 
-@pytest.mark.parametrize(("number", "code"), [*ENDING, (signal.SIGKILL, -9)])
+# SIGINT and SIGHUP are one case here: the same mask keeps both from the processes.
+@pytest.mark.parametrize(("number", "code"), [*ENDING[:2], (signal.SIGKILL, -9)])
 def test_processes_that_compile_end_with_the_command(tmp_path, number, code):
     kernels = {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
     with started(*PARAFLEX, "run", "--out", tmp_path / "out", env=kernels) as child:
@@ -179,7 +201,7 @@ def test_imports_before_the_command_begins_end_at_once(number, code):
     [(LATE, "importing", "imported"), (LOST, "going", "going"), (OTHER, "working", "working")],
 )
 def test_libraries_do_not_keep_a_command_from_ending(script, when, last):
-    with started(sys.executable, "-c", script) as child:
+    with started(sys.executable, "-c", ANSWER + script) as child:
         child.until(lambda: when in child.out)
         child.send(signal.SIGTERM)
         done = child.end()
@@ -214,11 +236,11 @@ def test_nohup_is_respected(study, tmp_path):
         "import os, signal, sys; signal.signal(signal.SIGHUP, signal.SIG_IGN); os.execv(sys.executable, sys.argv[1:])"
     )
     out = tmp_path / "out"
-    with started(sys.executable, "-c", deaf, *PARAFLEX, "sweep", study, "--output", out, "--limit", 40) as child:
+    with started(sys.executable, "-c", deaf, *SWEEP, study, "--output", out, "--limit", 8, "--no-report") as child:
         child.until(lambda: rows_in(out))
         child.send(signal.SIGHUP)
         assert child.end().returncode == 0
-    assert rows_in(out) == 40
+    assert rows_in(out) == 8
 
 
 def test_what_must_not_be_interrupted_is_not():

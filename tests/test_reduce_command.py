@@ -24,7 +24,7 @@ def test_it_tells_what_python_finds(tmp_path):
     few = pf.reduce(model, 16)
     own = numbers["modes"]["+-+-"]["craig-bampton"]
     assert own["frequencies_held"][:2] == pytest.approx(few.held_frequencies()[:2] / (2.0 * math.pi), rel=1e-9)
-    needed = pf.states_needed([model], until=2.0 * math.pi * 30.0)["states"]
+    needed = pf.states_needed([model], until=2.0 * math.pi * 30.0, methods=["craig-bampton"])["states"]
     assert own["states_needed"]["x"] == needed.sel(mode="+-+-", reduction="craig-bampton", output="x").item()
     # The paper's plan, free modes, has the held frequency a quarter too high; ours to a millionth.
     exact = numbers["modes"]["+-+-"]["full"]["frequencies_held"][0]
@@ -66,9 +66,9 @@ def test_balanced_models_come_with_their_bound(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["raparm_i", "--states", "4"], "--states: are fewer than the 8 of the coordinates of 4 motors"),
-        (["raparm_i", "--states", "15"], "--states: is odd"),
-        (["raparm_i", "--states", "1000"], "--states: no such number of states (got 1000)"),
+        (["five_bar", "--states", "2"], "--states: are fewer than the 4 of the coordinates of 2 motors"),
+        (["five_bar", "--states", "15"], "--states: is odd"),
+        (["five_bar", "--states", "1000"], "--states: no such number of states (got 1000)"),
         (["raparm_i", "--method", "magic"], "unknown reduction method"),
         (["raparm_i", "--until", "-1"], "--until: is not positive"),
         (["slider_crank"], "has rigid links only"),

@@ -56,7 +56,7 @@ def dated(folder, names):
 @pytest.mark.parametrize(
     ("line", "file", "says"),
     [
-        (RUN, "summary.json", 'a run of five_bar along "square", mode ++'),
+        ([*RUN, "--no-figures"], "summary.json", 'a run of five_bar along "square", mode ++'),
         (MOTION, "summary.json", "a run of pendulum"),
         (VERIFY, "verify.json", 'a verification of five_bar along "square", mode ++'),
         (COMPARE, "compare-methods.json", "a comparison of methods of five_bar"),

@@ -384,7 +384,7 @@ def test_without_plotly_it_is_said(monkeypatch):
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     out = tmp_path_factory.mktemp("ran")
-    done = paraflex("run", "--mode", "++++", "--mode", "tau1", *FAST, "--out", str(out))
+    done = paraflex("run", "--no-figures", "--mode", "++++", "--mode", "tau1", *FAST, "--out", str(out))
     return done, out
 
 
@@ -416,7 +416,7 @@ def test_the_command_in_the_report_gives_the_results_again(ran, tmp_path):
     command = text_of(re.search(r'<p class="command"><code>(.*?)</code>', html).group(1))
     words = shlex.split(command)
     assert words[:2] == ["paraflex", "run"]
-    again = paraflex(*words[1:], "--no-report", "--out", str(tmp_path))
+    again = paraflex(*words[1:], "--no-report", "--no-figures", "--out", str(tmp_path))
     assert again.returncode == 1, again.stderr
     assert not (tmp_path / "report.html").exists()
     first, second = load_results(out / "results.nc"), load_results(tmp_path / "results.nc")
@@ -424,7 +424,8 @@ def test_the_command_in_the_report_gives_the_results_again(ran, tmp_path):
 
 
 def test_a_run_without_a_path_has_a_report(tmp_path):
-    done = paraflex("run", "-m", "pendulum", "--duration", "0.2", "--samples", "41", "--out", str(tmp_path))
+    own = ("-m", "pendulum", "--duration", "0.2", "--samples", "41")
+    done = paraflex("run", "--no-figures", *own, "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<h1>flexible pendulum</h1>" in html
@@ -455,11 +456,14 @@ def test_a_run_without_a_path_has_a_report(tmp_path):
 
 
 def test_what_is_drawn_is_left_out_where_they_are_not_wanted(tmp_path):
-    """Those of the results before go with them."""
-    command = ("run", "pendulum", "--duration", "0.1", "--samples", "11", "--out", tmp_path / "out")
-    for options, kept in (((), {"figures", "report.html"}), (("--no-figures",), {"report.html"}),
-                          (("--no-figures", "--no-report"), set())):  # fmt: skip
-        done = paraflex(*command, *options)
+    """Those of the results before, which have other numbers, go with them."""
+    command = ("run", "pendulum", "--samples", "11", "--out", tmp_path / "out")
+    for duration, options, kept in (
+        ("0.1", (), {"figures", "report.html"}),
+        ("0.11", ("--no-figures",), {"report.html"}),
+        ("0.12", ("--no-figures", "--no-report"), set()),
+    ):
+        done = paraflex(*command, "--duration", duration, *options)
         assert done.returncode == 0, done.stderr
         assert {name for name in ("figures", "report.html") if (tmp_path / "out" / name).exists()} == kept
         named = {name for name in ("figures", "report.html") if name in done.stderr.splitlines()[-1]}

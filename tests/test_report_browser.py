@@ -2,18 +2,74 @@
 
 from collections import Counter
 from itertools import combinations
+from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Browser, Page
 
 from colours import APART, colour_distance
-from conftest import DESKTOP, PHONE
+from conftest import DESKTOP, PHONE, is_ours, page_asks
 from paraflex.plots.themes import THEMES
 from paraflex.report import Chart, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
 
 # Of opening, on a machine that is busy with other tests as well: the best of so many is told [ms].
 OPENING, TRIES = 3000.0, 5
+WIDE = {"width": 2000, "height": 1100}
+# What a page is when it is opened, and how it gets there again.
+REMEMBER = """() => {
+    window.controls = () => [...document.querySelectorAll("main select, main input[type=checkbox]")];
+    window.atFirst = { ...report.state, controls: controls().map((one) => one.checked ?? one.value) };
+}"""
+PUT_BACK = """() => {
+    controls().forEach((one, k) => {
+        const now = one.checked ?? one.value, before = atFirst.controls[k];
+        if (now === before) return;
+        one[typeof before === "boolean" ? "checked" : "value"] = before;
+        one.dispatchEvent(new Event("change"));
+    });
+    for (const what of ["playing", "run", "time", "magnify"]) report.set(what, atFirst[what]);
+    if (document.documentElement.dataset.theme !== "auto") report.setTheme("auto");
+    for (const button of document.querySelectorAll(".legend button[aria-pressed=false]")) button.click();
+    document.activeElement.blur();
+    scrollTo(0, 0);
+}"""
+
+
+class SharedPages:
+    """A report in windows of several sizes, each opened once (that takes 2 s) and put back for every test."""
+
+    def __init__(self, browser: Browser, report: Path) -> None:
+        self._browser, self._report = browser, report
+        self._pages: dict[tuple[int, ...], Page] = {}
+        self._complaints: list[str] = []
+
+    def __call__(self, viewport: dict[str, int] = DESKTOP) -> Page:
+        """The page in a window, as it was opened."""
+        size = tuple(viewport.values())
+        if size in self._pages:
+            self._pages[size].emulate_media(media="null")
+            self._pages[size].evaluate(PUT_BACK)
+        else:
+            self._pages[size] = self._opened(viewport)
+        wait_for_drawing(self._pages[size])
+        return self._pages[size]
+
+    def _opened(self, viewport: dict[str, int]) -> Page:
+        say = self._complaints.append
+        page = self._browser.new_context(viewport=viewport).new_page()
+        page.on("console", lambda message: say(message.text) if is_ours(message.text) else None)
+        page.on("pageerror", lambda error: say(str(error)))
+        page.on("request", lambda request: say(request.url) if page_asks(request.url) else None)
+        page.goto(self._report.as_uri())
+        page.wait_for_function("document.documentElement.dataset.charts === 'true'")
+        page.evaluate(REMEMBER)
+        return page
+
+    def check(self) -> None:
+        """What the consoles said since the last test, and what was asked of a network, must be nothing."""
+        said, self._complaints[:] = self._complaints[:], []
+        assert said == []
 
 
 @pytest.fixture(scope="module")
@@ -21,6 +77,18 @@ def report(tmp_path_factory):
     file = tmp_path_factory.mktemp("report") / "report.html"
     save_page(tracking_page(tracked(), FAILED), file)
     return file
+
+
+@pytest.fixture(scope="module")
+def pages(browser, report):
+    return SharedPages(browser, report)
+
+
+@pytest.fixture
+def shared(pages):
+    """The report in a window that other tests use too."""
+    yield pages
+    pages.check()
 
 
 def drawn(page: Page) -> str:
@@ -79,18 +147,18 @@ def test_it_opens_at_once(browser, report):
     assert min(taken) < OPENING
 
 
-def test_the_mechanism_is_above_the_fold_and_the_solver_below_it(opened):
-    page = opened(viewport={"width": 1400, "height": 1000})
+def test_the_mechanism_is_above_the_fold_and_the_solver_below_it(shared):
+    page = shared()
     drawing, solver = page.locator("#canvas").bounding_box(), page.locator("#part-integration").bounding_box()
     assert drawing is not None
     assert solver is not None
-    assert drawing["y"] + drawing["height"] <= 1000
-    assert solver["y"] > 1000
+    assert drawing["y"] + drawing["height"] <= DESKTOP["height"]
+    assert solver["y"] > DESKTOP["height"]
 
 
-def test_no_chart_can_be_sent_anywhere(opened):
+def test_no_chart_can_be_sent_anywhere(shared):
     requests = []
-    page = opened()
+    page = shared()
     page.on("request", lambda request: requests.append(request.url))
     curves(page, "torques")
     titles = page.evaluate(
@@ -130,8 +198,8 @@ def test_a_print_keeps_proportions_and_cuts_nothing(opened):
     assert not page.locator("#dock").is_visible()
 
 
-def test_charts_wider_than_paper_are_printed_smaller_as_a_whole(opened):
-    page = opened(viewport={"width": 2000, "height": 1100})
+def test_charts_wider_than_paper_are_printed_smaller_as_a_whole(shared):
+    page = shared(WIDE)
     curves(page, "path")
     size = "((box) => [box.width, box.height])(document.querySelector('#chart-path .main-svg').getBoundingClientRect())"
     wide = page.evaluate(size)
@@ -144,8 +212,8 @@ def test_charts_wider_than_paper_are_printed_smaller_as_a_whole(opened):
     assert page.evaluate(size) == pytest.approx(wide)
 
 
-def test_charts_over_time_are_flat_on_paper_and_as_before_after_it(opened):
-    page = opened(viewport={"width": 2000, "height": 1100})
+def test_charts_over_time_are_flat_on_paper_and_as_before_after_it(shared):
+    page = shared(WIDE)
     curves(page, "errors")
     size = (
         "((box) => [box.width, box.height])(document.querySelector('#chart-errors .main-svg').getBoundingClientRect())"
@@ -162,32 +230,18 @@ def test_charts_over_time_are_flat_on_paper_and_as_before_after_it(opened):
     assert [*page.evaluate(size), page.evaluate(title)] == pytest.approx(before, abs=1)
 
 
-def test_a_table_on_a_phone_says_that_it_scrolls(opened):
-    page = opened(viewport=PHONE)
+def test_a_table_on_a_phone_says_that_it_scrolls(shared):
+    page = shared(PHONE)
     table = page.locator("#part-modes .scroll")
     assert page.locator("#part-modes .swipe").is_visible()
     assert "goes-on" in table.get_attribute("class")
     table.evaluate("(one) => one.scrollTo(one.scrollWidth, 0)")
     page.wait_for_function("!document.querySelector('#part-modes .scroll').classList.contains('goes-on')")
-    wide = opened(viewport={"width": 1560, "height": 900})
-    assert not wide.locator("#part-modes .swipe").is_visible()
+    assert not shared().locator("#part-modes .swipe").is_visible()
 
 
-def test_buttons_that_go_on_beside_a_phone_fade_there(opened, tmp_path):
-    save_page(verification_page(*verified()), tmp_path / "report.html")
-    page = opened(tmp_path / "report.html", viewport={"width": 280, "height": 700})
-    page.locator("#runs label").first.click()
-    buttons = page.locator("#runs")
-    page.wait_for_function("document.getElementById('runs').classList.contains('goes-on')")
-    assert "goes-back" not in buttons.get_attribute("class")
-    assert "gradient" in buttons.evaluate("(one) => getComputedStyle(one).maskImage")
-    page.locator("#runs label").last.click()
-    page.wait_for_function("document.getElementById('runs').classList.contains('goes-back')")
-    assert "goes-on" not in buttons.get_attribute("class")
-
-
-def test_motors_and_joints_are_of_the_selected_mode_and_on_paper_of_all(opened):
-    page = opened()
+def test_motors_and_joints_are_of_the_selected_mode_and_on_paper_of_all(shared):
+    page = shared()
     tables = page.locator("#part-motors-and-prescribed-motions .of-run")
     shown = "(parts) => parts.map((part) => part.checkVisibility())"
     page.locator("#runs label").nth(1).click()
@@ -198,8 +252,8 @@ def test_motors_and_joints_are_of_the_selected_mode_and_on_paper_of_all(opened):
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_no_link_has_the_colour_of_the_trail_or_the_path(opened, theme):
-    page = opened()
+def test_no_link_has_the_colour_of_the_trail_or_the_path(shared, theme):
+    page = shared()
     page.evaluate("(name) => report.setTheme(name)", theme)
     links = page.evaluate("report.palette()")
     for name in ("trail", "text"):
@@ -209,11 +263,12 @@ def test_no_link_has_the_colour_of_the_trail_or_the_path(opened, theme):
     assert page.evaluate("report.colour('trail')") == THEMES[theme].trail
 
 
-def test_names_keep_clear_of_one_another(opened):
-    page = opened()
+def test_names_keep_clear_of_one_another(shared):
+    page = shared()
     page.evaluate("""() => {
         const pen = CanvasRenderingContext2D.prototype, write = pen.fillText;
         window.boxes = [];
+        window.forget = () => { pen.fillText = write; };
         pen.fillText = function (text, x, y) {
             if (this.textAlign === "center") boxes.push([text, x, y, this.measureText(text).width]);
             return write.call(this, text, x, y);
@@ -231,6 +286,7 @@ def test_names_keep_clear_of_one_another(opened):
             if abs(x - u) < 0.5 * (wide + far) and abs(y - v) < 10.0
         ]
         assert not overlapping
+    page.evaluate("forget()")
 
 
 def test_charts_below_the_screen_wait_until_they_are_seen(opened):
@@ -242,8 +298,8 @@ def test_charts_below_the_screen_wait_until_they_are_seen(opened):
     assert before < page.evaluate("charts.all.filter((chart) => chart.drawn).length") < described
 
 
-def test_play_moves_the_mechanism_and_pause_stops_it(opened):
-    page = opened()
+def test_play_moves_the_mechanism_and_pause_stops_it(shared):
+    page = shared()
     still = drawn(page)
     page.get_by_role("button", name="Play").click()
     page.wait_for_function("report.state.time > 0.002")
@@ -255,8 +311,8 @@ def test_play_moves_the_mechanism_and_pause_stops_it(opened):
     assert drawn(page) == stopped
 
 
-def test_the_links_are_drawn_where_the_dataset_has_them(opened):
-    page = opened()
+def test_the_links_are_drawn_where_the_dataset_has_them(shared):
+    page = shared()
     page.locator("#names").uncheck()
     page.evaluate("player.seek(0.04)")
     wait_for_drawing(page)
@@ -266,8 +322,8 @@ def test_the_links_are_drawn_where_the_dataset_has_them(opened):
     assert counts[0] > 1.5 * counts[1]
 
 
-def test_the_slider_and_the_keys_move_in_time(opened):
-    page = opened()
+def test_the_slider_and_the_keys_move_in_time(shared):
+    page = shared()
     still = drawn(page)
     page.locator("#scrub").fill("500")
     assert time_of(page) == pytest.approx(0.05, abs=1e-6)
@@ -289,8 +345,8 @@ def test_the_slider_and_the_keys_move_in_time(opened):
     assert drawn(page) == still
 
 
-def test_the_magnifier_bends_links_more_and_leaves_joints_alone(opened):
-    page = opened()
+def test_the_magnifier_bends_links_more_and_leaves_joints_alone(shared):
+    page = shared()
     page.evaluate("player.seek(0.02)")
     # It begins with a round number at which bending is seen.
     assert page.evaluate("report.state.magnify === report.page.film.magnify && report.state.magnify > 1")
@@ -309,8 +365,8 @@ def test_the_magnifier_bends_links_more_and_leaves_joints_alone(opened):
     assert page.evaluate("report.state.magnify") == 5
 
 
-def test_the_selector_of_modes_changes_curves_and_mechanism(opened):
-    page = opened()
+def test_the_selector_of_modes_changes_curves_and_mechanism(shared):
+    page = shared()
     assert page.evaluate("report.runName()") == "++++"
     page.evaluate("player.seek(0.05)")
     before, picture = curves(page, "torques"), drawn(page)
@@ -336,8 +392,8 @@ def test_the_selector_of_modes_changes_curves_and_mechanism(opened):
     assert page.evaluate("report.runName()") == MODES[0]
 
 
-def test_a_run_that_stopped_stays_where_it_ended(opened):
-    page = opened()
+def test_a_run_that_stopped_stays_where_it_ended(shared):
+    page = shared()
     page.evaluate("report.set('run', 2); player.seek(0.06)")
     ended = drawn(page)
     page.evaluate("player.seek(0.05)")
@@ -346,8 +402,8 @@ def test_a_run_that_stopped_stays_where_it_ended(opened):
     assert set(gaps) == {25}
 
 
-def test_a_line_in_every_chart_goes_with_time(opened):
-    page = opened()
+def test_a_line_in_every_chart_goes_with_time(shared):
+    page = shared()
     curves(page, "torques")
     places = []
     for time in (0.02, 0.06):
@@ -364,8 +420,8 @@ def test_a_line_in_every_chart_goes_with_time(opened):
     assert page.locator("#chart-path .dot").first.is_visible()
 
 
-def test_the_legend_hides_a_curve(opened):
-    page = opened()
+def test_the_legend_hides_a_curve(shared):
+    page = shared()
     curves(page, "torques")
     button = page.locator("#chart-torques .legend button").first
     button.click()
@@ -374,8 +430,8 @@ def test_the_legend_hides_a_curve(opened):
 
 
 @pytest.mark.parametrize("viewport", [PHONE, {"width": 820, "height": 1100}, DESKTOP], ids=["phone", "tablet", "desk"])
-def test_nothing_is_wider_than_the_screen(opened, viewport):
-    page = opened(viewport=viewport)
+def test_nothing_is_wider_than_the_screen(shared, viewport):
+    page = shared(viewport)
     curves(page, "phases")
     assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
 
@@ -412,21 +468,25 @@ def test_a_page_repainted_while_its_film_is_unpacked_says_nothing(browser, repor
     page.add_init_script(SLOW)
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.goto(report.as_uri())
-    page.evaluate(
+    repainted = page.evaluate(
         """async () => {
-            for (let k = 0; k < 40; k++) {
+            let k = 0;
+            const { dataset } = document.documentElement;
+            for (; dataset.ready !== "true" || k % 2; k++) {
                 report.setTheme(k % 2 ? "dark" : "light");
                 await new Promise((done) => setTimeout(done, 20));
             }
+            return k;
         }"""
     )
+    assert repainted > 4
     assert len(set(coloured(page))) > 1
     page.close()
     assert complaints == []
 
 
-def test_everything_is_reached_by_keyboard_and_has_a_name(opened):
-    page = opened()
+def test_everything_is_reached_by_keyboard_and_has_a_name(shared):
+    page = shared()
     nameless = page.evaluate(
         """[...document.querySelectorAll("main button, main input, main select, canvas")].filter((one) =>
             !(one.getAttribute("aria-label") || one.textContent.trim() || (one.labels && one.labels.length))
@@ -448,14 +508,22 @@ def test_everything_is_reached_by_keyboard_and_has_a_name(opened):
     assert {"play", "scrub", "run", "canvas", "magnify", "speed", "ghost", "trail", "names"} <= set(seen)
 
 
-def test_models_of_a_verification_move_and_are_overlaid(opened, tmp_path):
+def test_models_of_a_verification_are_overlaid_and_their_buttons_fade_beside_a_phone(opened, tmp_path):
     save_page(verification_page(*verified()), tmp_path / "report.html")
-    page = opened(tmp_path / "report.html")
+    page = opened(tmp_path / "report.html", viewport={"width": 280, "height": 700})
     page.evaluate("player.seek(0.03)")
     picture = drawn(page)
     assert len(curves(page, "angle_differences")) == 3
     page.locator("#runs label", has_text="rigid").click()
     assert drawn(page) != picture
+    page.locator("#runs label").first.click()
+    buttons = page.locator("#runs")
+    page.wait_for_function("document.getElementById('runs').classList.contains('goes-on')")
+    assert "goes-back" not in buttons.get_attribute("class")
+    assert "gradient" in buttons.evaluate("(one) => getComputedStyle(one).maskImage")
+    page.locator("#runs label").last.click()
+    page.wait_for_function("document.getElementById('runs').classList.contains('goes-back')")
+    assert "goes-on" not in buttons.get_attribute("class")
 
 
 def test_parallel_coordinates_are_drawn_too(opened, tmp_path):

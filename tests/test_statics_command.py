@@ -13,34 +13,40 @@ from paraflex.results import load_results, statics_summary
 from shell import paraflex
 
 
-def test_a_guide_is_pushed_and_written_as_python_does_it(tmp_path):
+@pytest.fixture(scope="module")
+def guide(tmp_path_factory):
+    """What the command says of a guide that is pushed, and where it has written."""
+    folder = tmp_path_factory.mktemp("statics")
     options = ["--move", "stage.T.x=10 mm", "--steps", "5", "--stiffness", "stage.T.x", "--stiffness", "stage.T.y"]
-    done = paraflex("statics", "leaf_spring_guide", *options, "--out", "guide", cwd=tmp_path)
+    return paraflex("statics", "leaf_spring_guide", *options, "--out", "guide", cwd=folder), folder
+
+
+def test_a_guide_is_pushed_and_written_as_python_does_it(guide):
+    done, folder = guide
     assert done.returncode == 0, done.stderr
     found = pf.statics(
         pf.load("leaf_spring_guide"), moved={"stage.T.x": 0.01}, steps=5, stiffness=["stage.T.x", "stage.T.y"]
     )
-    data = load_results(tmp_path / "guide" / "statics.nc")
+    data = load_results(folder / "guide" / "statics.nc")
     assert data["effort"].sel(named="stage.T.x").values == pytest.approx(found.effort("stage.T.x"), abs=1e-9)
     assert data["stiffness"].sel(named="stage.T.y").values == pytest.approx(found.stiffness("stage.T.y"))
-    numbers = json.loads((tmp_path / "guide" / "statics.json").read_text())
+    numbers = json.loads((folder / "guide" / "statics.json").read_text())
     assert {key: numbers[key] for key in numbers if key != "digest"} == statics_summary(data)
     assert numbers["last"]["stage.T.y"]["travel"] == pytest.approx(-0.6e-3, rel=0.01)
-    assert {file.name for file in (tmp_path / "guide" / "figures").glob("*.png")} == {
+    assert {file.name for file in (folder / "guide" / "figures").glob("*.png")} == {
         "force_travel.png", "stiffness_travel.png", "deformed_shapes.png"
     }  # fmt: skip
     lines = done.stdout.splitlines()
     assert lines[0] == "leaf-spring guide: 6 equilibria"
     assert any(line.split() == ["stable", "1", "10", "10.6", "1.08", "258.1"] for line in lines)
     assert "safety factor 3.6" in done.stdout
-    again = paraflex("plot", "guide", "stiffness_travel", "--out", "again", cwd=tmp_path)
+    again = paraflex("plot", "guide", "stiffness_travel", "--out", "again", cwd=folder)
     assert again.returncode == 0, again.stderr
-    assert list((tmp_path / "again").glob("stiffness_travel*"))
+    assert list((folder / "again").glob("stiffness_travel*"))
 
 
-def test_films_of_equilibria_are_refused(tmp_path):
-    assert paraflex("statics", "leaf_spring_guide", "--out", "g", cwd=tmp_path).returncode == 0
-    done = paraflex("animate", "g", "film.gif", cwd=tmp_path)
+def test_films_of_equilibria_are_refused(guide):
+    done = paraflex("animate", "guide", "film.gif", cwd=guide[1])
     assert done.returncode == 2
     assert "paraflex plot draws them" in done.stderr
 
@@ -119,7 +125,7 @@ def test_bad_input_names_the_option(arguments, message, tmp_path):
 
 
 def test_figures_of_a_snap_show_both_branches():
-    found = pf.statics(truss(), loads={"apex.T.y": -15.0}, held=["apex.T.angle"], steps=10, warning=False)
+    found = pf.statics(truss(), loads={"apex.T.y": -15.0}, held=["apex.T.angle"], steps=5, warning=False)
     data = pf.statics_dataset(found)
     figure = pf.plots.force_travel(data)
     (axes,) = figure.axes

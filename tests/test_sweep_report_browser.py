@@ -7,7 +7,7 @@ from conftest import DESKTOP, PHONE
 from paraflex.report import save_page
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
-from test_report_browser import drawn, wait_for_drawing
+from test_report_browser import SharedPages, drawn, wait_for_drawing
 
 STUDY = """
 mechanism = "raparm_i"
@@ -42,6 +42,18 @@ def report(tmp_path_factory):
     return folder / "report.html"
 
 
+@pytest.fixture(scope="module")
+def pages(browser, report):
+    return SharedPages(browser, report)
+
+
+@pytest.fixture
+def shared(pages):
+    """The report in a window that other tests use too."""
+    yield pages
+    pages.check()
+
+
 def traces(page: Page, chart: str) -> list[dict]:
     """What Plotly draws in a chart, once it is drawn."""
     page.locator(f"#chart-{chart}").scroll_into_view_if_needed()
@@ -69,15 +81,15 @@ def choose(page: Page, chart: str, which: str, name: str) -> None:
     wait_for_drawing(page)
 
 
-def test_every_chart_of_all_designs_is_drawn(opened):
-    page = opened()
+def test_every_chart_of_all_designs_is_drawn(shared):
+    page = shared()
     for chart in ("responses1", "responses2", "front", "distribution", "parallel"):
         assert traces(page, chart)
     assert page.locator("#chart-parallel canvas").count() > 0
 
 
-def test_selectors_of_metric_and_parameter_change_the_response(opened):
-    page = opened()
+def test_selectors_of_metric_and_parameter_change_the_response(shared):
+    page = shared()
     marks = [trace for trace in traces(page, "responses1") if trace["mode"] == "markers" and trace["customdata"]]
     assert [trace["name"] for trace in marks] == ["++++", "+++-"]
     first, rows = marks[0], marks[0]["customdata"]
@@ -90,8 +102,8 @@ def test_selectors_of_metric_and_parameter_change_the_response(opened):
     assert changed["y"] == [values(page, "total_mass")[row] for row in rows]
 
 
-def test_a_grid_is_joined_by_lines_and_medians(opened):
-    page = opened()
+def test_a_grid_is_joined_by_lines_and_medians(shared):
+    page = shared()
     marks, _, lines, middles = traces(page, "responses1")[:4]
     assert (lines["mode"], middles["mode"]) == ("lines", "lines")
     # Three masses, each a line over three thicknesses and a gap.
@@ -101,8 +113,8 @@ def test_a_grid_is_joined_by_lines_and_medians(opened):
     assert middles["y"] == pytest.approx(at)
 
 
-def test_the_front_is_that_of_no_better_design(opened):
-    page = opened()
+def test_the_front_is_that_of_no_better_design(shared):
+    page = shared()
     for across, up, names in (("tracking_rms", "total_mass", ("RMS tracking error", "mass")),
                               ("total_mass", "peak_torque_max", ("mass", "peak torque"))):  # fmt: skip
         choose(page, "front", "across", names[0])
@@ -118,14 +130,14 @@ def test_the_front_is_that_of_no_better_design(opened):
             assert set(front["customdata"]) == expected
 
 
-def test_the_histogram_counts_every_run(opened):
-    page = opened()
+def test_the_histogram_counts_every_run(shared):
+    page = shared()
     for trace in traces(page, "distribution"):
         assert sum(trace["y"][1:-1:2]) == 9
 
 
-def test_a_design_chosen_moves_and_is_ringed(opened):
-    page = opened()
+def test_a_design_chosen_moves_and_is_ringed(shared):
+    page = shared()
     ring = traces(page, "responses1")[-1]
     page.evaluate("player.seek(0.03)")
     picture, name = drawn(page), page.evaluate("report.runName()")
@@ -144,8 +156,8 @@ def test_a_design_chosen_moves_and_is_ringed(opened):
     assert page.evaluate("report.state.run") == 1
 
 
-def test_the_table_sorts_by_any_number(opened):
-    page = opened()
+def test_the_table_sorts_by_any_number(shared):
+    page = shared()
     keys = "[...document.querySelectorAll('tr[data-run]')].map((row) => JSON.parse(row.dataset.keys)[{}])"
     head = page.locator("table.sortable th", has_text="thickness")
     column = page.evaluate("(head) => head.cellIndex", head.element_handle())
@@ -157,8 +169,8 @@ def test_the_table_sorts_by_any_number(opened):
 
 
 @pytest.mark.parametrize("viewport", [PHONE, DESKTOP], ids=["phone", "desk"])
-def test_nothing_is_wider_than_the_screen(opened, viewport):
-    page = opened(viewport=viewport)
+def test_nothing_is_wider_than_the_screen(shared, viewport):
+    page = shared(viewport)
     for chart in ("front", "parallel", "strain"):
         traces(page, chart)
     assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
@@ -180,8 +192,8 @@ def test_charts_of_designs_follow_the_theme(opened):
     assert all(one != other for one, other in zip(dark, page.evaluate(colours), strict=True))
 
 
-def test_everything_has_a_name(opened):
-    page = opened()
+def test_everything_has_a_name(shared):
+    page = shared()
     traces(page, "parallel")
     nameless = page.evaluate(
         """[...document.querySelectorAll("main button, main input, main select")].filter((one) =>
