@@ -306,7 +306,7 @@ def test_the_model_file_and_the_command_line_say_so(tmp_path):
     with pytest.raises(InputError, match=r"study.after"):
         load(str(model))
     asked = ("run", "-m", "raparm_i", "--path", "line", "--mode", "++++", "--duration", "0.2", "--tol", "1e-3")
-    done = paraflex(*asked, "--after", "hold", cwd=tmp_path)
+    done = paraflex(*asked, "--no-figures", "--after", "hold", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "the motors" in done.stdout
     assert "held by brakes" in " ".join(done.stdout.split())

@@ -114,8 +114,8 @@ def test_info_judges_in_three_levels_and_ends_with_1_where_it_is_wrong(tmp_path)
 def test_a_run_says_what_it_doubts_once_before_its_numbers_and_keeps_it(tmp_path):
     file = slipped(tmp_path, "gantry", "thickness = 0.004", "thickness = 0.0004")
     out = tmp_path / "out"
-    command = ("run", "-m", str(file), "--samples", "21", "--tol", "1e-3", "--out", str(out))
-    done = paraflex(*command)
+    command = ("run", "-m", str(file), "--samples", "21", "--tol", "1e-3", "--no-figures", "--out", str(out))
+    done = paraflex(*command, "--no-report")
     assert done.returncode == 0, done.stderr
     text = done.stdout + done.stderr
     assert text.count("[gravity]") == 0
@@ -133,7 +133,7 @@ def test_a_run_says_what_it_doubts_once_before_its_numbers_and_keeps_it(tmp_path
     assert page.count("7.85 kg/m^3 is that of no solid") == 1
     assert page.index("7.85 kg/m^3 is that of no solid") < page.index("<table")
     # With --json numbers stand alone on the standard output.
-    done = paraflex(*command, "--json")
+    done = paraflex(*command, "--no-report", "--json")
     assert json.loads(done.stdout)["verdict"]["level"] == "doubtful"
     assert done.stderr.count("[density]") == 1
 

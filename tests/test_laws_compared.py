@@ -439,7 +439,7 @@ def test_a_comparison_has_no_film_and_no_report(done, tmp_path, words, said):
 
 
 def test_ctrl_c_ends_it_in_one_line(tmp_path):
-    long = ["--duration", "30", "--samples", "30001", "--controller", "pd"]
+    long = ["--duration", "30", "--samples", "3001", "--controller", "pd"]
     said = interrupted("control", "compare", str(LAWS), *long, "--output", str(tmp_path / "out"))
     assert "interrupted before any law had run; nothing is written" in str(said)
     assert not (tmp_path / "out").exists()

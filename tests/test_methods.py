@@ -195,7 +195,7 @@ def test_second_order_geometry_runs_by_every_method(method):
 @pytest.fixture(scope="module")
 def raparm():
     model = load("raparm_i")
-    return plan_tracking(model.mechanism, model.path(), duration=0.7, samples=141)
+    return plan_tracking(model.mechanism, model.path(), duration=0.35, samples=71)
 
 
 def paths(task, **options):

@@ -38,7 +38,7 @@ def task(arm):
 
 @pytest.fixture(scope="module")
 def full(task):
-    return {mode: task.simulate(mode, warning=False) for mode in MODES}
+    return task.simulate("++++", warning=False)
 
 
 def study(task, reduced, modes):
@@ -133,7 +133,7 @@ def test_all_coordinates_are_the_whole_mechanism(arm, task, full):
     whole = replace(arm, bases=bases_of(system, [rng.standard_normal((40, system.n))], system.n_flexible))
     assert [body.nf for body in build_system(whole).bodies] == [body.nf for body in system.bodies]
     run = task.remodelled(whole).simulate("++++", warning=False)
-    errors = [pf.tracking_dataset([one])["tracking_rms"].item() for one in (run, full["++++"])]
+    errors = [pf.tracking_dataset([one])["tracking_rms"].item() for one in (run, full)]
     assert errors[0] == pytest.approx(errors[1], rel=1e-3)
 
 
@@ -160,7 +160,7 @@ def codes(data):
 
 
 def test_so_it_is_by_proper_orthogonal_decomposition_of_a_run(task, full):
-    data = study(task, pf.reduced_mechanism(full["++++"], 16), ["++++"]).data
+    data = study(task, pf.reduced_mechanism(full, 16), ["++++"]).data
     error, distance = off(data, "++++")
     assert abs(error) < 2e-6
     assert distance < 0.02
@@ -169,7 +169,7 @@ def test_so_it_is_by_proper_orthogonal_decomposition_of_a_run(task, full):
 def test_more_coordinates_are_nearer_and_too_few_are_said(task, full):
     errors = []
     for count in (2, 14, 24):
-        data = study(task, pf.reduced_mechanism(full["++++"], count), ["++++"]).data
+        data = study(task, pf.reduced_mechanism(full, count), ["++++"]).data
         errors.append(off(data, "++++")[1])
         assert ("reduced-too-far" in codes(data)) is (errors[-1] > 0.1)
     assert errors[0] > 0.1 > errors[1] > 3.0 * errors[2]
@@ -305,9 +305,9 @@ def test_what_cannot_be_reduced_is_said_in_a_line(tmp_path, reduced_file, task, 
     with pytest.raises(InputError, match=r"study.reduced: derivatives are of runs with all .*craig-bampton"):
         pf.sensitivities(reduced_file / "derived.toml")
     with pytest.raises(InputError, match="are not of one mechanism"):
-        pf.reduced_mechanism([full["++++"], pf.load("five_bar").plan().simulate("++", warning=False)])
+        pf.reduced_mechanism([full, pf.load("five_bar").plan().simulate("++", warning=False)])
     with pytest.raises(InputError, match="modes: are those of the runs"):
-        pf.reduced_mechanism(full["++++"], modes=["++++"])
+        pf.reduced_mechanism(full, modes=["++++"])
     few = pf.reduced_mechanism(task, 16, modes=["++++"])
     with pytest.raises(InputError, match=r"bases: .* say reduced = N in its \[study\]"):
         few.save(tmp_path / "few.toml")

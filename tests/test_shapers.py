@@ -269,13 +269,15 @@ def test_no_derivative_by_the_damping_of_an_ei_shaper(tmp_path):
 def test_info_and_a_run_name_and_draw_a_shaped_path(tmp_path):
     file = with_shaper(tmp_path, SHAPED)
     assert "square" in paraflex("info", file).stdout
-    done = paraflex("run", file, "--mode=++++", "--samples", 41, "--tol", 1e-4, "--out", tmp_path / "out")
+    asked = ("--mode=++++", "--samples", 41, "--tol", 1e-4, "--no-figures", "--out", tmp_path / "out")
+    done = paraflex("run", file, *asked)
     assert done.returncode == 0
     data = pf.load_results(tmp_path / "out")
     model = pf.load(file)
     assert data.attrs["motion_end"] == pytest.approx(model.paths["square"].duration)
     desired = model.paths["square"].evaluate(data["time"].values).position
     np.testing.assert_allclose(data["end_effector_desired"].isel(mode=0).values, desired, rtol=0, atol=1e-12)
+    assert pf.plots.desired_path(data).axes
     assert pf.plots.end_effector_path(data, "++++").axes
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 from scipy.special import ellipe, ellipk
 
 import paraflex as pf
@@ -57,7 +58,7 @@ def test_columns_of_euler_buckle_at_their_loads(lower: str, upper: str, factor: 
     assert found.stable.all()
 
 
-@pytest.mark.parametrize(("tip", "steps"), [(60.0, 10), (120.0, 10), (120.0, 3)])
+@pytest.mark.parametrize(("tip", "steps"), [(60.0, 3), (120.0, 7), (120.0, 3)])
 def test_a_column_pushed_across_its_load_bends_as_the_elastica(tip: float, steps: int) -> None:
     """It leaves its axis within a small part of the load, and no factor of the straight column is left."""
     modulus = math.sin(math.radians(tip / 2.0)) ** 2
@@ -96,7 +97,7 @@ def test_buckling_shapes_are_those_of_euler() -> None:
 def test_a_guide_pushed_sideways_buckles_in_a_leaf_whatever_the_frames() -> None:
     """The push presses one leaf with P L / (2 apart); both its ends are clamped: 4 pi^2 EI / L^2."""
     wanted = 4.0 * math.pi**2 * EI / LENGTH**2 / (10.5 * LENGTH / (2.0 * 0.05))
-    found = [pf.statics(guide(frames, elements=2), loads={"stage.T.x": 10.5}, steps=2) for frames in (1, 4, 8)]
+    found = [pf.statics(guide(frames, elements=2), loads={"stage.T.x": 10.5}, steps=1) for frames in (1, 4, 8)]
     assert [one.buckling[0, 0] for one in found] == pytest.approx([wanted] * 3, rel=1e-3)
     assert found[1].buckling[-1, 0] == pytest.approx(found[2].buckling[-1, 0], rel=3e-3)
     assert all((one.buckling > one.fraction[:, None]).all() for one in found)
@@ -110,7 +111,7 @@ def test_a_cantilever_under_a_load_across_does_not_buckle(frames: int) -> None:
     assert "full turn" in found.equilibria[0].buckling.reason
 
 
-@pytest.mark.parametrize(("frames", "load"), [(4, 18.0), (20, 18.0), (4, 20.0)])
+@pytest.mark.parametrize(("frames", "load"), [(4, 18.0), (12, 18.0), (4, 20.0)])
 def test_the_factor_of_a_frame_is_that_of_its_limit_point(frames: int, load: float) -> None:
     """On the branch or a little beyond what is given, where linear estimates are off by up to a factor of four."""
     frame, unit = lee_frame(frames)
@@ -137,7 +138,7 @@ def test_factors_and_frequencies_do_not_depend_on_the_size(scale: float) -> None
 
 def test_many_frames_and_several_factors_of_a_column() -> None:
     """More coordinates than have all their vibrations computed."""
-    found = pf.statics(cantilever(100), loads={"leaf100.B.x": -0.1}, steps=1, buckling=2)
+    found = pf.statics(cantilever(80), loads={"leaf80.B.x": -0.1}, steps=1, buckling=2)
     assert not found.equilibria[0].vibrations.complete
     euler = 0.25 * math.pi**2 * EI / LENGTH**2 / 0.1
     assert found.buckling == pytest.approx(np.array([[euler, 9.0 * euler]] * 2), rel=1e-3)
@@ -251,12 +252,11 @@ def test_a_guide_of_two_leaves_moves_as_the_exact_elastica(
     loads = dict(zip(("stage.T.x", "stage.T.y"), load, strict=True))
     # The turn is a difference of what the leaves sink: 1.6e-4 and 3.9e-4 off in four frames, 1.5e-5 in eight; more
     # elements in a frame change nothing.
-    for frames, places, angle in ((4, 1e-4, off), (8, 1e-5, 2e-5)):
-        found = pf.statics(guide(frames), loads=loads, stiffness=["stage.T.angle"], steps=2)
+    given = {"loads": loads, "stiffness": ["stage.T.angle"], "steps": 1}
+    coarse, fine, finer = (pf.statics(each, **given) for each in (guide(4), guide(8), guide(4, elements=2)))
+    for found, places, angle in ((coarse, 1e-4, off), (fine, 1e-5, 2e-5)):
         assert [found.travel(f"stage.T.{axis}")[-1] for axis in "xy"] == pytest.approx(travel, rel=places)
         assert found.travel("stage.T.angle")[-1] == pytest.approx(turn, rel=angle)
-    finer = pf.statics(guide(4, elements=2), loads=loads, stiffness=["stage.T.angle"], steps=2)
-    coarse = pf.statics(guide(4), loads=loads, stiffness=["stage.T.angle"], steps=2)
     assert finer.travel("stage.T.angle")[-1] == pytest.approx(coarse.travel("stage.T.angle")[-1], rel=5e-6)
 
 
@@ -319,8 +319,8 @@ def test_load_and_travel_find_the_same_equilibria_and_stiffness_is_their_slope()
 
 
 def test_the_strain_energy_is_the_work_of_what_moves_it() -> None:
-    found = pf.statics(guide(1), moved={"stage.T.x": 0.01}, steps=40)
-    work = np.trapezoid(found.effort("stage.T.x"), found.travel("stage.T.x"))
+    found = pf.statics(guide(1), moved={"stage.T.x": 0.01}, steps=6)
+    work = simpson(found.effort("stage.T.x"), found.travel("stage.T.x"))
     assert found.solution.strain_energy[-1] == pytest.approx(work, rel=1e-4)
 
 
