@@ -126,7 +126,7 @@ def test_every_option_of_a_run_is_in_the_command_that_repeats_it_or_shows_result
         "method": "bdf2", "step": 0.1, "constraints": "baumgarte", "alpha": 1.0, "beta": 2.0, "segments": 3,
         "reduced": 4, "reference": "free", "curvature": "shared", "after": "hold", "assembly": "start", "max_steps": 7,
         "method_parameters": {"a": 1.0}, "rigid": True, "ked": True, "balanced": True, "stop_at": ["singular=0.1"],
-        "controllers": ["joint"], "tolerance_per": "run", "control": "forces",
+        "controllers": ["joint"], "tolerance_per": "run", "control": "forces", "allow_outside": True,
     }  # fmt: skip
     lines = " ".join(
         run_command_line(each)

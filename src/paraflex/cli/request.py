@@ -12,6 +12,7 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.control.described import NONE, ControllerDescription
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.files import Model, load, load_path
+from paraflex.files.outside import may_be_outside
 from paraflex.files.overlay import value_of
 from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, Mechanism
@@ -34,10 +35,10 @@ def asked_model(choice: ModelChoice) -> Model:
 
 def asked_of(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance of a command: a model, its file, --set and the rest of a run."""
-    return {
-        "model": dict(model.parameters),
-        "run": {"mechanism": model.source, "set": dict(model.settings)} | dict(run),
-    }
+    source = {"mechanism": model.source, "set": dict(model.settings)}
+    if may_be_outside():
+        source["allow_outside"] = True
+    return {"model": dict(model.parameters), "run": source | dict(run)}
 
 
 def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:

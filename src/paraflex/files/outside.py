@@ -22,6 +22,11 @@ def allowing_outside() -> Iterator[None]:
         _allowed.reset(before)
 
 
+def may_be_outside() -> bool:
+    """Whether models that are read now may name tables outside their folders."""
+    return _allowed.get()
+
+
 def check_outside(folder: Path, name: str, field: str) -> None:
     """Check that a file that a model names lies in the model's folder, wherever links lead, or may lie elsewhere.
 
@@ -30,7 +35,7 @@ def check_outside(folder: Path, name: str, field: str) -> None:
     InputError
         It lies elsewhere, and nobody said that it may.
     """
-    if not _allowed.get() and is_outside(folder, name):
+    if not may_be_outside() and is_outside(folder, name):
         raise InputError(
             "lies outside the folder of the model", field=field, value=name,
             remedy="copy it there, or say --allow-outside (in Python: `with pf.allowing_outside()`)",

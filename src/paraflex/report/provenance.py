@@ -128,7 +128,8 @@ def model_words(run: dict[str, Any]) -> list[str]:
     """A model as an argument, with what was set of it."""
     given = run.get("set") or {}
     texts = (f"{name}={value if isinstance(value, str) else json.dumps(value)}" for name, value in given.items())
-    return [mechanism_argument(run["mechanism"]), *repeated("--set", texts)]
+    outside = ["--allow-outside"] if run.get("allow_outside") else []
+    return [mechanism_argument(run["mechanism"]), *repeated("--set", texts), *outside]
 
 
 def repeated(flag: str, values: Iterable[str] | None) -> list[str]:
