@@ -137,6 +137,18 @@ def test_files_are_written_and_said(written):
     assert "1408 rad/s" in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("model", "figures"),
+    [("spin_up", ["mode_shapes"]), ("slider_crank", ["bode", "pole_zero_map", "singular_values"])],
+)
+def test_figures_are_those_that_there_is_anything_in(tmp_path, model, figures):
+    """Without motors, end-effector and sensors there are no outputs; rigid links do not vibrate."""
+    done = paraflex("linearise", model, "--no-report", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert sorted(file.stem for file in (tmp_path / "out" / "figures").glob("*.png")) == figures
+    assert json.loads((tmp_path / "out" / "linear.json").read_text())
+
+
 def test_what_is_written_equals_what_python_has(written):
     _, out = written
     data, numbers = pf.load_results(out), json.loads((out / "linear.json").read_text())

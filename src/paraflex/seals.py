@@ -63,6 +63,12 @@ def unreadable(error: OSError, file: Path, remedy: str = "check its permissions"
     return InputError(f"cannot be read ({error.strerror or error})", field=str(file), remedy=remedy)
 
 
+def check_regular(file: Path) -> None:
+    """Raise an OSError for what may never end, or begin, to be read, as foreign folders may hold."""
+    if file.is_fifo() or file.is_char_device():
+        raise OSError("a pipe or a device, not a file")
+
+
 def damaged(file: Path, why: str, remedy: str) -> InputError:
     """The error of a file that is not what was written."""
     return InputError(f"damaged: {why}", field=str(file), remedy=remedy)

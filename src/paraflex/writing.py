@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError, OutputError
-from paraflex.seals import damaged, seal, unreadable
+from paraflex.seals import check_regular, damaged, seal, unreadable
 
 ELSEWHERE = "choose another folder"
 # Under which key a file of JSON has the digest of the others.
@@ -155,10 +155,11 @@ def read_values(file: Path, remedy: str) -> Any:
         It is damaged, or cannot be read.
     """
     try:
+        check_regular(file)
         found = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise unreadable(error, file, remedy) from error
-    except (ValueError, RecursionError) as error:
+    except (ValueError, RecursionError, MemoryError) as error:
         raise damaged(file, "not JSON to its end", remedy) from error
     if isinstance(found, dict) and _DIGEST in found and found.pop(_DIGEST) != _digest(found):
         raise damaged(file, "not as it was written", remedy)

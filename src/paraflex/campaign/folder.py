@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from paraflex.campaign.journal import JOURNAL, Journal, Row, write_journal
 from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA_KEY, UNFINISHED, write_table
 from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, check_listed, files_of, foreign_files, hold_folder
+from paraflex.folders.changes import check_inside
 from paraflex.results.parquet import read_parquet
 from paraflex.seals import damaged
 from paraflex.writing import GO_ON, read_values, write_json
@@ -86,12 +87,13 @@ def open_campaign(
         (folder / f"{STUDY}.part").unlink(missing_ok=True)
         _check_ours(folder)
         for left in [*folder.glob("*.part"), *folder.glob(f"{TRAJECTORIES}/*.part")]:
+            check_inside(folder, left.relative_to(folder))
             left.unlink(missing_ok=True)
         said = read_study(folder / STUDY) if (folder / STUDY).exists() else study
         _check_same(folder, said, study)
         with write_journal(folder, locks=held.locks) as journal:
             noted = journal.noted("study")
-            _check_same(folder, study if noted is None else json.loads(noted), study)
+            _check_same(folder, study if noted is None else _noted(noted), study)
             if noted is None:
                 _take_over(folder, journal, schema, belongs)
                 journal.note("study", json.dumps(study, default=str).encode())
@@ -128,12 +130,19 @@ def _check_ours(folder: Path) -> None:
             raise InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
 
 
-def _check_same(folder: Path, found: Mapping[str, Any], study: Mapping[str, Any]) -> None:
-    if found.get("content") != study["content"]:
+def _noted(study: bytes) -> Any:
+    """What a journal says of its study; none where it says nothing."""
+    with suppress(ValueError, RecursionError):
+        return json.loads(study)
+
+
+def _check_same(folder: Path, found: Any, study: Mapping[str, Any]) -> None:
+    had_versions = found.get("versions", {}) if isinstance(found, Mapping) else None
+    if not isinstance(had_versions, Mapping) or found.get("content") != study["content"]:
         problem = "the folder holds results of another study, or of this one before it was changed"
         raise InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
     for name, wanted in study["versions"].items():
-        had = found.get("versions", {}).get(name)
+        had = had_versions.get(name)
         if had != wanted:
             raise InputError(
                 f"the folder's results were begun with {name} {had}, this is {wanted}: they would not be comparable",
@@ -158,6 +167,8 @@ def _take_over(folder: Path, journal: Journal, schema: pa.Schema, belongs: Calla
 def _typed(file: Path, schema: pa.Schema) -> pa.Table:
     """A table, whose columns are of the kinds that the study's are."""
     found = read_parquet(file)
+    if not {"run", "id", "status"} <= set(found.column_names):
+        raise damaged(file, "not a table of runs", "delete it and run the same command again")
     for column in found.schema:
         if column.name in schema.names and column.type != schema.field(column.name).type:
             raise damaged(file, f"{column.name} holds {column.type}", "delete it and run the same command again")

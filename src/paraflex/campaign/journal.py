@@ -118,7 +118,7 @@ class Journal:
             The file, or a row, is damaged.
         """
         self.commit()
-        return (json.loads(content) for content in self._contents())
+        return (_row(content) for content in self._contents())
 
     def check(self) -> None:
         """See that notes and rows are as they were written; see `rows` for the errors."""
@@ -139,7 +139,10 @@ class Journal:
 
     def _tally(self) -> _Tally:
         noted = self.noted(_TALLY)
-        return _Tally() if noted is None else _Tally(*map(int, noted.split()))
+        try:
+            return _Tally() if noted is None else _Tally(*map(int, noted.split()))
+        except (TypeError, ValueError) as error:
+            raise sqlite3.DatabaseError("it does not say how many rows there are") from error
 
     def add(self, rows: Sequence[Row]) -> None:
         """Keep rows, in place of those of the same runs; they are written together, within two seconds."""
@@ -180,6 +183,9 @@ def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
         Nothing in it is whole, or the disk is full or cannot be written for another reason.
     """
     file, how = folder / JOURNAL, f"mode=rwc&nolock={int(not locks)}"
+    if file.is_file() and not file.is_symlink() and file.stat().st_nlink > 1:  # a copy by hard links stays as it is
+        with whole_file(file, remedy=GO_ON) as own:
+            shutil.copyfile(file, own)
     reason = _reason_to_mend(file, how)
     if reason:
         _mend(file, how, reason)
@@ -270,7 +276,7 @@ def _keep_whole(damaged: Path, journal: Journal) -> int:
                 for run, identity, content, digest in connection.execute(f"{_ALL} NOT INDEXED ORDER BY {order}"):
                     if (run, identity) not in found and digest == _digest(run, identity, content):
                         found.add((run, identity))
-                        journal.add([json.loads(content)])
+                        journal.add([_row(content)])
                 break
     journal.commit()
     return len(found)
@@ -301,11 +307,11 @@ def _check_files(file: Path) -> None:
     It rolls back into what a link leads to, and deletes the file that a rollback journal names.
     """
     beside = [file.with_name(file.name + end) for end in ("", "-journal", "-wal", "-shm")]
-    if any(each.is_symlink() for each in beside):
-        raise sqlite3.DatabaseError("it is a link, or a file beside it is")
+    if any(each.is_symlink() or (each.exists() and not each.is_file()) for each in beside):
+        raise sqlite3.DatabaseError("it is a link or no file, or one beside it is")
     with suppress(OSError), beside[1].open("rb") as stream:
         stream.seek(-len(_NAMES_ANOTHER), 2)
-        if stream.read() == _NAMES_ANOTHER:
+        if stream.read(len(_NAMES_ANOTHER)) == _NAMES_ANOTHER:
             raise sqlite3.DatabaseError(f"{beside[1].name} names another file")
 
 
@@ -337,6 +343,15 @@ def _code(error: Exception) -> int:
 
 def _digest(*parts: object) -> str:
     return hashlib.blake2b(" ".join(map(str, parts)).encode(), digest_size=16).hexdigest()
+
+
+def _row(content: str) -> Row:
+    """What is in a row, whose digest holds whoever wrote it."""
+    with suppress(ValueError, RecursionError):
+        found = json.loads(content)
+        if isinstance(found, dict) and {"run", "id"} <= found.keys():
+            return found
+    raise sqlite3.DatabaseError("what a row holds is not of a run")
 
 
 def _plain(number: Any) -> int | float:

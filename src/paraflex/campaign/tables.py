@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -176,7 +177,10 @@ def _schema(journal: Journal) -> pa.Schema:
     import pyarrow as pa
 
     noted = journal.noted(SCHEMA_KEY)
-    return pa.schema([]) if noted is None else pa.ipc.read_schema(pa.py_buffer(noted))
+    try:
+        return pa.schema([]) if noted is None else pa.ipc.read_schema(pa.py_buffer(noted))
+    except (pa.ArrowException, OSError) as error:
+        raise sqlite3.DatabaseError("its columns are not noted") from error
 
 
 def _pieces(journal: Journal, size: int) -> Iterator[pa.Table]:
@@ -184,4 +188,7 @@ def _pieces(journal: Journal, size: int) -> Iterator[pa.Table]:
 
     schema, rows = _schema(journal), journal.rows()
     while some := list(islice(rows, size)):
-        yield pa.Table.from_pylist(some, schema)
+        try:
+            yield pa.Table.from_pylist(some, schema)
+        except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
+            raise sqlite3.DatabaseError("a row holds what its columns do not") from error

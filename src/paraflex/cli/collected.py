@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import typer
 
-from paraflex.errors import ParaflexWarning
+from paraflex.errors import ParaflexWarning, printable
 from paraflex.findings import Finding, Verdict
 
 _found: list[Finding] = []
@@ -30,7 +30,7 @@ def collecting() -> Iterator[None]:
 
         def collect(message, category, filename, lineno, file=None, line=None) -> None:
             if not isinstance(message, ParaflexWarning):
-                before(message, category, filename, lineno, file, line)
+                before(printable(str(message)), category, filename, lineno, file, line)
             elif message.finding is not None:
                 _found.append(message.finding)
             else:

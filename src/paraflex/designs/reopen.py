@@ -84,7 +84,7 @@ def open_study(folder: str | Path) -> StudyFolder:
     try:
         return StudyFolder(
             folder=folder,
-            name=account["name"],
+            name=str(account["name"]),
             runs=account.get("runs"),
             sampling=account.get("sampling", "search"),
             setting=_setting(account["study"], account.get("versions", {})),

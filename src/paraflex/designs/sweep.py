@@ -283,7 +283,8 @@ class _Session:
         self.began, self.fresh = time.perf_counter(), 0
         rows = np.zeros(study.runs // len(self.setting.modes), dtype=np.intp)
         for number in self._runs():
-            rows[number // len(self.setting.modes)] += 1
+            if 0 <= number < study.runs:  # others are of whoever sent the folder
+                rows[number // len(self.setting.modes)] += 1
         # Of a task that lacks a row all are made again.
         self.done: NDArray[np.bool_] = rows == len(self.setting.modes)
 
@@ -294,7 +295,7 @@ class _Session:
             return self.campaign.journal.runs()
         there = {each.stem for each in kept.iterdir()}
         rows = self.campaign.journal.rows()
-        return (row["run"] for row in rows if row["status"] != STATUS_COMPLETE or row["id"] in there)
+        return (row["run"] for row in rows if row.get("status") != STATUS_COMPLETE or row["id"] in there)
 
     @property
     def complete(self) -> bool:

@@ -6,6 +6,7 @@ With a manifest of all that is to be there `.new` is renamed to `.ready`: from t
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from contextlib import suppress
 from pathlib import Path, PureWindowsPath
@@ -17,6 +18,7 @@ from paraflex.writing import ELSEWHERE, read_values, unwritable
 
 MANIFEST = "manifest.json"
 NEW, READY, REMOVED = ".new", ".ready", "removed.json"
+_NO_NAME = re.compile("[\0\ud800-\udfff]")  # no file's name holds an end of text or half of a letter
 
 
 def finish_moves(folder: Path) -> None:
@@ -92,7 +94,7 @@ def _put(ready: Path, folder: Path) -> None:
 def is_inside(name: str) -> bool:
     """Whether a name in a list is of a file within the folder: others are never touched, whoever wrote the list."""
     path = PureWindowsPath(name)  # which takes both slashes for what they are
-    return not path.anchor and ".." not in path.parts
+    return not path.anchor and ".." not in path.parts and not _NO_NAME.search(name)
 
 
 def files_in(folder: Path) -> list[Path]:

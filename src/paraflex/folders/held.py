@@ -21,6 +21,7 @@ from paraflex.folders.manifest import (
     kind_of_folder,
     whole_manifest,
 )
+from paraflex.interrupts import uninterrupted
 from paraflex.writing import ELSEWHERE, unwritable, write_json
 
 
@@ -104,7 +105,8 @@ class ResultsFolder:
         except OSError as error:
             raise unwritable(error, str(self.path), self.remedy) from error
         finally:
-            shutil.rmtree(new, ignore_errors=True)
+            with uninterrupted():
+                shutil.rmtree(new, ignore_errors=True)
         finish_moves(self.path)
 
 
@@ -144,9 +146,10 @@ def hold_folder(
                     remedy=f"name another folder{'' if force is None else ', or say --force to replace them'}",
                 )  # fmt: skip
             try:
-                shutil.rmtree(path / NEW, ignore_errors=True)
-                (path / NEW).mkdir()
-                (path / NEW).rmdir()
+                with uninterrupted():  # or one is left
+                    shutil.rmtree(path / NEW, ignore_errors=True)
+                    (path / NEW).mkdir()
+                    (path / NEW).rmdir()
             except OSError as error:
                 raise unwritable(error, field, ELSEWHERE, str(path)) from error
             yield ResultsFolder(path, kind, locks=locks, remedy=remedy)

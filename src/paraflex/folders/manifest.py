@@ -99,7 +99,7 @@ def read_manifest(folder: Path) -> Manifest | None:
         whole = manifest.identity == found["identity"] and manifest.kind in KINDS
         if whole and all(map(is_inside, manifest.files)):
             return manifest
-    except (KeyError, TypeError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError):
         pass
     raise damaged(file, "not a list of the folder's files", remedy)
 

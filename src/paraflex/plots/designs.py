@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.plots.labels import display_unit, metric_name
 from paraflex.plots.selection import place_of
 from paraflex.results.metrics import JOINT, METRICS, MOTOR
+from paraflex.seals import damaged
 
 Array = NDArray[np.float64]
 
@@ -143,22 +145,29 @@ def _is_judged(column: str) -> bool:
 def read_designs(files: Sequence[Path]) -> DesignTable:
     """The table of a study in order of its runs, from the files of its folder that `tables_of` finds."""
     table = read_tables(files)
-    names = table.column_names
-    if not {*_FIRST_COLUMNS, *_LAST} <= set(names):
+    if not {*_FIRST_COLUMNS, *_LAST} <= set(table.column_names):
         raise InputError(
             "not a table of designs", field=str(files[0]), remedy="name a results.parquet that paraflex wrote"
         )
+    try:
+        return _in_order(table)
+    except (KeyError, TypeError, ValueError) as error:
+        raise damaged(files[0], "not a table of numbers", "delete it and run the same command again") from error
+
+
+def _in_order(table: Any) -> DesignTable:
+    names = table.column_names
     first, last = names.index("mode") + 1, names.index("status")
     judged = [name for name in names[last:] if name not in _LAST and not name.startswith("slope.")]
     columns = {name: table[name].to_numpy().astype(float) for name in (*names[first:last], *judged)}
     units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
-    texts = {name: np.array(table[name].to_pylist(), dtype=str) for name in ("path", "mode", "status", "reason")}
+    texts = {key: np.array([*map(str, table[key].to_pylist())], str) for key in ("path", "mode", "status", "reason")}
     designs = DesignTable(
         parameters={name: columns[name] for name in names[first:last]},
         metrics={name: columns[name] for name in judged},
         units={name: units[name] for name in judged},
-        run=table["run"].to_numpy(),
-        design=table["design"].to_numpy(),
+        run=table["run"].to_numpy().astype(int),
+        design=table["design"].to_numpy().astype(int),
         **texts,
     )
     order = np.argsort(designs.run, kind="stable")

@@ -11,6 +11,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure, homes
 from paraflex.plots.selection import default_mode, names_of, place_of, point_number, prototype_pair
 from paraflex.results.controllers import controller_names
+from paraflex.results.linear_motion import drawn_modes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,6 +52,9 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "link_deflections": lambda found: bool(found["tip_transverse"].any()),
     "controllers": lambda found: bool(controller_names(found)),
     "law_comparison": lambda found: bool((found["status"] == "complete").any()),
+    **dict.fromkeys(("singular_values", "pole_zero_map"), lambda found: found.sizes["map"] > 0),
+    "bode": lambda found: found.sizes["output"] > 0,
+    "mode_shapes": lambda found: any(True for _ in drawn_modes(found, rigid=False)),
     "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
 

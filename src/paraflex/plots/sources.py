@@ -11,7 +11,7 @@ from paraflex.campaign import tables_of
 from paraflex.errors import InputError
 from paraflex.folders import check_listed
 from paraflex.plots.designs import DesignTable, read_designs
-from paraflex.seals import NETCDF, PARQUET, unreadable
+from paraflex.seals import NETCDF, PARQUET, check_regular, unreadable
 from paraflex.writing import read_values
 
 _OURS = "name a folder or file that paraflex wrote"
@@ -80,6 +80,7 @@ def _folder(folder: Path) -> Source:
 
 def _format(file: Path) -> str:
     try:
+        check_regular(file)
         with file.open("rb") as opened:
             beginning = opened.read(4)
     except OSError as error:

@@ -30,7 +30,7 @@ def number(value: float | None, factor: float = 1.0, *, beside: float = 0.0) -> 
     beside : float
         Magnitude of what the value is a difference of, or a part; what is only the rounding of that is "0".
     """
-    if value is None or not math.isfinite(value):
+    if value is None or not math.isfinite(factor * value):
         return NO_VALUE
     if value == 0.0 or (math.isfinite(beside) and abs(value) < _ROUNDING * beside):
         return "0"

@@ -198,7 +198,10 @@ def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
     from pyarrow import csv
 
     names = [f"{name} [{units[name]}]" if units[name] else name for name in table.column_names]
-    csv.write_csv(spreadsheet_table(table.rename_columns(names)), file)
+    try:
+        csv.write_csv(spreadsheet_table(table.rename_columns(names)), file)
+    except ValueError as error:
+        raise InputError("the table holds what CSV does not", field="to", remedy='export it as "mat"') from error
 
 
 def matlab_struct(data: xr.Dataset) -> dict[str, Any]:

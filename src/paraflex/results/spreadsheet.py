@@ -24,7 +24,7 @@ def spreadsheet_table(table: pa.Table) -> pa.Table:
     import pyarrow as pa
 
     for k, field in enumerate(table.schema):
-        if not pa.types.is_string(field.type):
+        if not (pa.types.is_string(field.type) or pa.types.is_large_string(field.type)):
             continue
         texts = [text for text in table[k].unique().to_pylist() if text is not None]
         cells = {text: cell for text in texts if (cell := spreadsheet_text(text)) != text}

@@ -16,7 +16,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.folders import check_listed
 from paraflex.interrupts import uninterrupted
 from paraflex.results.following import metric_variables
-from paraflex.seals import NETCDF, PARQUET, check_seal, damaged, unreadable
+from paraflex.seals import NETCDF, PARQUET, check_regular, check_seal, damaged, unreadable
 from paraflex.writing import sealed_file
 
 # Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from. 3:
@@ -146,6 +146,7 @@ def results_file(path: str | Path) -> Path:
 
 def _read(file: Path) -> xr.Dataset:
     try:
+        check_regular(file)
         with file.open("rb") as stream:
             start = stream.read(4)
     except OSError as error:
