@@ -85,7 +85,6 @@ def figures(model):
     start = None
     if model.start is not None:
         start = start_state(build_system(model.mechanism), model.start, model.mechanism.assembly())
-    # Rounding in the law of spin_up, from rest, is followed in 1e5 steps where the run is shorter.
     return simulate_motion(model.mechanism, 0.1, samples=3, start=start).solution.q
 
 
