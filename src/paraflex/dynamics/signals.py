@@ -18,8 +18,8 @@ from paraflex.mechanism import AngleLaw, Mechanism, TabulatedLaw
 # often as it takes, within these numbers, until their middles are as near to the law, relative to its largest value.
 _LAW_PIECES, _MOST_PIECES, _HALVINGS = 2000, 500_000, 20
 _NEAR_LAW, _NEARLY_LAW, _FALLING = 1e-10, 1e-3, 0.25
-# What rounding leaves of terms of a prescribed motion that cancel [rad or m].
-LEFT = 1e-15
+# What rounding leaves of terms of a prescribed motion that cancel [rad or m], or of larger values a part of these.
+LEFT = 2e-14
 _SHORTEST_PIECE = 1e-6
 _DEGREE = 5
 
@@ -32,13 +32,16 @@ class InputSignals:
     coefficients: Array
 
 
-def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array) -> InputSignals:
+def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array, left: float = 0.0) -> InputSignals:
     """The quintic Hermite interpolant of values with two derivatives; each of them is reproduced at t.
 
     Parameters
     ----------
     t, value, rate, acceleration : (k + 1,) arrays
         Times strictly increasing [s].
+    left : float
+        What rounding leaves of values, or of those above one as a part: a change over a piece is that of the rates
+        where it differs from it by no more. Twice differentiated the rounding of values would be an acceleration.
     """
     h = np.diff(t)
     c0, c1, c2 = value[:-1], rate[:-1], 0.5 * acceleration[:-1]
@@ -46,6 +49,8 @@ def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array) 
     d0 = value[1:] - (c0 + h * (c1 + h * c2))
     d1 = (rate[1:] - (c1 + 2.0 * h * c2)) * h
     d2 = (acceleration[1:] - 2.0 * c2) * h**2
+    of_rates = 0.5 * d1 - d2 / 12.0
+    d0 = np.where(np.abs(d0 - of_rates) <= left * np.maximum(1.0, np.abs(value[1:])), of_rates, d0)
     c3 = (10.0 * d0 - 4.0 * d1 + 0.5 * d2) / h**3
     c4 = (-15.0 * d0 + 7.0 * d1 - d2) / h**4
     c5 = (6.0 * d0 - 3.0 * d1 + 0.5 * d2) / h**5
@@ -141,7 +146,7 @@ def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
     for _ in range(_HALVINGS):
         value, rate, acceleration = _evaluate(place, law, np.clip(t, low, high))
         outside = t - np.clip(t, low, high)
-        pieces = piecewise_quintic(t, value + outside * rate, rate + outside * acceleration, acceleration)
+        pieces = piecewise_quintic(t, value + outside * rate, rate + outside * acceleration, acceleration, left)
         half = 0.5 * np.diff(t)
         value = _evaluate(place, law, t[:-1] + half)[0]
         powers = half[:, None] ** np.arange(_DEGREE + 1)

@@ -15,7 +15,7 @@ from paraflex.mechanism import FlexibleBeam
 
 # Below this part of the largest value, or of its derivative by the shortest piece, changes are rounding. Of motions so
 # is what is left of terms that cancel, which derivatives of quintic pieces enlarge by such a number.
-_SMALL, _ROUNDING, _ENLARGED = 1e-6, 1e-11, 400.0
+_SMALL, _ROUNDING, _ENLARGED = 1e-6, 1e-11, 20.0
 # StepLimits are rounded down to powers of this, and one is kept where many pieces have the same.
 _GRADES = 2.0**0.5
 

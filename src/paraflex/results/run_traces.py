@@ -231,9 +231,9 @@ class StaticsTraces(SolutionTraces[Statics]):
 
     @property
     def compliance(self) -> Trace:
-        """Compliance (k, directions) [m/N, rad/(N m)]; infinite where none resists, past buckling say."""
+        """Compliance (k, directions) [m/N, rad/(N m)]; infinite where none resists: of equilibria past buckling."""
         with np.errstate(divide="ignore"):
-            return np.where(self.stiffness <= 0.0, np.inf, 1.0 / self.stiffness)
+            return np.where((self.stiffness <= 0.0) | ~self.run.stable[:, None], np.inf, 1.0 / self.stiffness)
 
     @property
     def frequency(self) -> Trace:
