@@ -254,9 +254,12 @@ def _turning(system: System) -> NDArray[np.int64]:
 def _long_from(system: System) -> float:
     """Length of steps from which on they are long beside vibrations: all are where no body is flexible.
 
-    Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them.
+    Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them. A beam in
+    several frames vibrates more slowly than one of them, by the square of their number.
     """
-    return _FOLLOWS / max(system.lowest, default=np.inf)
+    beams = [system.carrier(body.name)[0] for body in system.bodies if body.nf]
+    lowest = (omega / beams.count(beam) ** 2 for beam, omega in zip(beams, system.lowest, strict=True))
+    return _FOLLOWS / max(lowest, default=np.inf)
 
 
 def _least_step(problem: Problem) -> float:
