@@ -258,7 +258,9 @@ def test_runs_stop_and_fail_in_the_dwell_with_what_was_computed():
     bound = max(beyond, key=beyond.__getitem__)
     run = task.simulate("+-++", options=IntegrationOptions(tolerance=1e-4, events=(bound,)))
     assert run.solution.status == "stopped"
-    assert SIDE.duration < run.solution.event_time < 2.0 * SIDE.duration
+    # Which vibration goes furthest, and when, is up to rounding.
+    in_dwell = SIDE.duration < run.solution.event_time < 2.0 * SIDE.duration
+    assert in_dwell
     data = tracking_dataset([run])
     assert np.isfinite(data["tracking_rms_motion"][0])
     assert np.isnan(data["tracking_rms"][0])

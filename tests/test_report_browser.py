@@ -479,7 +479,7 @@ def test_a_page_repainted_while_its_film_is_unpacked_says_nothing(browser, repor
             return k;
         }"""
     )
-    assert repainted > 4
+    assert repainted > 2  # 8 to 18 here, by the time it takes
     assert len(set(coloured(page))) > 1
     page.close()
     assert complaints == []
