@@ -124,6 +124,8 @@ def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tupl
     if isinstance(law, TabulatedLaw) and law.linear:
         t = _grid(law, 0.0, end, end)
         return _polyline(t, _evaluate(place, law, t)[0]), [stop for stop in law.stops if 0.0 < stop < end]
+    if getattr(law, "breaks", None) is not None:
+        left = 0.0  # quintic as it is
     # The law or a derivative may jump at a knot: pieces on either side take its one-sided limits.
     parts = []
     for a, b in pairwise([0.0, *inner, end]):

@@ -11,7 +11,6 @@ from paraflex.errors import InputError, suggestion
 from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure, homes
 from paraflex.plots.selection import default_mode, names_of, place_of, point_number, prototype_pair
 from paraflex.results.controllers import controller_names
-from paraflex.results.linear_motion import drawn_modes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,9 +53,15 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "law_comparison": lambda found: bool((found["status"] == "complete").any()),
     **dict.fromkeys(("singular_values", "pole_zero_map"), lambda found: found.sizes["map"] > 0),
     "bode": lambda found: found.sizes["output"] > 0,
-    "mode_shapes": lambda found: any(True for _ in drawn_modes(found, rigid=False)),
+    "mode_shapes": lambda found: _vibrates(found),
     "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
+
+
+def _vibrates(found: Any) -> bool:
+    from paraflex.results.linear_motion import drawn_modes  # not for other results
+
+    return any(True for _ in drawn_modes(found, rigid=False))
 
 
 def figures_of(source: Source) -> list[CatalogueFigure]:
