@@ -241,7 +241,7 @@ def manifest(folder: Path, bait: Path, chance: Random) -> str:
 
             detail = found["kind"] = chance.choice([*KINDS])
         case "contents":
-            one = chance.choice(_WRONG)
+            one: Any = chance.choice(_WRONG)
             found |= vars(Manifest.of(found["kind"], found["files"], dict.fromkeys(found["files"], one)))
             detail = f"{one!r:.60}"
         case _:
@@ -347,8 +347,8 @@ Change = Callable[[xr.Dataset, Random], tuple[xr.Dataset, str]]
 
 
 def _drop(data: xr.Dataset, chance: Random) -> tuple[xr.Dataset, str]:
-    name = chance.choice(list(data.variables))
-    return data.drop_vars(name), str(name)
+    name = chance.choice([*map(str, data.variables)])
+    return data.drop_vars(name), name
 
 
 def _nothing(data: xr.Dataset, chance: Random) -> tuple[xr.Dataset, str]:
@@ -512,7 +512,11 @@ def journal(folder: Path, bait: Path, chance: Random) -> str:
 
 
 def _sql(*statements: str) -> Callable[[sqlite3.Connection, Path, Path, Random], None]:
-    return lambda connection, folder, bait, chance: [connection.execute(each) for each in statements] and None
+    def work(connection: sqlite3.Connection, folder: Path, bait: Path, chance: Random) -> None:
+        for each in statements:
+            connection.execute(each)
+
+    return work
 
 
 def _wal(connection: sqlite3.Connection, folder: Path, bait: Path, chance: Random) -> None:

@@ -352,7 +352,11 @@ def _silent(
     """Whether other numbers were read, or are there after the command that makes them anew."""
     numbers = box.notes / "numbers"
     if code == 0 and reader == "again" and kind != "sweep":
-        child = started(lambda: numbers.write_text(_numbers(box.folder, kind, "open")) and None, box.notes / "again")
+
+        def read() -> None:
+            numbers.write_text(_numbers(box.folder, kind, "open"))
+
+        child = started(read, box.notes / "again")
         if ended(child, _BOUND) != 0:
             return "the results that the command left are not read"
     elif code != 0 or reader not in ("open", "source") or not attack.told:

@@ -155,7 +155,7 @@ def test_closed_loop(run):
     assert 1.0 < undamped < 1.0009
     assert f"{undamped:.4f}" in printed
     gain, delay = every.margins
-    assert gain == pytest.approx(2.857, abs=2e-3)
+    assert gain == pytest.approx(2.857, abs=3e-3)
     assert delay == pytest.approx(2.468, abs=2e-3)
     # Steps of 1 ms are fine enough for damped links: error control agrees.
     finely = every.task.remodelled(example.manipulator(0.12)).simulate("++++", method="esdirk4")

@@ -53,7 +53,7 @@ def test_friction_whose_slope_changes_within_a_step(rubbing):
     # Of first order, as without friction: torques jump, and what vibrates then is faster than these steps.
     assert errors[0] < 4e-3
     assert errors[1] < 0.6 * errors[0]
-    assert errors[2] < 0.3 * errors[1]
+    assert errors[2] < 0.35 * errors[1]
     # Slopes are renewed in the iteration: hardly any step has to be done in parts.
     assert rejected[0] < 10
     assert rejected[1:] == [0, 0]

@@ -349,7 +349,7 @@ def test_a_swinging_soft_pendulum_keeps_its_energy():
         assert solution.strain_energy[0] > 0.05 * total
         worst.append(solution.energy_balance_max / total)
     assert worst[0] < 1e-2
-    assert worst[1] < 0.2 * worst[0]
+    assert worst[1] < 0.3 * worst[0]
 
 
 def test_geometry_is_a_choice_of_the_mechanism():
