@@ -241,8 +241,9 @@ def manifest(folder: Path, bait: Path, chance: Random) -> str:
 
             detail = found["kind"] = chance.choice([*KINDS])
         case "contents":
-            one: Any = chance.choice(_WRONG)
-            found |= vars(Manifest.of(found["kind"], found["files"], dict.fromkeys(found["files"], one)))
+            one = chance.choice(_WRONG)
+            contents: Any = dict.fromkeys(found["files"], one)
+            found |= vars(Manifest.of(found["kind"], found["files"], contents))
             detail = f"{one!r:.60}"
         case _:
             texts = {"deep": "[" * _DEEP, "huge": '{"files": {"x": ' + _HUGE * 1000 + "}}",
