@@ -131,7 +131,7 @@ def _check_ours(folder: Path) -> None:
 
 
 def _noted(study: bytes) -> Any:
-    """What a journal says of its study; none where it says nothing."""
+    """The description of a study in a journal; None if it is not JSON."""
     with suppress(ValueError, RecursionError):
         return json.loads(study)
 

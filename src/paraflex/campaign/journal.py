@@ -346,7 +346,7 @@ def _digest(*parts: object) -> str:
 
 
 def _row(content: str) -> Row:
-    """What is in a row, whose digest holds whoever wrote it."""
+    """The row of a run from its JSON; its digest alone does not show that it is one."""
     with suppress(ValueError, RecursionError):
         found = json.loads(content)
         if isinstance(found, dict) and {"run", "id"} <= found.keys():

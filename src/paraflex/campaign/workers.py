@@ -5,7 +5,6 @@ Each runs any function of a task, and what comes back does not depend on which o
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import math
 import multiprocessing
@@ -174,7 +173,7 @@ class Dask(Engine):
                 )
         try:
             if address is not None:
-                _apart(lambda: asyncio.run(_reach(address)))  # a notebook has a loop of its own
+                _apart(lambda: _reach(address))  # a notebook has a loop of its own
             self._client = distributed.Client(address or self._cluster, timeout=_REACHED_WITHIN, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             reason = str(error).partition("\n")[0] or type(error).__name__
@@ -214,13 +213,18 @@ class Dask(Engine):
             self._cluster.close(timeout=5)
 
 
-async def _reach(address: str) -> None:
+def _reach(address: str) -> None:
     """Connect to a scheduler: a client that cannot would wait long for its own end, and complain."""
+    import asyncio
+
     from distributed import Security
     from distributed.comm.core import connect
 
-    comm = await connect(address, timeout=_REACHED_WITHIN, **Security().get_connection_args("client"))
-    comm.abort()
+    async def reach() -> None:
+        comm = await connect(address, timeout=_REACHED_WITHIN, **Security().get_connection_args("client"))
+        comm.abort()
+
+    asyncio.run(reach())
 
 
 def open_engine(engine: str | Engine, workers: int | None = None, cluster: str | None = None) -> Engine:

@@ -40,8 +40,8 @@ def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array, 
     t, value, rate, acceleration : (k + 1,) arrays
         Times strictly increasing [s].
     left : float
-        What rounding leaves of values, or of those above one as a part: a change over a piece is that of the rates
-        where it differs from it by no more. Twice differentiated the rounding of values would be an acceleration.
+        Rounding error of values, relative to those above one. Where a change of value over a piece differs from that of
+        the rates by no more, the latter is taken: the second derivative of the rounding would be an acceleration.
     """
     h = np.diff(t)
     c0, c1, c2 = value[:-1], rate[:-1], 0.5 * acceleration[:-1]
@@ -113,7 +113,7 @@ def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tupl
     end : float
         [s]
     left : float
-        What rounding leaves of its values: they are not followed more closely.
+        Rounding error of its values, below which pieces are not refined.
 
     Raises
     ------

@@ -49,7 +49,7 @@ class ResultsFolder:
     def replaced(self, *, but: Sequence[str] = ()) -> Iterator[Path]:
         """A folder to write results to that take the place of all that paraflex wrote; other files stay.
 
-        Where all but wall times is as before, nothing is removed: figures that were drawn later stay too.
+        If the new results differ in wall times alone, nothing is removed: figures that were drawn later stay too.
 
         Parameters
         ----------

@@ -65,7 +65,7 @@ class Manifest:
     files : mapping of str to str
         Digests of the bytes of all files, by their names within the folder ("figures/desired_path.png").
     contents : mapping of str to str
-        Of files that may hold wall times: digests of all else in them.
+        Digests of the contents without wall times, of files that may hold them.
     """
 
     kind: str

@@ -79,9 +79,8 @@ def _limits_of(signals: Signals, k: int, order: int) -> StepLimits:
     places = lengths[:, None] * np.array([0.0, 0.5, 1.0])
     value, curvature = (_derivative(coefficients, n, places) for n in (order, order + 2))
     shortest = float(np.min(lengths))
-    rounding = _ROUNDING * float(
-        np.max(np.abs(coefficients[:, 0]), initial=_ENLARGED * LEFT / _ROUNDING if order else 0.0)
-    )
+    left = _ENLARGED * LEFT if order else 0.0
+    rounding = max(_ROUNDING * float(np.max(np.abs(coefficients[:, 0]), initial=0.0)), left)
     scale = max(0.5 * float(np.ptp(value)), _SMALL * float(np.max(np.abs(value))), rounding / shortest**order)
     noise = rounding / shortest ** (order + 2)
     bending = np.maximum(np.max(np.abs(curvature), axis=1) - noise, 0.0)

@@ -40,6 +40,12 @@ class PlannedFigure:
         return f"{self.figure.name}_{self.of}" if self.of else self.figure.name
 
 
+def _vibrates(found: Any) -> bool:
+    from paraflex.results.linear_motion import drawn_modes  # not for other results
+
+    return any(True for _ in drawn_modes(found, rigid=False))
+
+
 # Required content of results for a figure, besides its variables.
 _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "convergence": lambda found: any(value is not None for _, value, _ in found.get("history", ())),
@@ -53,15 +59,9 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "law_comparison": lambda found: bool((found["status"] == "complete").any()),
     **dict.fromkeys(("singular_values", "pole_zero_map"), lambda found: found.sizes["map"] > 0),
     "bode": lambda found: found.sizes["output"] > 0,
-    "mode_shapes": lambda found: _vibrates(found),
+    "mode_shapes": _vibrates,
     "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
-
-
-def _vibrates(found: Any) -> bool:
-    from paraflex.results.linear_motion import drawn_modes  # not for other results
-
-    return any(True for _ in drawn_modes(found, rigid=False))
 
 
 def figures_of(source: Source) -> list[CatalogueFigure]:

@@ -60,7 +60,7 @@ class ListedCommand(NamedTuple):
 
 
 def _outside(request: Any) -> AbstractContextManager[None]:
-    """What lets models name files outside their folders, where the request does."""
+    """Permission for models to name files outside their folders, if the request gives it."""
     if not any(getattr(each, "allow_outside", False) for each in (request, getattr(request, "model", None))):
         return nullcontext()
     from paraflex.files import allowing_outside
