@@ -119,6 +119,25 @@ def natural_frequencies(
     return Vibration(squares[kept], shapes[:, kept], acceleration, complete)
 
 
+def slowest_deflection(system: System, q: Array) -> float:
+    """Angular frequency of the slowest vibration of an assembled mechanism by its beams alone [rad/s].
+
+    Without springs, loads and weight. Infinite where nothing vibrates; the least of its beams alone where there are
+    more than 600 coordinates.
+    """
+    elastic = stiffness_diagonal(system)
+    if not np.any(elastic > 0.0):
+        return np.inf
+    if system.n > DENSE_COORDINATES:
+        return system.slowest
+    M, typical = sparse_mass(system, q), float(np.min(elastic[elastic > 0.0]))
+    basis = admissible(sparse_jacobian(system, q), M, elastic, typical)
+    mass = basis.T @ (M @ basis)
+    inverse = scipy.linalg.eigvalsh(mass, basis.T @ (elastic[:, None] * basis) + typical * mass) if mass.size else mass
+    squares = 1.0 / inverse - typical
+    return float(np.sqrt(np.min(squares[squares > _FREE * typical], initial=np.inf)))
+
+
 def _joint_rows(system: System, q: Array, joints: Sequence[str]) -> Sparse:
     """Derivatives (joints, n) of the joints' angles or travels, each once."""
     rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, inputs_of
+from paraflex.dynamics.linearise import slowest_deflection
 from paraflex.errors import InputError
 from paraflex.integrators.method import NativeMethod, Treatment
 from paraflex.integrators.newmark import NewmarkMethod
@@ -61,7 +62,7 @@ NEAR_ERROR = 0.01
 LEAST_NEAR_ERROR = 8e-11
 # A singular position is near that could be reached in this fraction of the time since the start.
 _NEAR_AHEAD = 0.2
-# Steps are long beside vibrations from so many radians of the slowest one of each free body on.
+# Steps are long beside vibrations from so many radians of the slowest one of the mechanism on.
 _FOLLOWS = 20.0
 # The smallest step, as a fraction of the run, and in units of the clock's last digit: by so little a step may differ
 # from what the clock moves by.
@@ -251,15 +252,13 @@ def _turning(system: System) -> NDArray[np.int64]:
     return np.array([body.angle for body, one in zip(system.bodies, matters, strict=True) if one], dtype=np.int64)
 
 
-def _long_from(system: System) -> float:
+def _long_from(system: System, q: Array) -> float:
     """Length of steps from which on they are long beside vibrations: all are where no body is flexible.
 
-    Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them. A beam in
-    several frames vibrates more slowly than one of them, by the square of their number.
+    Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them. What they
+    follow is slower the more mass a beam carries.
     """
-    beams = [system.carrier(body.name)[0] for body in system.bodies if body.nf]
-    lowest = (omega / beams.count(beam) ** 2 for beam, omega in zip(beams, system.lowest, strict=True))
-    return _FOLLOWS / max(lowest, default=np.inf)
+    return _FOLLOWS / slowest_deflection(system, q)
 
 
 def _least_step(problem: Problem) -> float:
@@ -294,7 +293,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         force_part=options.force_part(system),
         force_control=int(options.control_for(system) is Control.FORCES),
         force_cycles=_FORCE_CYCLES if system.vibrations_die_out else np.inf,
-        long_from=_long_from(system),
+        long_from=_long_from(system, initial.q),
         newton_fraction=options.newton_fraction or method.newton_fraction,
         alpha=options.alpha,
         beta=options.beta,
