@@ -36,6 +36,7 @@ print(len(before), compiled() - before)
 # Prints what a run gives; before it, loads from the cache what else is asked for.
 RUN = """
 import gc, hashlib, sys
+from pathlib import Path
 import paraflex as pf
 from paraflex.kernel.compiling import Kernel
 from paraflex.integrators import IntegrationOptions
@@ -44,8 +45,9 @@ import paraflex.kernel.ode, paraflex.dynamics.linearise
 kernels = sorted((each for each in gc.get_objects() if isinstance(each, Kernel)), key=lambda each: each.__name__)
 loaded = 0
 for each in kernels[::-1] if sys.argv[1:] else []:
-    for signature, *_ in each.from_python._cache._cache_file._load_index():
-        each.from_python.compile(signature)
+    file = each.from_python._cache._cache_file
+    for found in Path(file._index_path).parent.glob(file._index_name[:-3] + "*.nbc"):
+        each.from_python.compile(file._unsealed(found)[1][0])
         loaded += 1
 model = pf.load("raparm_i")
 task = pf.plan(model.mechanism, model.path("square"), duration=0.01, samples=5)

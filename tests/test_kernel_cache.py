@@ -91,11 +91,11 @@ def test_outdated_kernels_are_removed(tmp_path):
     others = [tmp_path / f"paraflex-kernels-{k}" for k in range(5)]
     for k, folder in enumerate(others):
         folder.mkdir()
-        (folder / "march.nbi").touch()
+        (folder / "march.nbc").touch()
         os.utime(folder, (k, k))
-    (tmp_path / "theirs.nbi").touch()
+    (tmp_path / "theirs.nbc").touch()
     folder = disk_cache.make_folder(tmp_path)
-    kept = {folder, tmp_path / "theirs.nbi", *others[6 - disk_cache.STATES_KEPT :]}
+    kept = {folder, tmp_path / "theirs.nbc", *others[6 - disk_cache.STATES_KEPT :]}
     assert set(tmp_path.iterdir()) == kept
     # Made already: nothing goes.
     others[0].mkdir()
@@ -161,16 +161,32 @@ def flipped(content):
     return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
 
 
-@pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("damage", [truncated, emptied, flipped])
-def test_a_damaged_kernel_is_compiled_anew(compiled, tmp_path, damage, ending):
+def test_a_damaged_kernel_is_compiled_anew(compiled, tmp_path, damage):
     place = shutil.copytree(compiled[0], tmp_path / "kernels")
     # The kernel that Python calls, and no other: all of its code is in one file.
-    (file,) = place.rglob(f"dense.factor_dense_from_python*.{ending}")
+    (file,) = place.rglob("dense.factor_dense_from_python*.nbc")
     file.write_bytes(damage(file.read_bytes()))
     said = f"paraflex: a compiled kernel is damaged and compiled anew ({file})\n"
     assert streams(KERNELS.format(""), place) == ("0 1\n", said)
     assert streams(KERNELS.format(""), place) == ("1 1\n", "")
+
+
+def test_two_processes_that_keep_a_kernel_at_once_do_not_mix_its_signatures(tmp_path, monkeypatch):
+    """Both gave one name to their code, and an installation could be left with code that nothing could call."""
+    file = disk_cache.KernelCache(python)._cache_file
+    monkeypatch.setattr(file, "_index_path", str(tmp_path / "kernel.nbi"))
+    monkeypatch.setattr(file, "_cache_path", str(tmp_path))
+    plain = file._seal
+
+    def late(*arguments):
+        monkeypatch.setattr(file, "_seal", plain)
+        file.save("other", 2)
+        plain(*arguments)
+
+    monkeypatch.setattr(file, "_seal", late)
+    file.save("one", 1)
+    assert [file.load(key) for key in ("one", "other", "third")] == [1, 2, None]
 
 
 def test_what_cannot_be_kept_is_compiled_all_the_same(tmp_path, monkeypatch):

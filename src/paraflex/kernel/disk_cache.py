@@ -30,21 +30,21 @@ FOLDER = _PREFIX + STATE
 
 
 class _Sealed(IndexDataCacheFile):
-    """The index of a kernel, signatures and the names of their files, and these; damaged ones are compiled anew."""
+    """One file for each signature of a kernel, without Numba's index: two processes may compile at once.
 
-    def _load_index(self) -> dict[Any, str]:
-        found = self._unsealed(self._index_path)
+    With an index both could name different code alike. Damaged files are compiled anew.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        self._seal(self._file(key), (self._source_stamp, key, data))
+
+    def load(self, key: Any) -> Any:
         # The function may have been edited: those of others have no state of their own.
-        return found[1] if found is not None and found[0] == self._source_stamp else {}
+        found = self._unsealed(self._file(key))
+        return found[2] if found is not None and found[:2] == (self._source_stamp, key) else None
 
-    def _save_index(self, overloads: dict[Any, str]) -> None:
-        self._seal(self._index_path, (self._source_stamp, overloads))
-
-    def _load_data(self, name: str) -> Any:
-        return self._unsealed(self._data_path(name))
-
-    def _save_data(self, name: str, data: Any) -> None:
-        self._seal(self._data_path(name), data)
+    def _file(self, key: Any) -> str:
+        return str(Path(self._index_path).with_suffix(f".{_digest(repr(key).encode()).hex()}.nbc"))
 
     def _seal(self, file: str, data: Any) -> None:
         content = self._dump(data)
