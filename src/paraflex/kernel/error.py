@@ -5,9 +5,9 @@ Without the filter (Hosea and Shampine 1996) an undamped axial mode would dictat
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, isinf
 
-from paraflex.kernel.arrays import fill, largest
+from paraflex.kernel.arrays import copy, fill, largest
 from paraflex.kernel.bending import subtract_geometric
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import note_friction
@@ -18,6 +18,7 @@ from paraflex.kernel.run_state import (
     CYCLE,
     LAST_STEP,
     LOCAL,
+    LOST,
     MEMORY,
     NEAR,
     PEAK,
@@ -32,6 +33,12 @@ SLOW_AGE = 25
 # A velocity error of a step that nothing turns round moves the mechanism for half of a cycle, on average: by the error
 # times this fraction of it.
 MEMORY_PART = 0.25
+# Vibrations are lost in steps so many times longer than the last one. Errors are so many times what is found lost:
+# vibrations with a period of a step are half found.
+GROWN = 1.2
+LOST_SHARE = 1.5
+# Constraints as they are: weights of velocities' errors in them.
+UNCHANGED = (1.0, 0.0, 0.0)
 # In a step forces are controlled no closer than to this part of the largest, well above rounding.
 LEAST_PART = 1e-6
 
@@ -106,6 +113,28 @@ def filtered_error(system, g, gains, march, work, slow):
 
 
 @routine
+def note_lost_vibrations(system, controls, h, g, march, work):
+    """Keep the multipliers of undamped vibrations that a step loses since it is much longer than the last one.
+
+    Of the accelerations a = A phi of a vibration (K - omega^2 M) phi + Phi_q^T nu = 0 the filter's multipliers are
+    g^2 A nu / (1 + g^2 omega^2), and those of the vibration A nu / omega^2; of motions without deflection they are
+    zero. Twice filtered, vibrations that are resolved are too. At the stages of the last step it has all phases.
+    """
+    fill(march.forces[LOST], 0.0)
+    if not isinf(controls.force_cycles) or h < GROWN * march.clock[LAST_STEP]:
+        return
+    fill(march.eq, 0.0)
+    for s in range(march.stage_a.shape[1]):
+        copy(march.stage_a[1, 0] if s == 0 else march.stage_a[0, s], march.ev)
+        filter_error(system, g, UNCHANGED, march.eq, march.ev, work)
+        for j in range(march.ev.size):
+            march.ev[j] -= work.x[j]
+        filter_error(system, g, UNCHANGED, march.eq, march.ev, work)
+        for r in range(work.mu.size):
+            march.forces[LOST, r] = max(march.forces[LOST, r], abs(work.mu[r]))
+
+
+@routine
 def force_error(controls, h, march):
     """What the step's error makes of the multipliers over what is allowed; zero where forces are not controlled."""
     if controls.force_control == 0 or march.counts[NEAR] > 0 or largest(march.forces[PEAK]) == 0.0:
@@ -127,7 +156,8 @@ def note_forces(controls, h, march):
         march.forces[PEAK, r] = max(march.forces[PEAK, r], abs(march.stage_lam[0, r]))
         if march.counts[NEAR] == 0:
             march.forces[RECENT, r] = forgotten * march.forces[RECENT, r] + march.forces[LOCAL, r]
-            march.forces[UNRESOLVED, r] = max(march.forces[UNRESOLVED, r], march.forces[RECENT, r])
+            unresolved = max(march.forces[RECENT, r], LOST_SHARE * march.forces[LOST, r])
+            march.forces[UNRESOLVED, r] = max(march.forces[UNRESOLVED, r], unresolved)
 
 
 @routine

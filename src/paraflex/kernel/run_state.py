@@ -38,8 +38,8 @@ CYCLE, FASTEST, MEMORY = 21, 22, 23
 # What the last sample solved has changed forces by, as a part of the largest.
 SAMPLE_CHANGE = 24
 # Rows of March.forces: the largest multipliers, and what local errors have changed them by: in the last step, in the
-# last cycles, and in those that had most.
-PEAK, LOCAL, RECENT, UNRESOLVED = range(4)
+# last cycles, and in those that had most; vibrations that the last step has lost.
+PEAK, LOCAL, RECENT, UNRESOLVED, LOST = range(5)
 # March.counts
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
 # and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
@@ -130,7 +130,7 @@ class March(NamedTuple):
     vs: NDArray[np.float64]
     eq: NDArray[np.float64]  # (n,) estimated errors of a step
     ev: NDArray[np.float64]
-    forces: NDArray[np.float64]  # (4, m) of multipliers: see PEAK
+    forces: NDArray[np.float64]  # (5, m) of multipliers: see PEAK
     guess_lam: NDArray[np.float64]  # (m,) multipliers of a sample before the equations of motion are solved there
     torques: NDArray[np.float64]  # (acting,) of the motors at a stage, or forces, then of loads given in time
     algorithmic: NDArray[np.float64]  # (2, n) accelerations that the Newmark family carries, of the last step and this
@@ -174,7 +174,7 @@ def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGA
         vs=apart(n),
         eq=apart(n),
         ev=apart(n),
-        forces=apart((4, m)),
+        forces=apart((5, m)),
         guess_lam=apart(m),
         torques=apart(acting),
         algorithmic=apart((2, n)),

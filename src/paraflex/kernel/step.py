@@ -14,7 +14,14 @@ from paraflex.kernel.axes import axis_power
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import dissipated_power, note_friction
-from paraflex.kernel.error import allowed_part, embedded_error, filtered_error, force_error, history_error
+from paraflex.kernel.error import (
+    allowed_part,
+    embedded_error,
+    filtered_error,
+    force_error,
+    history_error,
+    note_lost_vibrations,
+)
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
 from paraflex.kernel.linear import SINGULAR_PART, orient
@@ -296,6 +303,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         error_q, error_v = filtered_error(system, b**0.5, gains, march, work, slow)
         if march.counts[NEAR] > 0:
             allowed = max(allowed, controls.near_error * share_of_passage(h, march))
+        note_lost_vibrations(system, controls, h, b**0.5, march, work)
         error = max(max(error_q, error_v) / allowed, moved, force_error(controls, h, march))
     if not isfinite(error):
         return NOT_FINITE, 0.0
