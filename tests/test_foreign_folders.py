@@ -28,6 +28,7 @@ from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.studies import load_sweep, sweep
 from paraflex.writing import read_json, write_json
 from processes import started
+from shell import paraflex
 
 SWEEP = STUDY + '\n[sampling]\nkind = "sobol"\nnumber = 4\n'
 # Readers are forked, from a process without threads; of results there is one kind.
@@ -248,3 +249,16 @@ def test_warnings_of_others_do_not_move_the_terminal():
 
 def test_numbers_beyond_all_in_their_unit_are_none_in_reports():
     assert number(-1e308, 1e6) == number(float("inf")) == NO_VALUE
+
+
+def test_what_results_without_a_seal_lead_to_is_one_line(tmp_path):
+    """Others' programs write results anew, and anything may stand in them then."""
+    data = pf.motion_dataset(pf.simulate_motion(pf.load("pendulum"), 0.1, samples=5, warning=False))
+    pf.save_results(data, tmp_path / "whole.nc")
+    data.assign_coords(time=data.time[::-1].to_numpy()).to_netcdf(tmp_path / "turned.nc", engine="netcdf4")
+    done = paraflex("compare", str(tmp_path / "whole.nc"), str(tmp_path / "turned.nc"))
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        f"error: {tmp_path / 'turned.nc'}: holds something else than what paraflex writes (ValueError); "
+        "run again what made it"
+    ]

@@ -15,6 +15,8 @@ from typing import BinaryIO
 from paraflex.errors import InputError
 
 NETCDF, PARQUET = b"\x89HDF", b"PAR1"
+# Files without a seal that this process has read: they may hold anything.
+unsealed: list[Path] = []
 _MARK = b"paraflex"
 _DIGEST = 24
 _SEAL = len(_MARK) + _DIGEST
@@ -51,7 +53,7 @@ def check_seal(file: Path, remedy: str) -> None:
     """
     try:
         with file.open("rb") as stream:
-            whole = _is_whole(stream)
+            whole = _is_whole(stream, file)
     except OSError as error:
         raise unreadable(error, file) from error
     if not whole:
@@ -74,14 +76,13 @@ def damaged(file: Path, why: str, remedy: str) -> InputError:
     return InputError(f"damaged: {why}", field=str(file), remedy=remedy)
 
 
-def _is_whole(stream: BinaryIO) -> bool:
+def _is_whole(stream: BinaryIO, file: Path) -> bool:
     start, end = _place(stream)
-    start -= _SEAL
-    if start < 0:
-        return True
+    start = max(start - _SEAL, 0)
     stream.seek(start)
     found = stream.read(_SEAL)
     if not found.startswith(_MARK):
+        unsealed.append(file)
         return end <= _named_end(stream, end)
     return found[len(_MARK) :] == _digest(stream, start, start + _SEAL)
 

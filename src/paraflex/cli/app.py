@@ -17,6 +17,7 @@ from paraflex.cli.commands.requests import with_options
 from paraflex.cli.commands.shell import COMMANDS, GROUPS
 from paraflex.cli.signals import exit_code
 from paraflex.errors import InputError, ParaflexError
+from paraflex.seals import unsealed
 
 app: typer.Typer = typer.Typer(
     name="paraflex",
@@ -81,6 +82,13 @@ def main() -> None:
         if error.errno != errno.ENAMETOOLONG:
             raise
         _complain(InputError("too long a name", field="file", value=error.filename, remedy="choose a shorter one"))
+        sys.exit(BAD_INPUT)
+    except Exception as error:
+        # Whatever it leads to: of what paraflex wrote a traceback is wanted.
+        if not unsealed:
+            raise
+        why = f"holds something else than what paraflex writes ({type(error).__name__})"
+        _complain(InputError(why, field=str(unsealed[-1]), remedy="run again what made it"))
         sys.exit(BAD_INPUT)
     except KeyboardInterrupt as interrupt:
         typer.echo(": ".join(["interrupted", *map(str, interrupt.args)]), err=True)
