@@ -27,10 +27,23 @@ _MADE_BY = {
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """Kind: "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking"."""
+    """Kind: "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking".
+
+    Raises
+    ------
+    InputError
+        It is of none.
+    """
     if "model" in data.dims:
         return "verification"
-    return data.attrs["kind"] if data.attrs.get("kind") in _MADE_BY else "tracking"
+    kind = str(data.attrs.get("kind"))
+    if kind in _MADE_BY:
+        return kind
+    if "mode" not in data.coords:
+        raise InputError(
+            "no results of paraflex", field="data", remedy="give what open_results or tracking_dataset returns"
+        )
+    return "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:
