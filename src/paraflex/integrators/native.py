@@ -141,6 +141,8 @@ class NativeRun:
         # The last call may have ended there; until now the run had the values before the jump.
         if np.any(jumps == now):
             self.resume()
+            # Steps grow from there as from the start: the error estimate leaves out what a long one makes of a jump.
+            self.state.clock[STEP] = min(self.state.clock[STEP], FIRST_STEP * self.problem.span)
         stops = self.problem.stops
         ahead = jumps[(jumps > now) & (jumps < stops[-1])]
         if ahead.size:

@@ -156,11 +156,21 @@ def begin(system, signals, controls, march, work):
 
 @routine
 def resume(system, signals, controls, march, work, aside):
-    """First stage after a jump, its matrix in a workspace aside: the factor in use stays."""
+    """First stage after a jump, its matrix in a workspace aside: the factor in use stays.
+
+    The next step is no longer than in which the change of acceleration moves the mechanism by the tolerance: the error
+    estimate leaves out what a long one makes of a jump.
+    """
     factor = march.clock[FACTOR_B]
     copy(work.redundant, aside.redundant)
+    copy(march.stage_a[1, 0], march.eq)
     begin(system, signals, controls, march, aside)
     march.clock[FACTOR_B] = factor
+    for j in range(march.eq.size):
+        march.eq[j] -= march.stage_a[1, 0, j]
+    change = mass_norm(system, aside, march.eq)
+    if controls.fixed_step == 0.0 and change > 0.0:
+        march.clock[STEP] = min(march.clock[STEP], sqrt(2.0 * controls.tolerance / change))
 
 
 @kernel
