@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from itertools import product
 
@@ -14,6 +13,7 @@ from paraflex.dynamics.state import point_position
 from paraflex.findings import Finding
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.joints import GROUND, PointRef
+from paraflex.validity.actions import numbered_alike
 from paraflex.validity.numbers import mechanism_size
 
 # Distance of two such points over the mechanism's size: what was to be joined closes only roughly without its joint.
@@ -38,7 +38,7 @@ def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
     pairs: list[tuple[bool, float, PointRef, PointRef]] = []
     for one, other in product(unused, known):
         apart = one.body != other.body and frozenset((one.body, other.body)) not in direct
-        if apart and (one.point == other.point or (other in unused and _stem(one) == _stem(other))):
+        if apart and (one.point == other.point or (other in unused and numbered_alike(one, other))):
             gap = float(np.linalg.norm(point_position(rigid, q, one) - point_position(rigid, q, other)))
             if gap < size * (1.0 if {one.body, other.body} & sliding else NEAR_POINTS):
                 pairs.append((other not in unused, gap, one, other))
@@ -57,7 +57,3 @@ def _unused(mechanism: Mechanism) -> list[PointRef]:
     used = mechanism.points_used
     named = [PointRef(body.name, name) for body in mechanism.bodies for name in body.points]
     return [point for point in named if point not in used]
-
-
-def _stem(ref: PointRef) -> str:
-    return re.sub(r"\d+$", "", ref.point)

@@ -69,7 +69,13 @@ def reduced_body(
         own = body.shape.integrals.Mff
         nearest = ModalBasis(_frequencies(body, shapes), body.modes.vectors @ shapes).like(like, own)
         shapes = body.modes.vectors.T @ own @ nearest.vectors
-    return _in_basis(body, shapes)
+    return replace(
+        body,
+        integrals=body.integrals.in_basis(shapes),
+        modes=ModalBasis(_frequencies(body, shapes), body.modes.vectors @ shapes),
+        points=None if body.points is None or not shapes.size else body.points.in_basis(shapes),
+        damping=np.zeros((shapes.shape[1], shapes.shape[1])),
+    )
 
 
 def _given(body: BodyCoordinates, shapes: Numbers) -> Numbers:
@@ -99,14 +105,3 @@ def _vibrations(body: BodyCoordinates, shapes: Numbers) -> Numbers:
 def _frequencies(body: BodyCoordinates, shapes: Numbers) -> Numbers:
     """Of modes (nf, k) of unit mass [rad/s]."""
     return np.sqrt(np.sum((body.modes.omega[:, None] * shapes) ** 2, axis=0))
-
-
-def _in_basis(body: BodyCoordinates, shapes: Numbers) -> BodyCoordinates:
-    """The body in modes (nf, k) of unit mass."""
-    return replace(
-        body,
-        integrals=body.integrals.in_basis(shapes),
-        modes=ModalBasis(_frequencies(body, shapes), body.modes.vectors @ shapes),
-        points=None if body.points is None or not shapes.size else body.points.in_basis(shapes),
-        damping=np.zeros((shapes.shape[1], shapes.shape[1])),
-    )

@@ -86,18 +86,9 @@ class Contacts(NamedTuple):
         """
         place = np.stack([place_along_beam(system, name, q) for name in self.joints], axis=1)
         force = multipliers[:, self.rows]
-        off = (np.real(place) < 0.0) | (np.real(place) > self.length)
+        off = (np.real(place) < 0.0) | (np.real(place) > np.real(self.beam.length))
         nearest = np.where(np.real(place) < 0.0, 0.0, self.beam.length)
         return np.where(off, nearest, place), np.where(off | np.isnan(force), 0.0, force)
-
-    @property
-    def length(self) -> float:
-        """Length of the beam [m]."""
-        return float(np.real(self.beam.length))
-
-    def element(self, place: Array) -> NDArray[np.int64]:
-        """Index of the element at places of any shape."""
-        return element_at(self.beam.mesh.nodes, place)
 
     def inside(self, x: Array, element: NDArray[np.int64]) -> Array:
         """Places (s,) a little within their elements, on their side of its nodes."""
@@ -116,14 +107,15 @@ class Contacts(NamedTuple):
 
     def between(self, x: Array, place: Array) -> tuple[NDArray[np.int64], Array]:
         """Of stations (s,) the index of that before each place, in its element, and how far it is to the next one."""
-        count, element, nodes = len(x) // len(self.stiffness), self.element(place), self.beam.mesh.nodes
+        nodes = self.beam.mesh.nodes
+        count, element = len(x) // len(self.stiffness), element_at(nodes, place)
         z = (place - nodes[element]) / (nodes[element + 1] - nodes[element])
         left = element * count + np.clip((np.real(z) * (count - 1)).astype(int), 0, count - 2)
         return left, (place - x[left]) / (x[left + 1] - x[left])
 
     def moment(self, place: Array, u: Array, across: Array) -> Array:
         """Moment (k, contacts) of coordinates (k, nf) and their accelerations across the beam, at places."""
-        bending = self.stiffness[self.element(place)][..., None] * self._rows(place, 2)
+        bending = self.stiffness[element_at(self.beam.mesh.nodes, place)][..., None] * self._rows(place, 2)
         resisted = transverse_rows(self.beam.mesh.nodes, self.resisted, place, 0)
         return np.einsum("kcj,kj->kc", bending, u) + np.einsum("kcj,kj->kc", resisted, across)
 

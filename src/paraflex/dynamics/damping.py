@@ -31,7 +31,7 @@ import numpy as np
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
 from paraflex.dynamics.held import held_modes, place_rows, slope_rows
-from paraflex.mechanism import GROUND, Damping, Joint, Mechanism, PointRef, RigidBody, stiffness_proportional
+from paraflex.mechanism import GROUND, Mechanism, RigidBody, stiffness_proportional
 
 # An entry of the damping matrix below this fraction of the damping of its two modes is rounding.
 _ROUNDED_ENTRY = 1e-9
@@ -58,15 +58,12 @@ def damping_matrix(
     if beta is not None:
         return np.diag(beta * squares)
     held = np.array(list(_conditions(mechanism, bodies, index, name))).reshape(-1, 3 + body.nf)
-    return _without_rounding(_by_modes(described.damping, squares, *held_modes(body, held)))
-
-
-def _by_modes(damping: Damping, squares: Numbers, omega: Numbers, modes: Numbers) -> Numbers:
-    """D of modes (nf, k) with these frequencies, in coordinates with stiffness diag(squares)."""
-    lost = damping.coefficients(omega) / omega**2
+    omega, modes = held_modes(body, held)
+    # Of the held modes (nf, k), in coordinates with stiffness diag(squares).
+    lost = described.damping.coefficients(omega) / omega**2
     forces = squares[:, None] * modes / omega
     rest = lost[0] if lost.size else 0.0
-    return (forces * (lost - rest)) @ forces.T + np.diag(rest * squares)
+    return _without_rounding((forces * (lost - rest)) @ forces.T + np.diag(rest * squares))
 
 
 def _without_rounding(matrix: Numbers) -> Numbers:
@@ -89,7 +86,8 @@ def _conditions(
             if here.body != name or GROUND not in mechanism.reached(there.body, past=name):
                 continue
             marker = make_marker(mechanism, bodies, index, here)
-            turns_with, along_itself = "angle" in joint.holds, _along_itself(joint, here)
+            turns_with = "angle" in joint.holds
+            along_itself = joint.slides and not turns_with and here is joint.a
             if turns_with or (joint.name in driven and not joint.slides):
                 yield from slope_rows(marker)
             if "points" in joint.holds or (joint.slides and joint.name in driven and not along_itself):
@@ -107,8 +105,3 @@ def _conditions(
         line = np.array([1.0, 0.0]) if origin is None else marker.x0 - origin
         if np.any(np.real(line)):
             yield np.array([-line[1], line[0]]) @ place_rows(marker)
-
-
-def _along_itself(joint: Joint, here: PointRef) -> bool:
-    """Whether a joint slides along the body of a point."""
-    return joint.slides and "angle" not in joint.holds and here is joint.a

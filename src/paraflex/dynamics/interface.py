@@ -45,7 +45,13 @@ def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator
     """Points, and rows of what works there: forces on their places, moments on their turns."""
     for term in (term for constraint in constraints for term in constraint.terms):
         if term.carrier in ("frame", "track"):
-            _refuse_sliding(mechanism, term.a)
+            beam = None if term.a.on_ground else mechanism.body(term.a.body)
+            if isinstance(beam, FlexibleBeam) and beam.reduction is BodyReduction.CRAIG_BAMPTON:
+                raise InputError(
+                    "something slides along it, so that no static shapes are all it needs",
+                    field=f"body.{beam.name}.reduction", value=beam.reduction.value,
+                    remedy='leave it out, or say "modal"',
+                )  # fmt: skip
         if term.kind != ANGLE:
             yield from ((term.a, place_rows), (term.b, place_rows))
         # What slides along an axis pushes beside the point that carries it.
@@ -71,12 +77,3 @@ def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator
                 yield PointRef(body.name, lump.point), slope_rows
     if mechanism.end_effector is not None:
         yield mechanism.end_effector.point, place_rows
-
-
-def _refuse_sliding(mechanism: Mechanism, ref: PointRef) -> None:
-    beam = None if ref.on_ground else mechanism.body(ref.body)
-    if isinstance(beam, FlexibleBeam) and beam.reduction is BodyReduction.CRAIG_BAMPTON:
-        raise InputError(
-            "something slides along it, so that no static shapes are all it needs", field=f"body.{ref.body}.reduction",
-            value=beam.reduction.value, remedy='leave it out, or say "modal"',
-        )  # fmt: skip

@@ -110,7 +110,7 @@ def natural_frequencies(
     typical = typical_square(elastic, other, M)
     K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
     if system.n <= DENSE_COORDINATES:
-        squares, shapes = _all(K, M, C, elastic, typical)
+        squares, shapes = all_modes(K, M, C, elastic, typical)
     else:
         freedoms = system.n - dependence(system, state.q).rank
         squares, shapes, _ = slowest(K, M, C, typical, LOWEST if count is None else count, freedoms)
@@ -190,15 +190,9 @@ def typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
     return largest if largest > 0.0 else 1.0
 
 
-def _all(K: Sparse, M: Sparse, C: Sparse, elastic: Array, typical: float) -> tuple[Array, Array]:
-    """All squares, ascending, and shapes, in a basis of the admissible motions.
-
-    Stiff coordinates are scaled down, and 1 / (square + shift) is sought: low frequencies keep all their digits beside
-    high ones.
-    """
+def all_modes(K: Sparse, M: Sparse, C: Sparse, elastic: Array, typical: float) -> tuple[Array, Array]:
+    """All squares (f,), ascending, and shapes (n, f), in a basis of the `admissible` motions: see `undamped_modes`."""
     basis = admissible(C, M, elastic, typical)
-    if basis.shape[1] == 0:
-        return np.zeros(0), np.zeros((elastic.size, 0))
     squares, shapes = undamped_modes(basis.T @ (M @ basis), basis.T @ (K @ basis), typical)
     return squares, basis @ shapes
 

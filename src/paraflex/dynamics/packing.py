@@ -54,6 +54,8 @@ def pack_system(
     loads = _load_records(mechanism, packer)
     markers, columns = packer.markers, _columns(bodies, packer.markers)
     tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
+    bent = [marker.bending for marker in markers if marker.bending is not None]
+    points = [body.points for body in bodies if body.points is not None]
 
     packed = PackedSystem(
         bodies=_body_records(bodies, packer.ports, packer.motor_sides, columns),
@@ -68,16 +70,19 @@ def pack_system(
         track_coefficients=coefficients,
         rows=records(ROW, _with_envelope(packer.rows, packer.ports)),
         modal=np.concatenate([_modal_rows(body) for body in bodies], axis=1),
-        damping=np.concatenate([_coupled_damping(body).ravel() for body in bodies]),
-        I2=np.concatenate([body.integrals.I2.ravel() for body in bodies]),
-        G2=np.concatenate([body.integrals.G2.ravel() for body in bodies]),
+        damping=_flat([_coupled_damping(body) for body in bodies]),
+        I2=_flat([body.integrals.I2 for body in bodies]),
+        G2=_flat([body.integrals.G2 for body in bodies]),
         shape=np.concatenate([np.zeros((3, 0)), *(np.vstack([m.N, m.slope]) for m in markers)], axis=1),
-        columns=np.concatenate([matrix.ravel() for matrix in columns]),
-        products=np.concatenate([_products(body).ravel() for body in bodies]),
-        bending=_bending(bodies, markers),
-        places=np.concatenate([_places(body).ravel() for body in bodies]),
-        spans=np.concatenate([_spans(body).ravel() for body in bodies]),
-        inertias=np.concatenate([_inertias(body).ravel() for body in bodies]),
+        columns=_flat(columns),
+        # Of each body columns of G2 and I2, one after the other (nf, 2 stride).
+        products=_flat([np.hstack([_padded(b.integrals.G2.T), _padded(b.integrals.I2.T)]) for b in bodies]),
+        bending=_flat([_padded(each) for each in bent]) if any(_is_full(body) for body in bodies) else None,
+        # Of all mass points of a body Nx, Ny and N2' by coordinate (nf, 3 pitch), weights by Gauss point (slopes,
+        # pitch), place along the beam, mass and moment of inertia (3, pitch).
+        places=_flat([np.hstack([_padded(rows.T) for rows in (p.N[:, 0], p.N[:, 1], p.slope)]) for p in points]),
+        spans=_flat([_padded(p.weights.T) for p in points]),
+        inertias=_flat([_padded(np.stack([p.x, p.mass, p.inertia])) for p in points]),
         total_mass=np.sum([body.integrals.m for body in bodies]).item(),
         size=size,
         gravity=np.array(mechanism.gravity) * 1.0,
@@ -213,6 +218,11 @@ def _coupled_damping(body: BodyCoordinates) -> Array:
     return _padded(rest) if np.any(rest) else np.zeros((0, padded(body.nf)))
 
 
+def _flat(matrices: list[Array]) -> Array:
+    """All entries, row by row, of one matrix after the other."""
+    return np.concatenate([np.zeros(0), *(matrix.ravel() for matrix in matrices)])
+
+
 def _padded(matrix: Array) -> Array:
     """The matrix with columns of zeros up to whole vectors."""
     rows, columns = matrix.shape
@@ -229,39 +239,9 @@ def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list
     return [_padded(np.vstack(parts).T) for parts in rows]
 
 
-def _products(body: BodyCoordinates) -> Array:
-    """Columns of G2 and I2 of a body, one after the other, padded: (nf, 2 stride)."""
-    return np.hstack([_padded(body.integrals.G2.T), _padded(body.integrals.I2.T)])
-
-
-def _bending(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> Array | None:
-    if not any(_is_full(body) for body in bodies):
-        return None
-    return np.concatenate([np.zeros(0), *(_padded(m.bending).ravel() for m in markers if m.bending is not None)])
-
-
 def _mass_points(body: BodyCoordinates) -> tuple[int, int]:
     """Number of mass points, and of the Gauss points that lead them."""
     return (0, 0) if body.points is None else body.points.weights.shape
-
-
-def _places(body: BodyCoordinates) -> Array:
-    """Nx, Ny and N2' of all mass points by coordinate, (nf, 3 pitch)."""
-    if body.points is None:
-        return np.zeros((body.nf, 0))
-    N = body.points.N
-    return np.hstack([_padded(rows.T) for rows in (N[:, 0], N[:, 1], body.points.slope)])
-
-
-def _spans(body: BodyCoordinates) -> Array:
-    """Weights of all mass points by Gauss point, (slopes, pitch)."""
-    return np.zeros((0, 0)) if body.points is None else _padded(body.points.weights.T)
-
-
-def _inertias(body: BodyCoordinates) -> Array:
-    """Place along the beam, mass and moment of inertia of all mass points, (3, pitch)."""
-    points = body.points
-    return np.zeros((3, 0)) if points is None else _padded(np.stack([points.x, points.mass, points.inertia]))
 
 
 def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:

@@ -65,7 +65,11 @@ def body_shape(body: Body) -> BodyShape:
     if isinstance(body, AssumedModesBeam):
         return _assumed(body)
     if isinstance(body, ModalBody):
-        return _modal(body)
+        points = {name: PointShape(*body.point(name)) for name in body.points}
+        listed = tuple(points.values())
+        slopes = np.array([point.slope for point in listed]).reshape(-1, body.n_flexible)
+        ends = (listed[0], listed[-1]) if listed and np.any(listed[0].x0 != listed[-1].x0) else ()
+        return BodyShape(body.integrals, points=points, ends=ends, slopes=slopes)
     mesh = body.mesh
     slopes = np.eye(mesh.n_nodal)[[mesh.slope_column(node) for node in range(mesh.nodes.size)]]
     return BodyShape(beam_integrals(mesh, body.spans, beam_lumps(body), body.reference), mesh, slopes=slopes)
@@ -89,11 +93,3 @@ def _assumed(bar: AssumedModesBeam) -> BodyShape:
     line = (ends[0], *inner, ends[1])
     slopes = np.array([point.slope for point in line])
     return BodyShape(bar.integrals, points=points, ends=ends, slopes=slopes, line=line)
-
-
-def _modal(body: ModalBody) -> BodyShape:
-    points = {name: PointShape(*body.point(name)) for name in body.points}
-    listed = tuple(points.values())
-    slopes = np.array([point.slope for point in listed]).reshape(-1, body.n_flexible)
-    ends = (listed[0], listed[-1]) if listed and np.any(listed[0].x0 != listed[-1].x0) else ()
-    return BodyShape(body.integrals, points=points, ends=ends, slopes=slopes)

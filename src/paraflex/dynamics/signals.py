@@ -123,14 +123,17 @@ def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tupl
     inner = sorted(knot for knot in law.knots if 0.0 < knot < end)
     if isinstance(law, TabulatedLaw) and law.linear:
         t = _grid(law, 0.0, end, end)
-        return _polyline(t, _evaluate(place, law, t)[0]), [stop for stop in law.stops if 0.0 < stop < end]
+        value, lines = _evaluate(place, law, t)[0], np.zeros((t.size - 1, _DEGREE + 1))
+        lines[:, 0], lines[:, 1] = value[:-1], np.diff(value) / np.diff(t)
+        return InputSignals(t, lines), [stop for stop in law.stops if 0.0 < stop < end]
     if getattr(law, "breaks", None) is not None:
         left = 0.0  # quintic as it is
     # The law or a derivative may jump at a knot: pieces on either side take its one-sided limits.
     parts = []
     for a, b in pairwise([0.0, *inner, end]):
         parts.append(_refined(place, law, _grid(law, a, b, end), left))
-    return _join(parts), inner
+    breaks = np.concatenate([part.breaks[:-1] for part in parts] + [parts[-1].breaks[-1:]])
+    return InputSignals(breaks, np.vstack([part.coefficients for part in parts])), inner
 
 
 def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
@@ -167,13 +170,6 @@ def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
         f"it changes too fast between t = {a:g} and {b:g} s to be followed", field=place,
         remedy="give a shorter duration, or smoother laws; where it jumps or has a kink, pieces that end there",
     )  # fmt: skip
-
-
-def _polyline(t: Array, value: Array) -> InputSignals:
-    """Straight lines between values at times t."""
-    coefficients = np.zeros((t.size - 1, _DEGREE + 1))
-    coefficients[:, 0], coefficients[:, 1] = value[:-1], np.diff(value) / np.diff(t)
-    return InputSignals(t, coefficients)
 
 
 def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float]]:
@@ -235,11 +231,6 @@ def _evaluate(place: str, law: AngleLaw, t: Array) -> tuple[Array, Array, Array]
         return law.evaluate(t)
     except InputError as error:
         raise error.within(place) from None
-
-
-def _join(parts: Sequence[InputSignals]) -> InputSignals:
-    breaks = np.concatenate([part.breaks[:-1] for part in parts] + [parts[-1].breaks[-1:]])
-    return InputSignals(breaks, np.vstack([part.coefficients for part in parts]))
 
 
 def _pack(signals: Sequence[InputSignals]) -> Signals:

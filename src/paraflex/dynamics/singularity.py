@@ -76,7 +76,7 @@ class SingularityMeasure:
         jacobian = self.system.jacobian(q)[self._constraints]
         if not self.motors:
             return jacobian
-        axes = [joint_coordinate(self.system, joint, q[None]).rows for joint in self._sliding]
+        axes = [joint_coordinate(self.system, joint, q[None]).rows for joint in self._joints(slides=True)]
         return np.vstack([jacobian, self._turning, *axes])
 
     @cached_property
@@ -88,10 +88,6 @@ class SingularityMeasure:
         """Rows of revolute joints, which do not depend on the pose."""
         rows = [joint_coordinate(self.system, joint, self.start[None]).rows for joint in self._joints(slides=False)]
         return np.vstack(rows) if rows else np.zeros((0, self.system.n))
-
-    @cached_property
-    def _sliding(self) -> list[str]:
-        return self._joints(slides=True)
 
     def _joints(self, *, slides: bool) -> list[str]:
         mechanism = self.system.mechanism

@@ -10,7 +10,7 @@ import scipy
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
-from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, slowest, typical_square, undamped_modes
+from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, all_modes, slowest, typical_square
 from paraflex.dynamics.sparse import Saddle, solved
 from paraflex.equilibria.branch import Point
 from paraflex.equilibria.equations import Equations, Matrices, Unknowns
@@ -83,11 +83,7 @@ def vibrations(equations: Equations, found: Matrices) -> Vibrations:
         freedoms = equations.system.n - equations.independent(C)[0].size
         low = slowest(symmetric, M, C, typical, min(LOWEST, freedoms), freedoms)
         return Vibrations(low.squares, low.shapes, False)
-    basis = admissible(C, M, elastic, typical)
-    if not basis.shape[1]:
-        return Vibrations(np.zeros(0), np.zeros((elastic.size, 0)), True)
-    squares, shapes = undamped_modes(basis.T @ (M @ basis), basis.T @ (symmetric @ basis), typical)
-    return Vibrations(squares, basis @ shapes, True)
+    return Vibrations(*all_modes(symmetric, M, C, elastic, typical), True)
 
 
 def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vibrations, count: int) -> Buckling:

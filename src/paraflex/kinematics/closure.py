@@ -28,8 +28,9 @@ from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.kinematics.paths import Path, PathMotion, turning_of
 from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.limits import INSTANTS, solvable
-from paraflex.mechanism import Assembly, Body, Mechanism, PointRef, with_actuators
+from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
 from paraflex.mechanism.members import TASK_COORDINATES
+from paraflex.mechanism.poses import local_points
 
 # Closure walks along the path in steps no longer than this [s], whatever times are asked for.
 _LONGEST_STEP = 1e-3
@@ -411,7 +412,9 @@ class PathClosure:
             place = f"({place}) m" if place else f"at t = {found.t[k]:.6g} s"
             furthest = f"its furthest point, {place}, lies {found.beyond(k)} beyond reach"
             detail = f"{detail}; {furthest}" if detail else furthest
-        size = sum(np.hypot.reduce(np.max(np.abs(_places(body)), axis=0)) for body in self.mechanism.bodies)
+        size = sum(
+            np.hypot.reduce(np.max(np.abs([*local_points(body).values()]), axis=0)) for body in self.mechanism.bodies
+        )
         if np.max(found.distance) > _OTHER_UNIT * size:
             detail += f"; that is {np.max(found.distance) / size:.0f} times the mechanism's size: is the path in mm?"
         place = tuple(found.desired[0, lengths].tolist()) or None
@@ -419,12 +422,6 @@ class PathClosure:
             cause, Moment(at, step, place), partial, _MOVE_PATH, detail=detail,
             shortfall=float(np.max(found.distance)), shortfall_angle=float(np.max(found.turn)),
         )  # fmt: skip
-
-
-def _places(body: Body) -> Array:
-    """Named points of a body in its frame (points, 2) [m]."""
-    places = [(place, 0.0) if isinstance(place, float) else place for place in body.points.values()]
-    return np.array(places, dtype=float).reshape(-1, 2)
 
 
 def with_marker(system: System, ref: PointRef) -> tuple[PackedSystem, int]:

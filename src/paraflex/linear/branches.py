@@ -9,7 +9,6 @@ import scipy
 from numpy.typing import NDArray
 
 from paraflex.linear.model import LinearModel
-from paraflex.linear.motions import Motions
 
 Complex = NDArray[np.complex128]
 # Poles that a branch may go on with, as a multiple of the branches: others come between them on the way.
@@ -33,9 +32,17 @@ def pole_branches(models: Sequence[LinearModel], held: Sequence[str] = (), count
     count : int
         Most branches.
     """
-    found = [_upper(model.motions(held), _CANDIDATES * count) for model in models]
+    found: list[tuple[Complex, Complex]] = []
+    for model in models:
+        moving = model.motions(held)
+        # The lowest poles that are not below the real axis.
+        kept = np.flatnonzero(moving.poles.imag >= 0.0)[: _CANDIDATES * count]
+        found.append((moving.poles[kept], moving.pole_shapes[:, kept]))
     poles, shapes = found[0]
-    chosen = _different(models[0], poles, shapes)[:count]
+    # Without the second of those that coincide in one motion: free ones are double.
+    same = _alike(models[0], shapes, shapes) > _SAME
+    same &= np.abs(poles[:, None] - poles) <= _NEAR * np.abs(poles).max()
+    chosen = np.flatnonzero(~np.any(np.tril(same, -1), axis=1))[:count]
     out = np.full((len(models), chosen.size), np.nan + 0j)
     out[0] = poles[chosen]
     for k in range(1, len(models)):
@@ -46,18 +53,6 @@ def pole_branches(models: Sequence[LinearModel], held: Sequence[str] = (), count
         chosen, shapes = columns, shapes_now
         out[k] = poles[chosen]
     return out
-
-
-def _upper(motions: Motions, count: int) -> tuple[Complex, Complex]:
-    """The lowest poles that are not below the real axis, and their shapes."""
-    kept = np.flatnonzero(motions.poles.imag >= 0.0)[:count]
-    return motions.poles[kept], motions.pole_shapes[:, kept]
-
-
-def _different(model: LinearModel, poles: Complex, shapes: Complex) -> NDArray[np.intp]:
-    """Numbers of poles without the second of those that coincide in one motion: free ones are double."""
-    same = (_alike(model, shapes, shapes) > _SAME) & (np.abs(poles[:, None] - poles) <= _NEAR * np.abs(poles).max())
-    return np.flatnonzero(~np.any(np.tril(same, -1), axis=1))
 
 
 def _alike(model: LinearModel, first: Complex, second: Complex) -> NDArray[np.float64]:

@@ -203,15 +203,6 @@ class Coordinates:
         own = {name: k for k, name in enumerate(self.system.rows)}
         return rows, np.array([own.get(name, -1) for name in extended.rows], dtype=int)
 
-    @property
-    def _task_rows(self) -> NDArray[np.int64]:
-        """Rows of the system with more rows that are coordinates of the end-effector."""
-        names = self.tangency.system.rows
-        return np.array(
-            [self._rows[0][_TASK] if axis == "angle" else names.index(f"{_TASK} {axis}") for axis in self.task],
-            dtype=int,
-        )
-
     def _rows_of(self, joints: Sequence[str]) -> NDArray[np.int64]:
         return np.array([self._rows[0][joint] for joint in joints], dtype=int)
 
@@ -225,8 +216,9 @@ class Coordinates:
 
     def at(self, point: MotionPoint) -> PointTangents:
         """The tangent matrices at a point of a motion."""
-        number = self._rows[1]
-        coordinates = np.concatenate([self._task_rows, self._rows_of(self._candidates)])
+        (rows_at, number), names = self._rows, self.tangency.system.rows
+        task = [rows_at[_TASK] if axis == "angle" else names.index(f"{_TASK} {axis}") for axis in self.task]
+        coordinates = np.concatenate([np.array(task, dtype=int), self._rows_of(self._candidates)])
         lam = np.zeros(number.size)
         lam[number >= 0] = point.multipliers[number[number >= 0]]
         whole = self.tangency.at(point._replace(multipliers=lam))
@@ -237,7 +229,7 @@ class Coordinates:
             return RowTangents(*rows_of(at, *parts), number=number[wanted])
 
         # Of the end-effector's pin no row holds, whether it is a coordinate or not.
-        pin = [k for k, name in enumerate(self.tangency.system.rows) if name.startswith(_TASK)]
+        pin = [k for k, name in enumerate(names) if name.startswith(_TASK)]
         holding = whole.rows[~np.isin(whole.rows, [*self._rows_of(self.joints), *coordinates, *pin])]
         motors = self._rows_of([motor.joint for motor in self.system.mechanism.motors])
         acting = rows_of(np.searchsorted(whole.rows, motors), whole.jacobian)[0]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
-from paraflex.linear.motions import SecondOrder, motions
+from paraflex.linear.motions import motions
 from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, by_size, zeros
 
@@ -115,10 +114,6 @@ class ReducedModel(NamedModel):
             )  # fmt: skip
         return self.basis
 
-    @cached_property
-    def _second_order(self) -> SecondOrder:
-        return self.full.frozen.within(self.shapes)
-
     @property
     def frequencies(self) -> Array:
         """Undamped natural frequencies, inputs zero [rad/s].
@@ -142,7 +137,7 @@ class ReducedModel(NamedModel):
         return self._frequencies(self.full.motor_joints(motors))
 
     def _frequencies(self, joints: Sequence[str]) -> Array:
-        equations = self._second_order
+        equations = self.full.frozen.within(self.shapes)
         rows = self.full.joint_rows(joints) @ self.shapes
         free = kernel(rows, 1.0 / np.sqrt(np.diag(equations.mass)))
         return motions(equations.within(free), free).frequencies

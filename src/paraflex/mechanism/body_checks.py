@@ -32,7 +32,11 @@ def check_body(body: Body) -> None:
             finite(position, f"{field}.points.{name}")
         return
     if isinstance(body, ModalBody):
-        _check_modal(body, field)
+        check_numbers(body, field)
+        with _within(field):
+            _ = body.integrals
+            for name in body.points:
+                body.point(name)
         n = body.n_flexible
     elif isinstance(body, AssumedModesBeam):
         _check_bar(body, field)
@@ -42,7 +46,6 @@ def check_body(body: Body) -> None:
         _check_bar(body, field)
         with _within(field):
             n = body.mesh.n_flexible
-    if isinstance(body, FlexibleBeam):
         _check_frames(body, field)
     check_damping(body.damping, f"{field}.damping")
     static = isinstance(body, FlexibleBeam) and body.reduction is BodyReduction.CRAIG_BAMPTON
@@ -122,14 +125,6 @@ def _check_shapes(body: AssumedModesBeam, field: str) -> None:
                 finite(function.coefficients, f"{field}.{kind}")
     with _within(field):
         _ = body.integrals
-
-
-def _check_modal(body: ModalBody, field: str) -> None:
-    check_numbers(body, field)
-    with _within(field):
-        _ = body.integrals
-        for name in body.points:
-            body.point(name)
 
 
 @contextmanager

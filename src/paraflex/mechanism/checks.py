@@ -29,7 +29,8 @@ def check_mechanism(mechanism: Members) -> None:
     check_names(mechanism)
     for body in mechanism.bodies:
         check_body(body)
-    check_ground(mechanism)
+    for name, position in mechanism.ground.items():
+        finite(position, f"ground.{name}")
     check_joints(mechanism)
     check_members_at_joints(mechanism)
     check_relations(mechanism)
@@ -37,7 +38,8 @@ def check_mechanism(mechanism: Members) -> None:
     check_connected(mechanism)
     check_task(mechanism)
     check_loads(mechanism)
-    check_sensors(mechanism)
+    for sensor in mechanism.sensors:
+        _check_measured(mechanism, sensor)
     check_actuators(mechanism)
 
 
@@ -54,12 +56,6 @@ def check_names(mechanism: Members) -> None:
                 )
     if not mechanism.bodies:
         raise InputError("a mechanism needs at least one body", field="body", remedy="add a beam or a rigid body")
-
-
-def check_ground(mechanism: Members) -> None:
-    """Check that ground points are finite."""
-    for name, position in mechanism.ground.items():
-        finite(position, f"ground.{name}")
 
 
 def check_joints(mechanism: Members) -> None:
@@ -192,13 +188,8 @@ def check_sensor(mechanism: Members, sensor: Sensor) -> None:
     _check_measured(mechanism, sensor)
 
 
-def check_sensors(mechanism: Members) -> None:
-    """Check that sensors measure what there is: bodies, axes of joints, strain on beams."""
-    for sensor in mechanism.sensors:
-        _check_measured(mechanism, sensor)
-
-
 def _check_measured(mechanism: Members, sensor: Sensor) -> None:
+    """Check that a sensor measures what there is: a body, an axis of a joint, strain on a beam."""
     field = f"sensor.{sensor.name}"
     if isinstance(sensor, PointSensor):
         known(sensor.body, mechanism.points, f"{field}.body", "body")

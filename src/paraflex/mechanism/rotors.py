@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from paraflex.arguments import with_fields
@@ -107,7 +106,8 @@ def with_actuators(mechanism: Any) -> Any:
             lump = (one.reflected_inertia, 0.0) if joint.slides else (0.0, one.reflected_inertia)
             bodies[point.body] = with_lump(bodies[point.body], point.point, *lump)
             if joint.slides and any(mechanism.gravity):
-                forces.append(_weightless(motor.name, point, lump[0], mechanism.gravity))
+                balance = PointForce(f"rotor of {motor.name}", point, (0.0, 0.0))
+                forces.append(with_fields(balance, force=tuple(-lump[0] * g for g in mechanism.gravity)))
     return with_fields(
         mechanism, bodies=tuple(bodies.values()), dampers=(*mechanism.dampers, *dampers),
         loads=(*mechanism.loads, *forces), actuators=(), cut=mechanism.cut or Cut(mechanism, {}, {}),
@@ -119,8 +119,3 @@ def rotor_mass(mechanism: Members) -> float:
     found = actuators_by_motor(mechanism)
     sliding = (found[motor.name] for motor in mechanism.motors if motor.name in found and mechanism.slides(motor.joint))
     return sum(one.reflected_inertia for one in sliding)
-
-
-def _weightless(motor: str, point: PointRef, mass: Any, gravity: Sequence[float]) -> PointForce:
-    balance = PointForce(f"rotor of {motor}", point, (0.0, 0.0))
-    return with_fields(balance, force=(-mass * gravity[0], -mass * gravity[1]))

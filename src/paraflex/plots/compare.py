@@ -51,7 +51,9 @@ def overlaid_motion(comparison: RunComparison, name: str, mode: str = "") -> Fig
     runs = [one_run(data, mode or None) for data in comparison.data]
     # What stands still or idles in both runs has no panel, unless all do.
     pairs = [pair for pair in pairs if peak([pair.first, pair.second]) > ROUNDING] or pairs
-    curves = [each for pair in _most_different(pairs) for each in _curves(pair, runs)][:_MOST]
+    # So many that there is a panel for each, in the order of the mechanism.
+    chosen = sorted(pairs, key=lambda pair: -np.nan_to_num(pair.difference))[:_MOST]
+    curves = [each for pair in pairs if pair in chosen for each in _curves(pair, runs)][:_MOST]
     unit = display_unit(pairs[0].unit, np.concatenate([values for _, each in curves for values in each]))
     with journal_style():
         figure, axes = panels(len(curves), 1)
@@ -74,12 +76,6 @@ def save_overlays(comparison: RunComparison, folder: Path) -> list[Path]:
         listed = CatalogueFigure(f"overlaid_{name}", "compare", "curves of two runs")
         drawn.append(PlannedFigure(listed, mode, partial(overlaid_motion, comparison, name, mode)))
     return write_figures(drawn, folder, ("png",), dpi=200.0, force=True)
-
-
-def _most_different(pairs: list[MotionPair]) -> list[MotionPair]:
-    """So many that there is a panel for each, in the order of the mechanism."""
-    chosen = sorted(pairs, key=lambda pair: -np.nan_to_num(pair.difference))[:_MOST]
-    return [pair for pair in pairs if pair in chosen]
 
 
 def _curves(pair: MotionPair, runs: list[xr.Dataset]) -> list[tuple[str, list[NDArray[np.float64]]]]:

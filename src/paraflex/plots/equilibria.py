@@ -141,18 +141,14 @@ def _pictures(runs: list[tuple[xr.Dataset, str]], look: Theme) -> tuple[Figure, 
     for k, (shown, (_, title)) in enumerate(zip(scenes, runs, strict=True)):
         left, bottom = (k % columns) / columns, 1.0 - (k // columns + 1) / rows
         panel = bare(figure.add_axes((left, bottom, 1.0 / columns, wide * aspect / high / rows)), limits)
-        _pale(panel, [places[:-1] for places in shown.bodies.values()], look)
+        # Links at steps before the last.
+        for places in shown.bodies.values():
+            for step in places[:-1]:
+                panel.plot(*step.T, color=look.faint, linewidth=0.7, zorder=1.0, clip_on=False)
         plain = replace(shown, trail=None, followed=None, loads=(), load_keys={})
         Sketch(panel, plain, limits, look, width=0.7).show(shown.time.size - 1)
         panel.set_title(title, fontsize=8.0, color=look.ink, pad=1.0)
     return figure, limits
-
-
-def _pale(panel: Axes, bodies: list[Array], look: Theme) -> None:
-    """Links at steps before the last."""
-    for places in bodies:
-        for step in places:
-            panel.plot(*step.T, color=look.faint, linewidth=0.7, zorder=1.0, clip_on=False)
 
 
 def _given(data: xr.Dataset) -> list[int]:

@@ -60,9 +60,11 @@ def coordinates(data: xr.Dataset) -> Figure:
         quantity, factor = _KINDS[kind]
         most = sorted(members, key=lambda k: -travel[k])[:MOST_LINES]
         for place, k in enumerate(sorted(most)):
-            body = names[k].rpartition(".")[0]
+            body, _, mode = names[k].rpartition(".")
             # A body has one look in all panels of its frame's coordinates.
-            label, look = (_mode_name(names[k]), place) if kind == "eta" else (symbol(body), bodies.index(body))
+            label, look = symbol(body), bodies.index(body)
+            if kind == "eta":
+                label, look = rf"{label}: $\eta_{{{mode.removeprefix('eta')}}}$", place
             draw_curves(panel, data, {label: factor * values[:, k]}, first=look)
         keep_flat(panel, peak(factor * values[:, members]) or 1.0)
         panel.set_ylabel(axis_label(quantity, direction=kind, short=kind == "eta"))
@@ -137,8 +139,3 @@ def moving_points(run: xr.Dataset) -> list[int]:
 
 def _kind(name: str) -> str:
     return name.rpartition(".")[2].rstrip("0123456789")
-
-
-def _mode_name(name: str) -> str:
-    body, _, mode = name.rpartition(".")
-    return rf"{symbol(body)}: $\eta_{{{mode.removeprefix('eta')}}}$"

@@ -45,7 +45,8 @@ def law_comparison(data: xr.Dataset) -> Figure:
         named = number == 0 or is_narrow()
         list_lines(panel, laws if named else [""] * len(laws))
         for k, mode in enumerate(modes):
-            places = np.arange(len(laws)) + _offset(k, len(modes))
+            # Modes stand beside one another within the line of a law.
+            places = np.arange(len(laws)) + (0.0 if len(modes) == 1 else _BAND * (k / (len(modes) - 1) - 0.5))
             _draw_mode(panel, unit.factor * values[k], places, _beyond(data, mode), k, f"mode {plain(mode)}")
         _scale(panel, unit.factor * values)
         panel.set_title(metric_name(name))
@@ -64,11 +65,6 @@ def _metrics(data: xr.Dataset) -> list[str]:
     if not found:
         raise InputError("no law ran in any mode", field="results", remedy="see the reasons in laws.json")
     return found
-
-
-def _offset(mode: int, modes: int) -> float:
-    """Where a mode stands within the line of a law."""
-    return 0.0 if modes == 1 else _BAND * (mode / (modes - 1) - 0.5)
 
 
 def _beyond(data: xr.Dataset, mode: str) -> NDArray[np.bool_]:

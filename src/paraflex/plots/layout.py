@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -150,8 +150,10 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
             panel.set_ylim(-1.04, 1.04)
     width = figure.get_figwidth() / MM
     shared, own = _entries(figure)
-    lines = _shared_legend(figure, shared)
-    panel_lines = _panel_legends(own, _columns(axes, width)[2])
+    # One legend above all panels, and one above each panel.
+    lines = _fitted_legend(figure, shared, 0.98 * figure.bbox.width, loc="upper center")
+    room = (_columns(axes, width)[2] + _OVERHANG) * MM * figure.dpi
+    panel_lines = {panel: _fitted_legend(panel, entries, room, loc="lower center") for panel, entries in own.items()}
     own_lines = [max((panel_lines.get(panel, 0) for panel in row), default=0) for row in axes]
     _, height = _rows(axes, panel_height, lines, own_lines)
     if height > _PAGE:
@@ -165,7 +167,11 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
         for panel, left, room in zip(row, lefts, numbers, strict=True):
             bottom = height - top - panel_height
             panel.set_position((left / width, bottom / height, panel_width / width, panel_height / height))
-            _place_labels(panel, room / panel_width, _TIME_NUMBERS / panel_height)
+            panel.yaxis.set_label_coords(-room / panel_width, 0.5)
+            panel.xaxis.set_label_coords(0.5, -_TIME_NUMBERS / panel_height)
+            # Ticks are made in the current style.
+            panel.xaxis.get_major_ticks()
+            panel.yaxis.get_major_ticks()
             if panel_lines.get(panel):
                 titled = any(panel.get_title(loc=loc) for loc in ("left", "center"))
                 above = 1.0 + (_TITLE if titled else 0.5) / panel_height
@@ -207,14 +213,6 @@ def _columns(axes: NDArray[Any], width: float) -> tuple[list[float], list[float]
     return lefts, numbers, panel_width
 
 
-def _place_labels(panel: Axes, left: float, below: float) -> None:
-    """Place axis labels at these distances, relative to the panel, and make the ticks in the current style."""
-    panel.yaxis.set_label_coords(-left, 0.5)
-    panel.xaxis.set_label_coords(0.5, -below)
-    panel.xaxis.get_major_ticks()
-    panel.yaxis.get_major_ticks()
-
-
 def _number_width(axis: Axis) -> float:
     """Width of the widest number on an axis [mm]."""
     low, high = sorted(axis.get_view_interval())
@@ -246,25 +244,13 @@ def _entries(figure: Figure) -> tuple[dict[str, Any], dict[Axes, dict[str, Any]]
     return common, {panel: own for panel, own in rest.items() if own}
 
 
-def _shared_legend(figure: Figure, entries: Mapping[str, Any]) -> int:
-    """One legend above all panels; the number of its lines."""
-    return _fitted_legend(figure, entries, 0.98 * figure.bbox.width, bbox_to_anchor=(0.5, 1.0), loc="upper center")
-
-
-def _panel_legends(own: Mapping[Axes, Mapping[str, Any]], width: float) -> dict[Axes, int]:
-    """A legend above each panel of a width [mm]; the numbers of their lines."""
-    found = {}
-    for panel, entries in own.items():
-        room = (width + _OVERHANG) * MM * panel.figure.dpi
-        found[panel] = _fitted_legend(panel, entries, room, bbox_to_anchor=(0.5, 1.0), loc="lower center")
-    return found
-
-
-def _fitted_legend(holder: Figure | Axes, entries: Mapping[str, Any], room: float, **place: Any) -> int:
-    """A legend with as few lines as fit a width [pixels]; their number."""
+def _fitted_legend(
+    holder: Figure | Axes, entries: Mapping[str, Any], room: float, loc: Literal["upper center", "lower center"]
+) -> int:
+    """A legend at the middle of the upper edge, with as few lines as fit a width [pixels]; their number."""
     for lines in range(1, len(entries) + 1):
         columns = math.ceil(len(entries) / lines)
-        legend = holder.legend(list(entries.values()), list(entries), ncols=columns, **place)
+        legend = holder.legend(list(entries.values()), list(entries), ncols=columns, bbox_to_anchor=(0.5, 1.0), loc=loc)
         if columns == 1 or legend.get_window_extent().width <= room:
             return math.ceil(len(entries) / columns)
         legend.remove()

@@ -89,11 +89,17 @@ def bode(
             to = output or joints[name]
             response = _channel(run, name, to)
             axes[0, column].plot(frequency, np.abs(response), label=symbol(name), **look_of(k))
-            axes[1, column].plot(frequency, _phase(response), label=symbol(name), **look_of(k))
+            angle = np.degrees(np.angle(response))
+            # Between -360 and 0: a response that is real but for rounding has 0 or -180.
+            phase = np.where(angle > 1e-6, angle - 360.0, angle)
+            axes[1, column].plot(frequency, phase, label=symbol(name), **look_of(k))
         axes[0, column].set_title("to its own encoder" if not output else f"to {symbol(output)}")
         axes[0, column].set_ylabel(f"magnitude [{channel_unit(data, chosen, [output or joints[chosen[0]]])}]")
         axes[1, column].set_ylabel("phase [°]")
-        _phase_axis(axes[1, column])
+        lines = axes[1, column].get_lines()
+        turns = -180 if min(float(np.nanmin(line.get_ydata(), initial=0.0)) for line in lines) > -185.0 else -360
+        axes[1, column].set_ylim(turns - 20.0, 20.0)
+        axes[1, column].set_yticks(range(turns, 1, 90 if turns < -180 else 45))
         for panel in axes[:, column]:
             _over_frequency(panel, data)
         _gain_axis(axes[0, column])
@@ -183,19 +189,6 @@ def _channel(run: xr.Dataset, name: str, output: str) -> Complex:
         place_of(one, names_of(run, what), what)
     one = run.sel(input=name, output=output)
     return one["response_real"].values + 1j * one["response_imag"].values
-
-
-def _phase(response: Complex) -> NDArray[np.float64]:
-    """Phase in degrees between -360 and 0; a response that is real but for rounding has 0 or -180."""
-    angle = np.degrees(np.angle(response))
-    return np.where(angle > 1e-6, angle - 360.0, angle)
-
-
-def _phase_axis(panel: Axes) -> None:
-    low = min(float(np.nanmin(line.get_ydata(), initial=0.0)) for line in panel.get_lines())  # type: ignore[arg-type]
-    turns = -180 if low > -185.0 else -360
-    panel.set_ylim(turns - 20.0, 20.0)
-    panel.set_yticks(range(turns, 1, 90 if turns < -180 else 45))
 
 
 def _over_frequency(panel: Axes, data: xr.Dataset) -> None:

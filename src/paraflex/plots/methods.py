@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
@@ -51,7 +50,12 @@ def work_precision(figures: Mapping[str, Any]) -> Figure:
     ):
         for title, look, runs in lines:
             panel.plot([run["error"] for run in runs], [run[key] for run in runs], label=title, **look)
-        _logarithmic(panel)
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.margins(0.06)
+        panel.grid(color="0.9", linewidth=0.4)
+        name_powers(panel.xaxis)
+        name_powers(panel.yaxis)
         uncertainty = figures["reference"]["uncertainty"]
         low, high = panel.get_xlim()
         if low < uncertainty < high:
@@ -76,12 +80,3 @@ def _lines(methods: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], list[d
             if runs:
                 lines.append((title, look, sorted(runs, key=lambda run: -run["error"])))
     return lines
-
-
-def _logarithmic(panel: Axes) -> None:
-    panel.set_xscale("log")
-    panel.set_yscale("log")
-    panel.margins(0.06)
-    panel.grid(color="0.9", linewidth=0.4)
-    name_powers(panel.xaxis)
-    name_powers(panel.yaxis)

@@ -79,7 +79,7 @@ def targets_reached(figures: Mapping[str, Any]) -> Figure:
 @drawn
 def sobol_bars(figures: Mapping[str, Any]) -> Figure:
     """First-order and total indices of every parameter, intervals of 95 %; one panel per metric, path and mode."""
-    panels_of: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    panels_of: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
     for row in figures["indices"]:
         if row["first"] is not None:
             panels_of.setdefault((row["metric"], row["path"], row["mode"]), []).append(row)
@@ -87,9 +87,11 @@ def sobol_bars(figures: Mapping[str, Any]) -> Figure:
         raise InputError("no metric varies", field="figures", remedy="widen the ranges, or choose another metric")
     columns = min(len(panels_of), 2)
     figure, axes = panel_grid(len(panels_of), columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)
-    for panel, (name, parameters) in zip(axes.flat, panels_of.items(), strict=False):
+    several = len({path for _, path, _ in panels_of}) > 1
+    for panel, ((metric, path, mode), parameters) in zip(axes.flat, panels_of.items(), strict=False):
         _draw_bars(panel, parameters)
-        panel.set_title(_panel_name(name, list(panels_of)), loc="left")
+        names = [metric_name(metric), path if several else "", plain(mode)]
+        panel.set_title(", ".join(filter(None, names)), loc="left")
     for panel in axes.flat:
         panel.set_xlabel("share of the variance" if panel.get_visible() else "")
     most = max(len(parameters) for parameters in panels_of.values())
@@ -126,9 +128,3 @@ def _target_name(target: Mapping[str, Any], targets: list) -> str:
     differing = [key for key in ("metric", "path") if len({each[key] for each in targets}) > 1]
     names = [metric_name(target[key]) if key == "metric" else target[key] for key in differing]
     return " ".join(filter(None, [plain(target["mode"]), *names])) or metric_name(target["metric"])
-
-
-def _panel_name(name: tuple[str, ...], names: list[tuple[str, ...]]) -> str:
-    metric, path, mode = name
-    paths = {each[1] for each in names}
-    return ", ".join(filter(None, [metric_name(metric), path if len(paths) > 1 else "", plain(mode)]))

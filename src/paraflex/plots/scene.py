@@ -247,6 +247,9 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
     seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
     loads = _loads(run, drawn, time, times, at)
     reach = np.concatenate([one.reshape(-1, 2) for one in seen])
+    # With the tails of the arrows of forces.
+    size = limits_of(reach).size
+    reach = np.concatenate([reach, *(load.place - ARROW * size * load.force for load in loads)])
     return Scene(
         mechanism=str(run.attrs["mechanism"]),
         mode=str(run["mode"].item()) if "mode" in run.coords else "",
@@ -262,7 +265,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
         trail=None if followed is None else at(drawn[:, followed]),
         desired=desired,
         reached=float(time[-1]),
-        limits=limits_of(_with_rails(_with_arrows(reach, loads), joints)),
+        limits=limits_of(_with_rails(reach, joints)),
         loads=loads,
         load_keys=_load_keys(run),
     )
@@ -422,12 +425,6 @@ def _load_keys(run: xr.Dataset) -> dict[str, str]:
             name = f"load {names[acting[0]]}" if acting.size == 1 else "loads"
             keys[kind] = f"{name}: {sized(float(sizes.max()), unit)}"
     return keys
-
-
-def _with_arrows(places: Array, loads: tuple[DrawnLoad, ...]) -> Array:
-    """Places, and the tails of the arrows of forces."""
-    size = limits_of(places).size
-    return np.concatenate([places, *(load.place - ARROW * size * load.force for load in loads)])
 
 
 def pitch_lines(ends: Array, directions: Array, radii: Array) -> tuple[Array, ...]:

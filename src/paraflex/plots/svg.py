@@ -62,17 +62,12 @@ def sketch(mechanism: Mechanism) -> str:
     limits, scale = shown.limits, _SKETCH / shown.limits.size
     pen = Pen((-scale * limits.left, scale * limits.top), scale, 0.9, PAGE)
     width, height = scale * (limits.right - limits.left), scale * (limits.top - limits.bottom)
-    parts = still_elements(shown, limits, pen) + moving_elements(shown, limits, pen)
+    parts = [_mark(mark, pen) for mark in still_marks(shown, limits)] + moving_elements(shown, limits, pen)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
         f'viewBox="0 0 {width:.1f} {height:.1f}" role="img" aria-label="{escape(mechanism.name)} as assembled" '
         f'style="color: inherit; max-width: 100%">{"".join(parts)}</svg>'
     )
-
-
-def still_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:
-    """Elements of the ground."""
-    return [_mark(mark, pen) for mark in still_marks(shown, limits)]
 
 
 def moving_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:

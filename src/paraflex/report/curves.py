@@ -76,6 +76,21 @@ def bending(data: xr.Dataset, name: str = "tip_transverse") -> xr.DataArray:
     return data[name].isel(body=np.flatnonzero(bent))
 
 
+def deflections_of(data: xr.Dataset) -> NDArray[np.float64]:
+    """Deflections of links from their chords (..., time, body); for earlier results those of their ends."""
+    name = "deflection" if "deflection" in data else "tip_transverse"
+    return np.abs(data[name].transpose(..., "time", "body").values)
+
+
+def joint_force_curves(force: NDArray[np.float64], x: NDArray[np.float64] | None = None) -> list[Curve]:
+    """Magnitude and components of forces (joints, samples, 2), one joint at a time; over x, by default the time."""
+    curves = []
+    for j, one in enumerate(force):
+        parts = (("magnitude", np.linalg.norm(one, axis=-1)), ("x", one[:, 0]), ("y", one[:, 1]))
+        curves += [Curve(word, y, x, run=0, choice=j, look=look(k)) for k, (word, y) in enumerate(parts)]
+    return curves
+
+
 def followed(
     chart: Chart,
     values: xr.DataArray,

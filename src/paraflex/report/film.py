@@ -98,17 +98,12 @@ class Animation:
                       for one, stiff in zip(self.scenes, self.stiff, strict=True)],
             "dot": DOT * limits.size,
             # Arrows of the largest force and torque: line, head, size.
-            "keys": [one and [_key(kind, text, limits) for kind, text in one.load_keys.items()]
-                     for one in self.scenes],
+            "keys": [one and [[*(part.ravel().tolist() for part in key_arrow(kind, limits)), text]
+                              for kind, text in one.load_keys.items()] for one in self.scenes],
             "tips": [one and one.followed for one in self.scenes],
             "path": None if self.path is None else packed(self.path.reshape(-1, *self.path.shape[-2:])),
             "view": [limits.left, limits.bottom, limits.right, limits.top],
         }  # fmt: skip
-
-
-def _key(kind: str, text: str, limits: Limits) -> list[Any]:
-    line, head = key_arrow(kind, limits)
-    return [line.ravel().tolist(), head.ravel().tolist(), text]
 
 
 def _marks(marks: list[Mark], frames: int) -> dict[str, Any]:

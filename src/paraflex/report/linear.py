@@ -60,6 +60,7 @@ def linear_page(data: xr.Dataset) -> Page:
     # The first that vibrates with motors held, where there is one.
     mode = default_mode(data)
     wanted = [k for k, one in enumerate(drawn) if one.frequency > 0.0 and one.holding == "held" and one.mode == mode]
+    of_maps = [chart for name in names_of(data, "map") for chart in (_gain_chart(data, name), _map_chart(data, name))]
     return Page(
         title=data.attrs["mechanism"],
         kind="linear models",
@@ -68,7 +69,7 @@ def linear_page(data: xr.Dataset) -> Page:
         command=_command(asked(data)),
         figures=_tiles(data),
         more=[("Frequencies and damping", _frequencies(data)), *_zero_tables(data)],
-        panels=[Panel("Responses, poles and zeros", _charts(data))],
+        panels=[Panel("Responses, poles and zeros", [*of_maps, *_branch_charts(data)])],
         time=np.linspace(0.0, _PERIOD, _FRAMES),
         runs=[_name(one) for one in drawn],
         groups=list(groups.items()),
@@ -193,12 +194,6 @@ def _zero_tables(data: xr.Dataset) -> list[tuple[str, str]]:
         )  # fmt: skip
         out.append((f"Zeros: {MAP_WORDS[name]}", html))
     return out
-
-
-def _charts(data: xr.Dataset) -> list[Chart]:
-    maps = names_of(data, "map")
-    charts = [chart for name in maps for chart in (_gain_chart(data, name), _map_chart(data, name))]
-    return [*charts, *_branch_charts(data)]
 
 
 def _gain_chart(data: xr.Dataset, name: str) -> Chart:

@@ -12,7 +12,18 @@ from paraflex.findings import DONE_STATUSES
 from paraflex.plots.labels import DisplayUnit, text_symbol
 from paraflex.plots.selection import names_of
 from paraflex.report.controllers import controller_panels, controller_tables
-from paraflex.report.curves import TIPS, bending, energies, energy_scale, followed, largest, look, thinned
+from paraflex.report.curves import (
+    TIPS,
+    bending,
+    deflections_of,
+    energies,
+    energy_scale,
+    followed,
+    joint_force_curves,
+    largest,
+    look,
+    thinned,
+)
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Page, Panel
@@ -150,13 +161,9 @@ def _points(data: xr.Dataset) -> Chart | None:
 def _joint_forces(data: xr.Dataset) -> Chart:
     force = data["joint_force"].transpose("joint", "time", "axis").values
     names = names_of(data, "joint")[:_MOST_CHOICES]
-    curves = []
-    for j in range(len(names)):
-        magnitude = np.linalg.norm(force[j], axis=-1)
-        parts = (("magnitude", magnitude), ("x", force[j, :, 0]), ("y", force[j, :, 1]))
-        curves += [Curve(name, values, run=0, choice=j, look=look(k)) for k, (name, values) in enumerate(parts)]
     return Chart(
-        "forces", "Joint forces", "force [N]", curves, choices=[text_symbol(name) for name in names], choosing="joint",
+        "forces", "Joint forces", "force [N]", joint_force_curves(force[: len(names)]),
+        choices=[text_symbol(name) for name in names], choosing="joint",
         note="On the joint's second body, in the ground frame.",
     )  # fmt: skip
 
@@ -193,20 +200,15 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     tiles = load_tiles({"": load_figures(data)})
-    # Of earlier results those of their ends.
-    name = "deflection" if "deflection" in data else "tip_transverse"
-    deflections = np.abs(data[name].transpose("time", "body").values)
+    deflections = deflections_of(data)
     if largest(deflections) > 0.0:
         body = int(np.argmax([largest(one) for one in deflections.T]))
         name = text_symbol(str(data["body"].values[body]))
         tiles.append(("largest deflection", quantity(largest(deflections), "m"), name))
     status = str(data["status"].item())
     last = "" if status in DONE_STATUSES else "last sample "
-    ended = ("status", status, f"{last}t = {_last_time(data):.4g} s, computed in {number(data['wall_time'].item())} s")
+    reached = np.isfinite(data["angle"].values).all(axis=1)
+    end = np.max(data["time"].values[reached], initial=0.0)
+    ended = ("status", status, f"{last}t = {end:.4g} s, computed in {number(data['wall_time'].item())} s")
     # That a run failed is more than its numbers.
     return [ended, *tiles] if last else [*tiles, ended]
-
-
-def _last_time(data: xr.Dataset) -> float:
-    reached = np.isfinite(data["angle"].values).all(axis=1)
-    return float(data["time"].values[reached][-1]) if reached.any() else 0.0

@@ -199,15 +199,8 @@ def _stress_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
             cells = [number(one["stress_max"].item(), STRESS.factor), number(one["safety_factor"].item()),
                      number(one["stress_place"].item()), f"{one['stress_step'].item():.0f}"]  # fmt: skip
             rows.append((text_symbol(name), cells))
-    yield (
-        "Stresses of beams",
-        table(
-            heads,
-            rows,
-            caption="Largest stresses of the beams",
-            note="Bending and axial together, the largest of all steps.",
-        ),
-    )
+    note = "Bending and axial together, the largest of all steps."
+    yield "Stresses of beams", table(heads, rows, caption="Largest stresses of the beams", note=note)
 
 
 def _reactions(data: xr.Dataset) -> Iterator[tuple[str, str]]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from paraflex.plots.labels import ROUNDING, display_unit, peak, text_symbol
 from paraflex.plots.scene import figure_of
 from paraflex.plots.selection import names_of
-from paraflex.report.curves import DOTTED, look
+from paraflex.report.curves import DOTTED, joint_force_curves, look
 from paraflex.report.page import PLAIN_LOOK, Chart, Curve, Look, Panel
 from paraflex.results.statics_data import branch_parts, seen_buckling
 from paraflex.results.statics_rows import given_coordinates, is_wide, quantity_word, shown_unit, unit_of
@@ -67,6 +67,7 @@ def _branch(data: xr.Dataset, name: str, x: Array, y: Array, own: Look, choice: 
 
 def _force_charts(data: xr.Dataset) -> Iterator[Chart]:
     """Force against travel of each coordinate that is moved or loaded."""
+    note = "Dotted: unstable equilibria; rings: limit points." if branch_parts(data).unstable.any() else ""
     for k in given_coordinates(data):
         one = data.isel(named=k)
         name, unit = text_symbol(str(one["named"].item())), display_unit(str(one["unit"].item()), one["travel"].values)
@@ -74,12 +75,8 @@ def _force_charts(data: xr.Dataset) -> Iterator[Chart]:
         yield Chart(
             f"force-{k}", f"{word.capitalize()} against travel: {name}", f"{word} [{unit_of(one, 'effort')}]",
             _branch(data, "", unit.factor * one["travel"].values, one["effort"].values, look(0)),
-            x=f"travel of {name} [{unit.name}]", over_time=False, note=_branch_note(data),
+            x=f"travel of {name} [{unit.name}]", over_time=False, note=note,
         )  # fmt: skip
-
-
-def _branch_note(data: xr.Dataset) -> str:
-    return "Dotted: unstable equilibria; rings: limit points." if branch_parts(data).unstable.any() else ""
 
 
 def _stiffness_charts(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
@@ -146,10 +143,7 @@ def _joint_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
     if not names:
         return
     force = data["joint_force"].transpose("joint", "step", "axis").values
-    curves = []
-    for j in range(len(names)):
-        parts = (("magnitude", np.linalg.norm(force[j], axis=-1)), ("x", force[j, :, 0]), ("y", force[j, :, 1]))
-        curves += [Curve(word, y, over.values, look(k), run=0, choice=j) for k, (word, y) in enumerate(parts)]
+    curves = joint_force_curves(force[: len(names)], over.values)
     yield Chart("joints", "Forces of joints", "force [N]", curves, x=over.label, over_time=False,
                 choices=[text_symbol(name) for name in names], choosing="joint",
                 note="On the joint's second body, in the ground frame.")  # fmt: skip

@@ -128,6 +128,7 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
     missing = dict(account.failed) | dict.fromkeys(
         others, "it has other bodies, joints, motors or springs than the first"
     )
+    not_shown = [f"{designs.label(row)} is not shown in motion: {reason}" for row, reason in missing.items()]
     return Page(
         title=account.name,
         kind=account.kind,
@@ -145,7 +146,7 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
         selecting="design",
         film=None if data is None else animation(data),
         no_film=_NO_RUN,
-        notes=[*account.notes, *_unfinished(designs, account), *_not_shown(designs, missing)],
+        notes=[*account.notes, *_unfinished(designs, account), *not_shown],
     )
 
 
@@ -296,10 +297,6 @@ def _unfinished(designs: DesignTable, account: StudyAccount) -> list[str]:
     if account.total is None or done >= account.total:
         return []
     return [f"The study is not finished: this is of the {count(done)} of {count(account.total)} runs that are done."]
-
-
-def _not_shown(designs: DesignTable, missing: Mapping[int, str]) -> list[str]:
-    return [f"{designs.label(row)} is not shown in motion: {reason}" for row, reason in missing.items()]
 
 
 def _panels(data: xr.Dataset, runs: list[str], account: StudyAccount) -> list[Panel]:

@@ -99,7 +99,9 @@ def table(
         None stands last.
     """
     runs = runs or {}
-    wordy = [k > 0 and any(_is_words(cells[k - 1]) for _, cells in rows) for k in range(len(heads))]
+    # Columns of texts with words, which are no numbers.
+    words = re.compile(r"[^\n]*?[A-Za-z]{2}")
+    wordy = [k > 0 and any(words.match(cells[k - 1]) for _, cells in rows) for k in range(len(heads))]
     head = "".join(
         f'<th scope="col"{_WORD_CLASS if words else ""}>{escape(name)}{_small(unit)}</th>'
         for (name, unit), words in zip(heads, wordy, strict=True)
@@ -147,8 +149,3 @@ def _row(
 def _cell(text: str, words: bool) -> str:
     first, _, second = text.partition("\n")
     return f"<td{_WORD_CLASS if words else ''}>{escape(first)}{_small(second)}</td>"
-
-
-def _is_words(text: str) -> bool:
-    """Whether a text has words and is not a number."""
-    return re.search(r"[A-Za-z]{2}", text.partition("\n")[0]) is not None

@@ -21,6 +21,7 @@ from paraflex.report.curves import (
     TIPS,
     bending,
     compared,
+    deflections_of,
     energies,
     energy_scale,
     errors,
@@ -66,6 +67,9 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     modes = f"{len(runs)} actuation modes" if len(runs) > 1 else f"actuation mode {runs[0]}"
     moving = animation(data)
     few = thinned(data)
+    # Of whole runs only.
+    whole = data.isel(mode=finished(data))
+    valid = validity_line({name: validity_summary(whole.sel(mode=name)) for name in names_of(whole, "mode")})
     return Page(
         title=data.attrs["mechanism"],
         kind="run",
@@ -88,7 +92,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         film=moving,
         no_film="" if moving else NO_SHAPES,
         notes=[*_unfinished(data, failed or {}), *doubt_lines(verdict_of(data))],
-        remarks=_validity(data),
+        remarks=[valid] if valid else [],
     )
 
 
@@ -96,7 +100,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
     """Results of every mode."""
     runs = names_of(data, "mode")
     errors_rms, words = headline(data)
-    gaps, deflections = errors(data).values, _deflections(data)
+    gaps, deflections = errors(data).values, deflections_of(data)
     ranked = gaps[:, during_motion(data["time"].values, data.attrs["motion_end"])] if ranked_by_motion(data) else gaps
     length, bend = display_unit("m", gaps), display_unit("m", deflections)
     after = _after_columns(data)
@@ -188,12 +192,6 @@ def _after_columns(data: xr.Dataset) -> list[tuple[str, str, NDArray[np.float64]
     return columns
 
 
-def _deflections(data: xr.Dataset) -> NDArray[np.float64]:
-    """Deflections of links from their chords (mode, time, body); for earlier results those of their ends."""
-    name = "deflection" if "deflection" in data else "tip_transverse"
-    return np.abs(data[name].transpose("mode", "time", "body").values)
-
-
 def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
     def of_links(identity: str, title: str, label: str, name: str) -> Chart:
         chart = Chart(identity, title, label, choosing="link")
@@ -262,7 +260,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         kind = "force" if torque_unit(data) == "N" else "torque"
         value = f"{number(peaks[least])} {torque_unit(data)}"
         tiles.append((f"least peak {kind}" if several else f"peak {kind}", value, _name(data, least)))
-    deflections = np.where(whole, [largest(one) for one in _deflections(data)], np.nan)
+    deflections = np.where(whole, [largest(one) for one in deflections_of(data)], np.nan)
     if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
         most = int(np.nanargmax(deflections))
         tiles.append(("largest deflection", quantity(deflections[most], "m"), _name(data, most)))
@@ -292,13 +290,6 @@ def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
             part = "" if status in DONE_STATUSES else ". Its curves and numbers are of the part before"
             out.append(f"Mode {name}: {status}. {data['message'].values[r]}{part}".rstrip())
     return out
-
-
-def _validity(data: xr.Dataset) -> list[str]:
-    """A sentence that the model is valid, if it is; of whole runs only."""
-    data = data.isel(mode=finished(data))
-    line = validity_line({str(name): validity_summary(data.sel(mode=name)) for name in data["mode"].values})
-    return [line] if line else []
 
 
 def _model(run: Mapping[str, object]) -> str:

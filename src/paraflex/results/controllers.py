@@ -199,7 +199,11 @@ def controller_figures(run: xr.Dataset) -> dict[str, Any]:
             "saturated_share": float(one.limited.sum()) / samples if samples else None,
             "torques": {motor: _torque(one, motor) for motor in map(str, one.data[OUTPUT].values)},
         }
-    internal = {"internal_torque_max": _largest_internal(run[INTERNAL])} if INTERNAL in run else {}
+    internal: dict[str, Any] = {}
+    if INTERNAL in run:
+        known = run[INTERNAL].transpose("time", "motor").values
+        known = known[np.isfinite(known).all(axis=1)]
+        internal["internal_torque_max"] = float(largest_norm(known)) if len(known) else None
     return internal | ({CONTROLLERS: figures} if figures else {})
 
 
@@ -208,9 +212,3 @@ def _torque(one: ControllerData, motor: str) -> dict[str, Any]:
     most = {f"{key}_max": largest(one.data[name].sel({OUTPUT: motor}).values)
             for key, name in (("wanted", WANTED), ("given", GIVEN))}  # fmt: skip
     return {"unit": one.units[motor], **most, "lowest": lowest, "highest": highest, "rate": one.rates[motor]}
-
-
-def _largest_internal(torques: xr.DataArray) -> float | None:
-    known = torques.transpose("time", "motor").values
-    known = known[np.isfinite(known).all(axis=1)]
-    return float(largest_norm(known)) if len(known) else None

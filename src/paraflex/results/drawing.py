@@ -311,7 +311,9 @@ def _base(
     moving = []
     for joint, ref in joined:
         if joint.follows_beam and ref is joint.a:
-            moving.append(_contact(place(joint.b), *frame(one.body)))
+            # Its place on the undeformed beam.
+            there, (origin, turn) = _complex(place(joint.b)), frame(one.body)
+            moving.append(Hold(((there - _complex(origin)) * np.exp(-1j * turn)).real.astype(complex), there))
         else:
             held.setdefault(one.points[ref.point], ref)
     holds = [
@@ -323,12 +325,6 @@ def _base(
     if not holds:
         holds = [Hold(np.zeros(len(shape), dtype=complex), _complex(origin))]
     return stiff_shape(one, holds, turn)
-
-
-def _contact(place: Array, origin: Array, angle: Array) -> Hold:
-    """Place of a point that slides along a beam, on the undeformed beam."""
-    local = _complex(place - origin) * np.exp(-1j * angle)
-    return Hold(local.real.astype(complex), _complex(place))
 
 
 def _directions(

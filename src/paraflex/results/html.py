@@ -55,7 +55,10 @@ def motion_run_html(run: MotionRun) -> str:
             ("kinetic energy, largest", f"{np.max(solution.kinetic_energy):.4g} J"),
             ("strain energy, largest", f"{np.max(solution.strain_energy):.4g} J"),
         ]
-        points = _last_places(run)
+        last = [values[-1:] for values in (solution.q, solution.v, solution.a)]
+        names = [PointRef(body.name, point) for body in system.described.bodies for point in body.points]
+        shown = [ref for ref in names if "._" not in str(ref)][:_MOST_LISTED]
+        points = [(str(ref), *map(float, point_motion(system, ref, *last).position[0])) for ref in shown]
     given = {
         name: "in time" if isinstance(law, AngleLaw) else f"{law:g}" for name, law in run.torques.items() if law != 0.0
     }
@@ -106,14 +109,6 @@ def _deflection(run: TrackingRun | MotionRun) -> str | None:
     system = run.task.system if isinstance(run, TrackingRun) else run.system
     bent = np.abs(deflections(system, run.solution.q))
     return f"{1e3 * np.nanmax(bent):.4g} mm" if np.isfinite(bent).any() else None
-
-
-def _last_places(run: MotionRun) -> list[tuple]:
-    solution = run.solution
-    q, v, a = (values[-1:] for values in (solution.q, solution.v, solution.a))
-    names = [PointRef(body.name, point) for body in run.system.described.bodies for point in body.points]
-    shown = [ref for ref in names if "._" not in str(ref)][:_MOST_LISTED]
-    return [(str(ref), *map(float, point_motion(run.system, ref, q, v, a).position[0])) for ref in shown]
 
 
 def _solver(solution: Solution, method: str) -> list[tuple[str, Any]]:

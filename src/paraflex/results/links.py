@@ -194,17 +194,11 @@ def _chord(system: System, names: Sequence[str], q: Array, v: Array) -> tuple[Ar
         return q[:, angle], v[:, angle]
     first, last = _ends(system, names, q, v)
     offset = np.arctan2(y, x)
-    line, rate = last.position - first.position, last.velocity - first.velocity
-    chord, chord_rate = line_angle(line, rate, q[:, angle] + offset)
-    return chord - offset, chord_rate
-
-
-def line_angle(line: Array, rate: Array, near: Array) -> tuple[Array, Array]:
-    """Angle (k,) of a line (k, 2) within a half turn of another angle (k,), and its rate."""
-    x, y = line[:, 0], line[:, 1]
-    turned = np.arctan2(y, x) - near
-    angle = near + (turned + np.pi) % (2.0 * np.pi) - np.pi
-    return angle, (x * rate[:, 1] - y * rate[:, 0]) / (x**2 + y**2)
+    (x, y), (dx, dy) = (last.position - first.position).T, (last.velocity - first.velocity).T
+    # Within a half turn of the frame's angle.
+    near = q[:, angle] + offset
+    chord = near + (np.arctan2(y, x) - near + np.pi) % (2.0 * np.pi) - np.pi
+    return chord - offset, (x * dy - y * dx) / (x**2 + y**2)
 
 
 def _tip(system: System, names: Sequence[str], q: Array) -> Array:

@@ -216,10 +216,6 @@ def _of_currents(formula: Callable[[Electrical], Any]) -> Formula:
     return value
 
 
-def _motor_energy(run: Any, nominal: Any) -> Any:
-    return integral(run.t, np.sum(np.sign(nominal.power) * run.power, axis=1))
-
-
 def _stress_where(used_up: Callable[[Any], Trace]) -> Formula:
     """Largest magnitude of the stress in the section where the nominal run has most of something; NaN if it has none.
 
@@ -324,7 +320,8 @@ _ALL = (
     Metric("work", "work done on the mechanism until the end, less what dampers take", "J",
            _as_it_is(lambda x: x.solution.work[-1])),
     Metric("motor_energy", "integral of the magnitudes of all motors' powers, from the samples", "J",
-           _motor_energy, "energy of the motors", of_motors=True),
+           lambda run, nominal: integral(run.t, np.sum(np.sign(nominal.power) * run.power, axis=1)),
+           "energy of the motors", of_motors=True),
     Metric("motor_power_max", "largest magnitude of any motor's power", "W",
            _largest_magnitude(lambda x: x.power), "largest motor power", of_motors=True),
     Metric("internal_torque_max", "largest Euclidean norm of the part of the torques that only strains links", "N m",

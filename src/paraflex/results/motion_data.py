@@ -88,7 +88,12 @@ def motion_dataset(
         data["applied_torque"] = (("time", "motor"), padded(torques, run.times.size))
     else:
         data["applied_torque"] = (("motor",), np.array(list(run.torques.values()), dtype=float))
-    coordinates = {"time": run.times, "coordinate": _coordinate_names(run), **link_coordinates(system, links)}
+    names = [
+        f"{body.name}.{part}"
+        for body in system.bodies
+        for part in ("x", "y", "phi", *(f"eta{k + 1}" for k in range(body.nf)))
+    ]
+    coordinates = {"time": run.times, "coordinate": names, **link_coordinates(system, links)}
     out = with_totals(xr.Dataset(data, coords=coordinates))
     label(out, mechanism)
     out.attrs = provenance(system, title_of(solution.method), options, parameters) | {
@@ -133,11 +138,3 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }
-
-
-def _coordinate_names(run: MotionRun) -> list[str]:
-    return [
-        f"{body.name}.{part}"
-        for body in run.system.bodies
-        for part in ("x", "y", "phi", *(f"eta{k + 1}" for k in range(body.nf)))
-    ]

@@ -65,7 +65,10 @@ def along_variables(
     own = _errors(paths, lambda path, _: path.own, True)
     nothing = _Errors(*(np.full_like(part, np.nan) for part in own))
     found, wanted = {OWN: [own, own]}, set(STATIC)
-    for name, take in _bases(places, closed=_is_closed(along[0])):
+    # Whether the last pose is the first.
+    first, last = (along[0].models[k].minimal for k in (0, -1))
+    closed = bool(np.max(np.abs(last.point.q - first.point.q) / first.system.units) < _SAME)
+    for name, take in _bases(places, closed=closed):
         found[name] = [_errors(paths, take, static == STATIC[0]) if static in wanted else nothing for static in STATIC]
         enough = [static for static, each in zip(STATIC, found[name], strict=True) if np.max(each.response) <= error]
         wanted -= set(enough)
@@ -79,12 +82,6 @@ def along_variables(
         "along_frequency_error": (("mode", "static", "basis", "place", "holding"), frequency),
     }
     return variables, {"static": list(STATIC), "basis": list(found), "place": places}
-
-
-def _is_closed(along: PosesAlong) -> bool:
-    """Whether the last pose is the first."""
-    first, last = (along.models[k].minimal for k in (0, -1))
-    return bool(np.max(np.abs(last.point.q - first.point.q) / first.system.units) < _SAME)
 
 
 def _bases(places: Array, *, closed: bool) -> Iterator[tuple[str, Take]]:

@@ -65,23 +65,20 @@ def write_results(data: xr.Dataset, path: Path, **options: Any) -> None:
 
 
 def _write_netcdf(data: xr.Dataset, file: Path) -> None:
+    # Large arrays are compressed: bytes of like weight together, at the least effort.
+    encoding = {
+        str(name): {"zlib": True, "complevel": 1, "shuffle": True}
+        for name, values in data.data_vars.items()
+        if values.nbytes >= _LARGE and values.dtype.kind in "fiu"
+    }
     try:
-        data.to_netcdf(file, engine="netcdf4", encoding=_encoding(data))
+        data.to_netcdf(file, engine="netcdf4", encoding=encoding)
     except (OSError, RuntimeError) as error:
         # The library does not say why, or says something else: writing as much without it does.
         with file.open("wb") as plain:
             for _ in range(1 + data.nbytes // _PIECE):
                 plain.write(bytes(_PIECE))
         raise OSError(f"by the netCDF library: {error}") from error
-
-
-def _encoding(data: xr.Dataset) -> dict[str, dict[str, object]]:
-    """Large arrays are compressed: bytes of like weight together, at the least effort."""
-    return {
-        str(name): {"zlib": True, "complevel": 1, "shuffle": True}
-        for name, values in data.data_vars.items()
-        if values.nbytes >= _LARGE and values.dtype.kind in "fiu"
-    }
 
 
 @checked_arguments()

@@ -75,7 +75,7 @@ def _beside(mechanism: Mechanism) -> Iterator[Finding]:
         points = [PointRef(body.name, name) for name in body.points]
         for free in (point for point in points if point not in used and point.point[-1:].isdigit()):
             for point in points:
-                if len(held.get(point, ())) > 1 and free.point in held[point] and _numbered_alike(free, point):
+                if len(held.get(point, ())) > 1 and free.point in held[point] and numbered_alike(free, point):
                     yield Finding(
                         "point-unused", f"joint.{free.point}",
                         f"it and another joint hold {point}, and nothing holds {free}",
@@ -83,7 +83,8 @@ def _beside(mechanism: Mechanism) -> Iterator[Finding]:
                     )  # fmt: skip
 
 
-def _numbered_alike(one: PointRef, other: PointRef) -> bool:
+def numbered_alike(one: PointRef, other: PointRef) -> bool:
+    """Whether two points have one name but for the number at its end."""
     return one.point.rstrip("0123456789") == other.point.rstrip("0123456789")
 
 

@@ -128,17 +128,14 @@ def doubtful_results(
         return []
     mechanism = mechanism or system.described
     where = _Where("" if driven is None else f"mode {driven.mode}", mechanism)
+    undamped = any(body.damping.size > 0 and not body.damping.any() for body in system.bodies)
     found = [
         *stiff_modes(system),
         *_large_slopes(where, system, solution),
         *_overstressed(where, system, solution),
         *_unbalanced(where, system, solution),
         # No default resolves vibrations of undamped beams along their axes: tables have the errors beside the numbers.
-        *(
-            _begun_singular(solution, where.place)
-            if _undamped(system)
-            else unresolved_loads(system, solution, where.place)
-        ),
+        *(_begun_singular(solution, where.place) if undamped else unresolved_loads(system, solution, where.place)),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
         *shared_loads(system, solution),
@@ -235,19 +232,18 @@ def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[F
     largest = max(largest, _turned_over(system, solution))
     least = NO_ENERGY * system.total_mass * STANDARD_GRAVITY * system.size
     off = solution.energy_balance_max
-    if largest > least and off > UNBALANCED * largest and off > _explained(system, solution):
+    if not (largest > least and off > UNBALANCED * largest):
+        return
+    # Work of the largest force on positions that are as far off as the default tolerance lets them be.
+    force = max((load for (_, unit), load in _peaks(system, solution).items() if unit == "N"), default=0.0)
+    explained = IntegrationOptions().tolerance_for(system) * force
+    if off > explained:
         yield Finding(
             "energy-unbalanced", where.place,
             f"energy and work do not balance: {100.0 * off / largest:.2g} % of the largest "
             "energy or work is missing or too much, and motion and stresses may be as far off",
             "give a smaller tolerance or shorter steps; damping of the material helps where stiff links vibrate",
         )  # fmt: skip
-
-
-def _explained(system: System, solution: Solution) -> float:
-    """Work of the largest force on positions that are as far off as the default tolerance lets them be [J]."""
-    force = max((load for (_, unit), load in _peaks(system, solution).items() if unit == "N"), default=0.0)
-    return IntegrationOptions().tolerance_for(system) * force
 
 
 def _turned_over(system: System, solution: Solution) -> float:
@@ -258,16 +254,10 @@ def _turned_over(system: System, solution: Solution) -> float:
     return float(np.trapezoid(power, solution.t)) if rates else 0.0
 
 
-def _undamped(system: System) -> bool:
-    """Whether the material of some beam has no damping."""
-    return any(body.damping.size > 0 and not body.damping.any() for body in system.bodies)
-
-
 def _begun_singular(solution: Solution, place: str) -> Iterator[Finding]:
     """Findings about runs of other programs' solvers that begin at a singular position."""
-    if not (solution.t.size and solution.t[0] in solution.singular_positions):
-        return
-    if not isinstance(METHODS[solution.method], NativeMethod):
+    begun = solution.t.size and solution.t[0] in solution.singular_positions
+    if begun and not isinstance(METHODS[solution.method], NativeMethod):
         text = f"{solution.method} begins at a singular position: forces near it may be off by several times their size"
         yield Finding(
             "forces-unresolved", place, text, "choose one of paraflex's own methods, or start beside this pose"
