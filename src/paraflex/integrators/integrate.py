@@ -317,8 +317,11 @@ class Integration:
             error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({rows}),"
             remedy = _AROUND if options.method.family is Family.ESDIRK else _PASSING_METHODS
         elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
-            error, cause = SingularPositionError, _before_singular(options.method.name, run.singular_ahead)
-            remedy = _PASSING_METHODS
+            error, remedy = SingularPositionError, _PASSING_METHODS
+            cause = (
+                f"a singular position lies ahead, at about t = {run.singular_ahead:.4g} s, which {options.method.name} "
+                "on index-3 equations cannot be relied on to pass; stopped"
+            )
         moment = Moment(now.t, solution.steps + (0 if self._begun is None else self._begun.steps))
         return error(cause, moment, solution, remedy)
 
@@ -351,13 +354,6 @@ def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:
         remedy = "allow more steps (max_steps), or choose a coarser tolerance or a shorter duration"
         return Breakdown(f"the run has not ended after {most} steps,", remedy)
     return _NOT_IN_PARTS if code == NO_CONVERGENCE and options.step is not None else CAUSES[code]
-
-
-def _before_singular(method: str, time: float) -> str:
-    return (
-        f"a singular position lies ahead, at about t = {time:.4g} s, which {method} on index-3 equations cannot be "
-        "relied on to pass; stopped"
-    )
 
 
 def _singular_start(run: Run, times: Array, q: Array) -> Array:
