@@ -105,10 +105,15 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
     position, where rows of the step's factor are held, at once.
     """
     near, g, b = march.counts[NEAR] > 0, march.clock[STAGE_G], march.clock[STAGE_B]
+    weights = INDEX_1
+    if controls.treatment == BAUMGARTE:
+        weights = constraint_weights(controls, march.clock[TRIED])[0]
     for i in range(first, march.counts[SAMPLE]):
         needed = near or out.asked[i] or (h >= controls.long_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
         if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
-            weights = begin_sample(controls, i, march, out)
+            explicit_parts(out.q[i], out.v[i], out.a[i], g, b, march)
+            copy(out.a[i], march.eq)
+            copy(out.lam[i], march.guess_lam)
             solved = not near and solve_at(
                 system, signals, out.times[i], weights, g, b, march.clock[CONTRACTION], march, work, out.a[i],
                 out.lam[i], march.torques,
@@ -116,17 +121,6 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
             if not solved:
                 solved = solve_anew(system, signals, controls, i, weights, march, work, out, aside)
             out.solved[i] = end_sample(system, i, solved, march, work, out)
-
-
-@routine
-def begin_sample(controls, i, march, out):
-    """Keep what a sample is; weights of its constraint rows."""
-    explicit_parts(out.q[i], out.v[i], out.a[i], march.clock[STAGE_G], march.clock[STAGE_B], march)
-    copy(out.a[i], march.eq)
-    copy(out.lam[i], march.guess_lam)
-    if controls.treatment == BAUMGARTE:
-        return constraint_weights(controls, march.clock[TRIED])[0]
-    return INDEX_1
 
 
 @routine
