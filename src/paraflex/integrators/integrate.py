@@ -277,7 +277,10 @@ class Integration:
         mesh = elements_too_few(system, run.problem.limits)
         findings = (*self._ends.findings(solution.q), *filter(None, [self._loose, few]), *mesh)
         solution = replace(solution, findings=findings)
-        _refuse_beam_end(solution, self._crossing)
+        end = None if self._crossing is None else self._crossing.function.event
+        if self._crossing is not None and isinstance(end, BeamEnd) and end.at_end is AtEnd.ERROR:
+            moment = Moment(self._crossing.t, solution.steps)
+            raise _failed(SliderOffBeamError(self._crossing.reached, moment, solution, STAY_ON_BEAM))
         if self.goes_on or self.status in ("interrupted", "stopped"):
             return solution
         raise _failed(self._error(solution))
@@ -330,16 +333,6 @@ def _failed(error: IntegrationError) -> IntegrationError:
     """An error with its partial solution, in which the message is that of the error."""
     error.partial = replace(error.partial, status="failed", message=str(error))
     return error
-
-
-def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
-    """Raise if a run ends at the end of a beam and its joint has `at_end` "error"."""
-    if crossing is None or not (
-        isinstance(crossing.function.event, BeamEnd) and crossing.function.event.at_end is AtEnd.ERROR
-    ):
-        return
-    moment = Moment(crossing.t, solution.steps)
-    raise _failed(SliderOffBeamError(crossing.reached, moment, solution, STAY_ON_BEAM))
 
 
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
