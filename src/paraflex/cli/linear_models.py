@@ -49,16 +49,12 @@ class AskedModels(NamedTuple):
 def asked_models(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
     """What makes the linear models, once all that can be checked before is checked."""
     _check(request)
-    if _names_results(request.model.name):
+    name = request.model.name
+    if Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names()):
         return _of_results(request, command)
     model = asked_model(request.model)
     modes = _modes(model, request)
     return lambda: _models(model, modes, request, command)
-
-
-def _names_results(name: str) -> bool:
-    """Whether a name is that of results, not of a model."""
-    return Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names())
 
 
 def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
