@@ -101,7 +101,8 @@ def simulate_ked(
     nominal, rigid = _nominal(task, times), task.motion
     end = end_of_motion(rigid.system, rigid.t, rigid.q, rigid.v)
     stop = math.inf if end is None else end.time
-    blocks = [Block(body.all, _mass(body), _stiffness(body)) for body in task.system.bodies]
+    stiffness = [np.diag(np.concatenate([np.zeros(3), body.modes.omega**2])) for body in task.system.bodies]
+    blocks = [Block(body.all, _mass(body), K) for body, K in zip(task.system.bodies, stiffness, strict=True)]
     held = [motor.joint for motor in task.mechanism.motors if motor.name in torques.mode.motors]
     kept: list[Response] = []
     reached: list[float] = []
@@ -247,10 +248,6 @@ def _mass(body: BodyCoordinates) -> Array:
     M[:2, 3:], M[3:, :2] = s.S2, s.S2.T
     M[2, 3:] = M[3:, 2] = s.G1 + s.Jf
     return M
-
-
-def _stiffness(body: BodyCoordinates) -> Array:
-    return np.diag(np.concatenate([np.zeros(3), body.modes.omega**2]))
 
 
 def _quarter(x: Array) -> Array:

@@ -94,6 +94,15 @@ def within(table: str) -> Iterator[None]:
         raise error.within(table) from None
 
 
+@contextmanager
+def renamed(field: str, *, only: str = "") -> Iterator[None]:
+    """Context whose input errors name another field: all of them, or those of one field only."""
+    try:
+        yield
+    except InputError as error:
+        raise (error.at(field) if only in ("", error.field) else error) from None
+
+
 class OutputError(InputError):
     """A place where results cannot be written."""
 

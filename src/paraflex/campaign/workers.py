@@ -256,7 +256,9 @@ def open_engine(engine: str | Engine, workers: int | None = None, cluster: str |
         raise InputError("the cluster has workers of its own", field="--workers", value=workers, remedy=remedy)
     if workers is not None and workers < 1:
         raise InputError("must be positive", field="--workers", value=workers, remedy="say 2")
-    count = workers or _processors()
+    # Those this process may use, not all the machine has: batch systems give out a part.
+    own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    count = workers or own or 1
     if engine == THREADS:
         return Threads(count)
     return Processes(count) if engine == PROCESSES else Dask(count, cluster)
@@ -322,11 +324,6 @@ def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> I
             except (BrokenExecutor, CancelledError):
                 engine.restart()
         yield task, result
-
-
-def _processors() -> int:
-    """Those this process may use, not all the machine has: batch systems give out a part."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _apart(start: Callable[[], T]) -> T:

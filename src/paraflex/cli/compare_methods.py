@@ -11,12 +11,12 @@ from paraflex.cli.compare_methods_tables import print_comparison
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, asked_of, at_fault, find_mode, find_path, of_assembly, plan_study
+from paraflex.cli.request import asked_model, asked_of, blaming, find_mode, find_path, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import build_system, consistent_state
-from paraflex.errors import AssemblyError, InputError
+from paraflex.errors import InputError, renamed
 from paraflex.files import Model
 from paraflex.folders import COMPARISON, ResultsFolder
 from paraflex.integrators import METHODS
@@ -81,10 +81,8 @@ def _options(request: CompareMethodsRequest) -> ComparisonOptions:
 
 
 def _methods(request: CompareMethodsRequest) -> list[str]:
-    try:
+    with renamed("--method"):
         return [find_method(name).name for name in request.methods or METHODS]
-    except InputError as error:
-        raise error.at("--method") from None
 
 
 def _mode(model: Model, request: CompareMethodsRequest) -> str | None:
@@ -104,12 +102,8 @@ def _motion(model: Model, request: CompareMethodsRequest) -> Case:
     study = own_motion(model, request.plan)
     mechanism = standing(model.mechanism, study.assembly, model.start)
     assert study.duration is not None
-    try:
+    with blaming(model):
         start = start_of(model, mechanism, study.assembly, balanced=False)
         if start is None:
             start = consistent_state(build_system(mechanism), mechanism.assembly(study.assembly))
         return motion_case(mechanism, study.duration, samples=study.samples, torques=study.torques, start=start)
-    except AssemblyError as error:
-        raise of_assembly(error, model) from error
-    except InputError as error:
-        raise at_fault(error, model) from None

@@ -14,12 +14,11 @@ from paraflex.cli.commands.requests import flagged
 from paraflex.cli.control_tables import print_laws
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, asked_of, find_modes, find_paths, plan_study
+from paraflex.cli.request import asked_model, asked_of, blaming, find_modes, find_paths, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription
-from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.folders import LAW_COMPARISON, ResultsFolder
 from paraflex.kinematics import Path
@@ -34,7 +33,9 @@ Paths = dict[str, Path]
 def compare_laws_command(request: CompareLawsRequest) -> int:
     """Run every law in every mode, write the table and its figure; the exit code."""
     model = asked_model(request.model)
-    laws, paths, modes = _laws(model, request), find_paths(model, request.paths), find_modes(model, request.modes)
+    with blaming(model):
+        laws = laws_of(model, request.controllers)
+    paths, modes = find_paths(model, request.paths), find_modes(model, request.modes)
     # Every check that needs no computing comes before the first minute is spent.
     with hold_results(request.out, LAW_COMPARISON, force=request.force, field="--output") as folder:
         return _compare(request, model, laws, paths, modes, folder)
@@ -74,13 +75,6 @@ def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, 
             reduced_tasks(model, tasks, modes), laws, modes, options, request.metrics, ErrorSpan(model.study.error),
             asked_of(model, _asked(model, laws, paths, modes) | options.to_dict()),
         )  # fmt: skip
-
-
-def _laws(model: Model, request: CompareLawsRequest) -> Laws:
-    try:
-        return laws_of(model, request.controllers)
-    except InputError as error:
-        raise (error.at("--controller") if error.field == "controllers" else error.in_file(model.source)) from None
 
 
 def _asked(model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from paraflex.cli.commands.models import NewRequest, SchemaRequest
 from paraflex.cli.tables import plain_console
-from paraflex.errors import InputError, OutputError
+from paraflex.errors import OutputError, renamed
 from paraflex.files import library_text, model_schema
 from paraflex.writing import write_text
 
@@ -16,10 +16,8 @@ from paraflex.writing import write_text
 def new_command(request: NewRequest) -> None:
     """Write a commented model file of this name, to edit."""
     name, template = request.name, request.template
-    try:
+    with renamed("--from"):
         text = library_text(template)
-    except InputError as error:
-        raise error.at("--from") from None
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if path.exists():
         raise OutputError("there is one already", field=str(path), remedy="choose another name, or remove it")

@@ -13,7 +13,7 @@ from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.requests import conflict, flagged
-from paraflex.cli.request import asked_model, asked_of, at_fault, find_modes, find_path, of_assembly, plan_study
+from paraflex.cli.request import asked_model, asked_of, blaming, find_modes, find_path, of_assembly, plan_study
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed
@@ -49,16 +49,12 @@ class AskedModels(NamedTuple):
 def asked_models(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
     """What makes the linear models, once all that can be checked before is checked."""
     _check(request)
-    if _names_results(request.model.name):
+    name = request.model.name
+    if Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names()):
         return _of_results(request, command)
     model = asked_model(request.model)
     modes = _modes(model, request)
     return lambda: _models(model, modes, request, command)
-
-
-def _names_results(name: str) -> bool:
-    """Whether a name is that of results, not of a model."""
-    return Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names())
 
 
 def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
@@ -246,16 +242,12 @@ def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
         )
     compile_kernels_for(model.mechanism, plain_console(stderr=True).print)
     until = study.duration if request.along is not None or not request.at else request.at
-    try:
+    with blaming(model):
         return simulate_motion(
             model.mechanism, until, samples=_SAMPLES, torques=study.torques,
             start=model.start or request.assembly or study.assembly,
             options=study.integration({}),
         )  # fmt: skip
-    except AssemblyError as error:
-        raise of_assembly(error, model) from error
-    except InputError as error:
-        raise at_fault(error, model) from None
 
 
 def _in_motion(motion: Motion, mode: ActuationMode, at: float, ports: dict[str, Any]) -> LinearModel:

@@ -20,14 +20,14 @@ from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import model_parameters
 from paraflex.cli.reduced import asked_reduction, kept_coordinates
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import acting_controllers, asked_of, at_fault, controllers_said, of_assembly
+from paraflex.cli.request import acting_controllers, asked_of, blaming, controllers_said
 from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription, simulate_controlled_motion
 from paraflex.dynamics import State, build_system, standing_system
 from paraflex.dynamics.state import nearest_state
-from paraflex.errors import AssemblyError, ControllerError, InputError, IntegrationError, ResultWarning, ValidityWarning
+from paraflex.errors import ControllerError, InputError, IntegrationError, ResultWarning, ValidityWarning, renamed
 from paraflex.files import Model, StudyDefaults
 from paraflex.findings import DONE_STATUSES
 from paraflex.folders import RUN, ResultsFolder
@@ -155,7 +155,7 @@ def _simulate(
         progress.update(bar, completed=reached)
 
     try:
-        with begun_late(progress), warnings.catch_warnings():
+        with blaming(model), begun_late(progress), warnings.catch_warnings():
             begun = start or start_of(model, mechanism, study.assembly, balanced=balanced) or study.assembly
             # The table and the summary say what the run doubts.
             warnings.simplefilter("ignore", ValidityWarning)
@@ -163,10 +163,6 @@ def _simulate(
             return free_run(model, mechanism, options, controllers, begun, report)
     except (IntegrationError, ControllerError) as error:
         return error.partial
-    except AssemblyError as error:
-        raise of_assembly(error, model) from error
-    except InputError as error:
-        raise at_fault(error, model) from None
 
 
 def own_motion(model: Model, chosen: PlanChoice) -> StudyDefaults:
@@ -185,10 +181,8 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
     """The state the file describes, balanced if asked for; None for an assembly undeformed, moving with its drives."""
     if not balanced and model.start is None:
         return None
-    try:
+    with renamed("--balanced", only="balanced"):
         return state_at(standing_system(mechanism, model.start, assembly), model.start, assembly, balanced=balanced)
-    except InputError as error:
-        raise (error.at("--balanced") if error.field == "balanced" else error) from error
 
 
 def _ended(summary: dict) -> str:

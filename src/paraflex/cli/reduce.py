@@ -10,7 +10,7 @@ from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, pose_asked
 from paraflex.cli.reduce_tables import print_reduction
-from paraflex.errors import InputError
+from paraflex.errors import InputError, renamed
 from paraflex.folders import REDUCED_MODELS
 from paraflex.linear import PosesAlong, poses_along
 from paraflex.linear.reduced import ReductionMethod
@@ -45,11 +45,9 @@ def _along(found: AskedModels, request: ReduceRequest) -> list[PosesAlong]:
                              remedy="say how many poses: --along 21")  # fmt: skip
         return []
     pose = None if request.basis is None else pose_asked(found.model, request.basis, request.assembly, "--basis")
-    try:
+    with renamed("--along", only="count"):
         return [poses_along(motion, request.along, mode=mode, pose=pose, **found.ports)
                 for motion, mode in zip(found.motions, found.modes, strict=True)]  # fmt: skip
-    except InputError as error:
-        raise (error.at("--along") if error.field == "count" else error) from None
 
 
 _COMMAND = DatasetCommand(REDUCED_MODELS, ("reduced.nc", "reduced.json"), reduction_summary, print_reduction, doubts=())

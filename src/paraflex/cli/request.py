@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
@@ -10,7 +11,7 @@ from paraflex.cli.commands.options import FramesChoice, ModelChoice, PlanChoice
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.control.described import NONE, ControllerDescription
-from paraflex.errors import AssemblyError, InputError, UnreachablePathError
+from paraflex.errors import AssemblyError, InputError, UnreachablePathError, renamed
 from paraflex.files import Model, load, load_path
 from paraflex.files.outside import may_be_outside
 from paraflex.files.overlay import value_of
@@ -68,10 +69,8 @@ def find_paths(model: Model, names: Sequence[str]) -> dict[str, EndEffectorPath]
 
 def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
     """The modes asked for, or the study's."""
-    try:
+    with renamed("--mode"):
         modes = model.modes(names)
-    except InputError as error:
-        raise error.at("--mode") from None
     if not modes:
         raise InputError(
             "no actuation mode to run",
@@ -83,10 +82,8 @@ def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
 
 def acting_controllers(model: Model, request: RunRequest) -> tuple[ControllerDescription, ...]:
     """The controllers asked for, or the study's."""
-    try:
+    with blaming(model):
         found = model.acting(request.controllers)
-    except InputError as error:
-        raise (error.at("--controller") if error.field == "controllers" else error.in_file(model.source)) from None
     if found and request.ked:
         raise InputError(
             "means nothing with --ked, which holds motors on the rigid motion", field="--controller",
@@ -120,14 +117,22 @@ def plan_study(
     after: str | None = None,
 ) -> TrackingTask:
     """The study, planned; errors name the option or the field at fault."""
+    with blaming(model):
+        try:
+            return model.plan(path, mechanism=mechanism, **asdict(chosen), after=after, warning=False)
+        except UnreachablePathError as error:
+            raise InputError(error.problem, field=f"path.{path_name}", remedy=error.remedy) from error
+
+
+@contextmanager
+def blaming(model: Model) -> Iterator[None]:
+    """Context whose errors of input, and of a mechanism that cannot be put together, name the option or file."""
     try:
-        return model.plan(path, mechanism=mechanism, **asdict(chosen), after=after, warning=False)
+        yield
     except AssemblyError as error:
-        if not isinstance(error, UnreachablePathError):
-            raise of_assembly(error, model) from error
-        raise InputError(error.problem, field=f"path.{path_name}", remedy=error.remedy, source=model.source) from error
+        raise of_assembly(error, model) from error
     except InputError as error:
-        raise at_fault(error, model) from None
+        raise at_fault(error, model) from error.__cause__
 
 
 def of_assembly(error: AssemblyError, model: Model) -> InputError:
@@ -144,6 +149,7 @@ def at_fault(error: InputError, model: Model) -> InputError:
         "samples": "--samples",
         "tolerance": "--tol",
         "method": "--method",
+        "controllers": "--controller",
         "assembly": "--assembly",
         "after": "--after",
         "events": "--stop-at",

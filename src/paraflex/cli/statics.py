@@ -15,7 +15,7 @@ from paraflex.cli.request import asked_model, asked_of, of_assembly
 from paraflex.cli.statics_tables import print_statics
 from paraflex.equilibria import Statics, StaticsDefaults, statics
 from paraflex.equilibria.given import coordinate_named
-from paraflex.errors import AssemblyError, EquilibriumError, InputError
+from paraflex.errors import AssemblyError, EquilibriumError, InputError, renamed
 from paraflex.files import Model
 from paraflex.files.fields import number_in
 from paraflex.folders import EQUILIBRIA
@@ -95,10 +95,8 @@ def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
 
 
 def _in_unit(text: str, unit: str, field: str) -> float:
-    try:
+    with renamed(field):
         return number_in(text, unit)
-    except InputError as error:
-        raise error.at(field) from None
 
 
 def _parameters(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> dict[str, Any]:

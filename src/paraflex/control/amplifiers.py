@@ -93,14 +93,12 @@ def largest_commands(mechanism: Mechanism, motors: tuple[str, ...]) -> Array:
 
     n k_t I under a current loop, n k_t U/R of a voltage.
     """
-    found = actuators_by_motor(mechanism)
-    return np.array([_largest_command(found.get(name)) for name in motors])
-
-
-def _largest_command(actuator: Actuator | None) -> float:
-    per_current, _, resistance, voltage, current = _numbers(actuator)
-    imposes_voltage = actuator is not None and actuator.imposes_voltage
-    return per_current * (voltage / resistance if imposes_voltage else current)
+    found, largest = actuators_by_motor(mechanism), []
+    for actuator in map(found.get, motors):
+        per_current, _, resistance, voltage, current = _numbers(actuator)
+        imposes_voltage = actuator is not None and actuator.imposes_voltage
+        largest.append(per_current * (voltage / resistance if imposes_voltage else current))
+    return np.array(largest)
 
 
 def relaxing(base: InputSignals, t: float, begin: float, target: float, lag: float) -> InputSignals:

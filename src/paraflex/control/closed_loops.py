@@ -17,7 +17,7 @@ from paraflex.arrays import Array
 from paraflex.control.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.control.reach import frequency_of
 from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
-from paraflex.errors import InputError, ResultWarning, warn_user
+from paraflex.errors import InputError, ResultWarning, warn_user, within
 from paraflex.linear.named import places_in_s
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import positive
@@ -288,10 +288,8 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
         raise InputError("there is no model", field="models", remedy="name one")
     loops = {}
     for name, model in models.items():
-        try:
+        with within(f"models.{name}"):
             loops[name] = closed_loop(model, controller, **settings)
-        except InputError as error:
-            raise error.within(f"models.{name}") from None
     rows = {
         name: {
             "stable": one.stable, "spectral_radius": one.spectral_radius, "frequency": one.slowest[0],

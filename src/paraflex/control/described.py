@@ -11,7 +11,7 @@ import numpy as np
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.control.described_laws import LawNames, of_names
 from paraflex.control.together import Numbers, check_distinct, check_name, check_whole, multiple_of
-from paraflex.errors import InputError
+from paraflex.errors import InputError, renamed, within
 from paraflex.mechanism import AngleLaw, Mechanism
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.measured import encoders_of, measured_sensors
@@ -81,11 +81,9 @@ class ControllerDescription(CheckedFields):
         motors = [motor.name for motor in mechanism.motors]
         sensors = [sensor.name for sensor in measured_sensors(mechanism)]
         encoders = encoders_of(mechanism, self.outputs or motors)
-        try:
-            points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+        points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+        with within(f"{TABLE}.{self.name}"):
             self._check(LawNames(self.inputs, self.outputs, sensors, motors, encoders, points))
-        except InputError as error:
-            raise error.within(f"{TABLE}.{self.name}") from None
 
     def _check(self, names: LawNames) -> None:
         for field_name, all_names, what in (("inputs", names.sensors, "sensor"), ("outputs", names.motors, "motor")):
@@ -142,10 +140,8 @@ def check_controllers(controllers: Mapping[str, ControllerDescription], mechanis
         And a name that stands for none.
     """
     for name, one in controllers.items():
-        try:
+        with renamed(TABLE):
             check_name(name)
-        except InputError as error:
-            raise error.at(TABLE) from None
         if name == NONE:
             raise InputError("is the word for no controller", field=f"{TABLE}.{name}", remedy="call it otherwise")
         one.check(mechanism)
@@ -160,12 +156,10 @@ def check_together(controllers: Iterable[ControllerDescription]) -> None:
         A period that is no multiple of the shortest, or two laws each of which gives the whole torque.
     """
     several = list(controllers)
-    try:
+    with within(TABLE):
         for one in several:
             multiple_of(one.name, one.period, min(each.period for each in several))
         check_whole([one.name for one in several if one.whole_torque])
-    except InputError as error:
-        raise error.within(TABLE) from None
 
 
 def _functions(reference: Any) -> Any:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields
 from paraflex.control.together import Numbers
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import all_known, known
@@ -48,7 +49,7 @@ class LawNames(NamedTuple):
     points: Sequence[str]
 
 
-class DescribedLaw(Protocol):
+class DescribedLaw(CheckedFields, ABC):
     """What computes torques from readings, as a file describes it; a kind of law is such a class in `LAWS`.
 
     Attributes
@@ -60,8 +61,9 @@ class DescribedLaw(Protocol):
     """
 
     kind: ClassVar[str]
-    whole_torque: ClassVar[bool]
+    whole_torque: ClassVar[bool] = False
 
+    @abstractmethod
     def check(self, names: LawNames) -> None:
         """Check its numbers and names.
 
@@ -70,16 +72,14 @@ class DescribedLaw(Protocol):
         InputError
             A number that makes no sense, an unknown motor.
         """
-        ...
 
+    @abstractmethod
     def made(self, outputs: Sequence[str], period: float) -> Any:
         """A law for `SampledController` that drives some motors."""
-        ...
 
 
-@given_as("a law", "a description of a law such as PIDDescription")
 @dataclass(frozen=True)
-class PIDDescription(CheckedFields):
+class PIDDescription(DescribedLaw):
     """A PID law of the angles of motors, with feedback of errors from the planned motion: see `JointPID`.
 
     Attributes
@@ -93,7 +93,6 @@ class PIDDescription(CheckedFields):
     """
 
     kind: ClassVar[str] = "pid"
-    whole_torque: ClassVar[bool] = False
     stiffness: Numbers
     damping: Numbers = 0.0
     integral: Numbers = 0.0
@@ -118,9 +117,8 @@ class PIDDescription(CheckedFields):
         return JointPID(**gains, project=self.project, cutoff=self.cutoff)
 
 
-@given_as("a law", "a description of a law such as PIDDescription")
 @dataclass(frozen=True)
-class StateSpaceDescription(CheckedFields):
+class StateSpaceDescription(DescribedLaw):
     """A discrete model in state space: x_k+1 = A x_k + B y_k, torques C x_k + D y_k.
 
     Attributes
@@ -134,7 +132,6 @@ class StateSpaceDescription(CheckedFields):
     """
 
     kind: ClassVar[str] = "state-space"
-    whole_torque: ClassVar[bool] = False
     _own = ("A", "B", "C", "D")
     D: Rows
     A: Rows = ()
@@ -170,9 +167,8 @@ class StateSpaceDescription(CheckedFields):
         return DiscreteModel(*matrices_of(self), period, (), ())
 
 
-@given_as("a law", "a description of a law such as PIDDescription")
 @dataclass(frozen=True)
-class ComputedTorqueDescription(CheckedFields):
+class ComputedTorqueDescription(DescribedLaw):
     """Computed torque of the rigid mechanism in task space: see `ComputedTorque`.
 
     Attributes
@@ -202,9 +198,8 @@ class ComputedTorqueDescription(CheckedFields):
         return ComputedTorque(self.frequency, self.damping_ratio, cutoff=self.cutoff)
 
 
-@given_as("a law", "a description of a law such as PIDDescription")
 @dataclass(frozen=True)
-class RateFeedbackDescription(CheckedFields):
+class RateFeedbackDescription(DescribedLaw):
     """Feedback of rates of readings: see `RateFeedback`.
 
     Attributes
@@ -216,7 +211,6 @@ class RateFeedbackDescription(CheckedFields):
     """
 
     kind: ClassVar[str] = "rate-feedback"
-    whole_torque: ClassVar[bool] = False
     gains: Mapping[str, Mapping[str, float]]
     cutoff: float | None = None
 
@@ -239,9 +233,8 @@ class RateFeedbackDescription(CheckedFields):
         return RateFeedback(_some_of(self.gains, outputs, "gains"), cutoff=self.cutoff)
 
 
-@given_as("a law", "a description of a law such as PIDDescription")
 @dataclass(frozen=True)
-class LQGDescription(CheckedFields):
+class LQGDescription(DescribedLaw):
     """LQG designed as a run starts, on the linear model of the mechanism in its mode: see `DesignedLQG`.
 
     Attributes
@@ -266,7 +259,6 @@ class LQGDescription(CheckedFields):
     """
 
     kind: ClassVar[str] = "lqg"
-    whole_torque: ClassVar[bool] = False
     deviations: Mapping[str, float]
     effort: Numbers
     noise: Numbers | None = None

@@ -138,13 +138,10 @@ def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
         It is continuous.
     """
     if dt is None or (dt is not True and not dt > 0.0):
+        # The method that discretises a continuous model has one name in SciPy, the other in python-control.
+        method = "to_discrete" if hasattr(given, "to_discrete") else "sample"
         raise InputError("is a continuous model", field=field, value=given,
-                         remedy=f"discretise it, say {name}.{_sampling(given)}(1e-3)")  # fmt: skip
-
-
-def _sampling(given: Any) -> str:
-    """Name of the method that discretises a continuous model: `sample` in python-control, `to_discrete` in SciPy."""
-    return "to_discrete" if hasattr(given, "to_discrete") else "sample"
+                         remedy=f"discretise it, say {name}.{method}(1e-3)")  # fmt: skip
 
 
 def matrices_of(model: Any) -> StateSpace:

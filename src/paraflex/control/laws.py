@@ -96,7 +96,11 @@ class JointPID:
         self._rates = BackwardDifference(plant.period, self._cutoff)
         self._sum = np.zeros(len(plant.outputs))
         self._wanted = np.zeros(len(plant.outputs))
-        self._projector = projectors(plant) if self._project and plant.task is not None else None
+        self._projector: AtSamples | None = None
+        if self._project and plant.task is not None:
+            # P (outputs, outputs) of its motors on the planned motion, at its samples.
+            effort = required_effort(planned_motion(plant))
+            self._projector = AtSamples(plant, torque_projectors(effort, plant.outputs))
 
     @checked_arguments()
     def sampled(self, period: float, mechanism: Mechanism, motors: Sequence[str] | None = None) -> DiscreteModel:
@@ -159,17 +163,6 @@ def _pid(Kp: Array, Kd: Array, Ki: Array, rates: BackwardDifference) -> LinearLa
         D=-(np.diag(Kp) + Kd[:, None] * one.D + gain),
         first=np.vstack([one.first, np.zeros_like(summed)]),
     )
-
-
-def projectors(plant: Plant) -> AtSamples:
-    """P = B^+ B (outputs, outputs) of a plant's motors on its planned motion, at the samples of its controller.
-
-    Raises
-    ------
-    InputError
-        There is no plan.
-    """
-    return AtSamples(plant, torque_projectors(required_effort(planned_motion(plant)), plant.outputs))
 
 
 def torque_projectors(effort: Effort, motors: Sequence[str]) -> Array:

@@ -269,8 +269,12 @@ class Loop:
 
     def _record(self, k: int, units: Callable[[str], str]) -> ControllerRecord:
         controller, plant = self.controllers[k], self._plants[k]
-        done = list(zip(*self.kept[k], strict=True)) if self.inside is None else _done(self.inside)
-        t, readings, wanted, given = done or [()] * 4
+        inside = self.inside
+        if inside is None:
+            t, readings, wanted, given = list(zip(*self.kept[k], strict=True)) or [()] * 4
+        else:
+            kept = (inside.t, inside.readings, inside.wanted, inside.given)
+            t, readings, wanted, given = (each[: inside.counts[SAMPLED]] for each in kept)
         law, limits, rates = _bounds(controller, len(plant.outputs))
         return ControllerRecord(
             name=self.names[k],
@@ -320,11 +324,6 @@ def _raised(name: str, error: Exception) -> LawFailure:
 
 def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
     return LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(motors)}')
-
-
-def _done(inside: SampledLaw) -> list[Array]:
-    """Samples of a controller in the compiled time loop so far: times, readings, torques wanted and given."""
-    return [each[: inside.counts[SAMPLED]] for each in (inside.t, inside.readings, inside.wanted, inside.given)]
 
 
 def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -> Controller:

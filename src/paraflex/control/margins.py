@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -182,20 +182,15 @@ def _roots(function: Callable[[float], float], grid: Array, values: Array) -> Ar
 def _peak(function: Callable[[float], float], grid: Array, values: Array) -> tuple[float, float]:
     """Where a function is largest, and how large: the highest points of a grid, refined."""
     best: tuple[float, float] = (float(grid[np.argmax(values)]), float(np.max(values)))
-    for k in _highest(values):
-        if 0 < k < len(grid) - 1:
-            # Measured from the grid's point, as the search is no finer than 1e-8 of its variable.
-            middle, width = grid[k], grid[k + 1] - grid[k - 1]
-            found = scipy.optimize.minimize_scalar(
-                lambda part, middle=middle, width=width: -function(middle + width * part),
-                bounds=tuple((grid[[k - 1, k + 1]] - middle) / width), method="bounded", options={"xatol": 1e-9},
-            )  # fmt: skip
-            if -found.fun > best[1]:
-                best = float(middle + width * found.x), float(-found.fun)
-    return best
-
-
-def _highest(values: Array) -> Sequence[int]:
-    """The three highest local maxima among values (k,)."""
     inner = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])) + 1
-    return [int(k) for k in inner[np.argsort(-values[inner])][:3]]
+    # The three highest local maxima.
+    for k in inner[np.argsort(-values[inner])][:3]:
+        # Measured from the grid's point, as the search is no finer than 1e-8 of its variable.
+        middle, width = grid[k], grid[k + 1] - grid[k - 1]
+        found = scipy.optimize.minimize_scalar(
+            lambda part, middle=middle, width=width: -function(middle + width * part),
+            bounds=tuple((grid[[k - 1, k + 1]] - middle) / width), method="bounded", options={"xatol": 1e-9},
+        )  # fmt: skip
+        if -found.fun > best[1]:
+            best = float(middle + width * found.x), float(-found.fun)
+    return best

@@ -67,7 +67,10 @@ class Observer:
         self._deviations = _by_sensor(noise, names, "noise", 0.0)
         self._resolution = _by_sensor(quantise, names, "quantise", 0.0)
         scale = _by_sensor(scales, names, "scales", 1.0)
-        _check_ahead(ahead, task)
+        if ahead and task is None:
+            raise InputError("there is no plan to look ahead in", field="ahead", value=ahead, remedy="leave it out")
+        if not all(np.isfinite(time) and time > 0.0 for time in ahead):
+            raise InputError("not positive numbers", field="ahead", value=ahead, remedy="give times in seconds")
         self._planned = np.zeros((times.size, len(names)))
         self._changes = np.zeros((times.size, 0))
         self.names: tuple[str, ...] = names
@@ -113,13 +116,6 @@ def _planned(task: TrackingTask, mechanism: Mechanism, names: tuple[str, ...], t
     """Planned readings (k,) at times (k,), those of the end after it."""
     motion = task.plan.follow(np.minimum(times, task.motion.t[-1]))
     return readings_of(motion, mechanism, names)
-
-
-def _check_ahead(ahead: Sequence[float], task: TrackingTask | None) -> None:
-    if ahead and task is None:
-        raise InputError("there is no plan to look ahead in", field="ahead", value=ahead, remedy="leave it out")
-    if not all(np.isfinite(time) and time > 0.0 for time in ahead):
-        raise InputError("not positive numbers", field="ahead", value=ahead, remedy="give times in seconds")
 
 
 def _by_sensor(given: Mapping[str, float] | None, names: tuple[str, ...], field: str, otherwise: float) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 
 from paraflex.control.described import TABLE, ControllerDescription, check_controllers
 from paraflex.control.described_laws import LAWS
-from paraflex.errors import InputError, within
+from paraflex.errors import InputError, renamed, within
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components
 from paraflex.files.said import fields_said, unsayable
@@ -48,10 +48,8 @@ def _read(
 
 def _reference(sensor: str, given: Any, parameters: Mapping[str, float], duration: float | None) -> InTime:
     """A reading that is wanted, in the words that torques of motors have."""
-    try:
+    with renamed(f"reference.{sensor}"):
         return read_components(TorqueTable.model_construct(torque=given), "torque", parameters, duration)[0]
-    except InputError as error:
-        raise error.at(f"reference.{sensor}") from None
 
 
 def controller_table(one: ControllerDescription) -> dict[str, Any]:

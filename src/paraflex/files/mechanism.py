@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from typing import Any
+from typing import Any, cast
 
 from paraflex.control.shaped import ShapedPath
 from paraflex.control.shaping import Shaper, ShaperKind
@@ -14,7 +14,6 @@ from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import quantities, read_components, read_law
 from paraflex.files.said import check_fields
 from paraflex.files.schema import (
-    AssemblyTable,
     JointTable,
     ModelTable,
     PathTable,
@@ -82,7 +81,7 @@ def read_mechanism(table: ModelTable) -> Mechanism:
         motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
         prescribed=_prescribed(table),
         end_effector=None if effector is None else EndEffector(**dict(effector)),
-        assemblies=tuple(_assembly(name, one) for name, one in table.assembly.items()),
+        assemblies=tuple(Assembly(name, one.angles, cast(Any, one.points)) for name, one in table.assembly.items()),
         modes=tuple(ActuationMode(name, tuple(motors)) for name, motors in table.mode.items()),
     )
     return mechanism if table.payload is None else mechanism.with_payload(Payload(**dict(table.payload)))
@@ -123,11 +122,6 @@ def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointT
             f"a {kind} joint has no {wrong}", field=f"prescribed.{name}.{wrong}", value=entry.joint,
             remedy=f"give its {right}",
         )  # fmt: skip
-
-
-def _assembly(name: str, entry: AssemblyTable) -> Assembly:
-    points: Any = entry.points
-    return Assembly(name, entry.angles, points)
 
 
 def _load(_: Group, name: str, entry: Any, table: ModelTable) -> Load:

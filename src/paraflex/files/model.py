@@ -12,7 +12,7 @@ from paraflex.control.described import NONE, ControllerDescription, check_togeth
 from paraflex.control.shaped import shape_torques
 from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults, conditions
-from paraflex.errors import InputError, suggestion, within
+from paraflex.errors import InputError, renamed, suggestion, within
 from paraflex.files.controllers import read_controllers
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
@@ -420,10 +420,8 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
         start=start, text=text,
         statics=_statics(table, mechanism), controllers=read_controllers(table, mechanism),
     )  # fmt: skip
-    try:
+    with renamed("study.controllers", only="controllers"):
         model.acting()
-    except InputError as error:
-        raise (error.at("study.controllers") if error.field == "controllers" else error) from None
     return model
 
 

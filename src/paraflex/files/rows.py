@@ -84,7 +84,8 @@ def _entries(data: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any], tupl
     for group in ("prescribed", "load"):
         for name, entry in _tables(data.get(group)):
             yield (group, name), entry, _THREE if group == "load" and entry.get("type") == "force" else _TWO
-    for name, entry in _tables(_of_study(data)):
+    study = data.get("study")
+    for name, entry in _tables(study.get("torques") if isinstance(study, dict) else None):
         yield ("study", "torques", name), entry, _TWO
     paths: Any = data.get("path")
     # A file of one path has it in place of its name.
@@ -93,10 +94,6 @@ def _entries(data: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any], tupl
         return
     for name, entry in _tables(paths):
         yield ("path", name), entry, _PATH
-
-
-def _of_study(data: dict[str, Any]) -> Any:
-    return study.get("torques") if isinstance(study := data.get("study"), dict) else None
 
 
 def _tables(given: Any) -> list[tuple[str, dict[str, Any]]]:

@@ -180,10 +180,7 @@ def _number_or_word(words: Sequence[str]) -> Any:
             if not words:
                 return value
             raise _refused("neither such a word nor a number", 'an angle may have a unit, "30 deg"')
-        try:
-            return evaluate(value, _parameters(info))
-        except ExpressionError as error:
-            raise _refused(error.problem, error.remedy) from None
+        return _number(value, info)
 
     numbers: Any = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
     return Annotated[numbers | (Literal[tuple(words)] if words else Text),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from paraflex.control.shaping import Shaper
-from paraflex.errors import InputError, within
+from paraflex.errors import InputError, renamed, within
 from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions, check_times, find_method
 from paraflex.kinematics import Path
 from paraflex.mechanism import Mechanism, parse_mode
@@ -119,10 +119,8 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
         if study.paths.count(name) > 1:
             raise InputError("is named twice", field="study.paths", value=name, remedy="name each path once")
     for mode in study.modes:
-        try:
+        with renamed("study.modes"):
             parse_mode(mechanism, mode)
-        except InputError as error:
-            raise error.at("study.modes") from error
     if study.shaper is not None and not paths:
         raise InputError(
             "is for torques planned along a path, and the model has none", field="study.shaper",

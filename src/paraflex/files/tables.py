@@ -24,7 +24,6 @@ from paraflex.mechanism import (
     AssumedModesBeam,
     Body,
     FlexibleBeam,
-    Joint,
     Mechanism,
     ModalBody,
     PointForce,
@@ -87,7 +86,10 @@ def model_tables(
         "ground": mechanism.ground,
         "gravity": [] if tuple(mechanism.gravity) == (0.0, 0.0) else mechanism.gravity,
         "body": {body.name: _body(body, names, shared) for body in mechanism.bodies},
-        "joint": {joint.name: _joint(joint) for joint in mechanism.joints},
+        "joint": {
+            joint.name: [joint.a, joint.b] if joint.kind == "revolute" else {"type": joint.kind, **_member(joint)}
+            for joint in mechanism.joints
+        },
         "motor": {motor.name: motor.joint for motor in mechanism.motors},
         "prescribed": {each.name: _prescribed(each, mechanism) for each in mechanism.prescribed},
         **_forces(mechanism),
@@ -269,10 +271,6 @@ def _functions(functions: Sequence[ShapeFunction], field: str, direction: str) -
         raise unsayable(field, functions, "give the sines from 1 on without gaps, then the polynomials")
     said = {f"{direction}_sines": len(sines), f"{direction}_polynomials": polynomials}
     return {key: value for key, value in said.items() if value}
-
-
-def _joint(joint: Joint) -> Any:
-    return [joint.a, joint.b] if joint.kind == "revolute" else {"type": joint.kind, **_member(joint)}
 
 
 def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -105,12 +106,9 @@ def beam_end_functions(system: System) -> tuple[EventFunction, ...]:
     functions = []
     for end in beam_ends(system.mechanism):
         margin = _AT_END * end.length
-        functions.append(EventFunction(end, _place(system, end.joint), -margin, end.length + margin, "m"))
+        place = partial(place_along_beam, system, end.joint)
+        functions.append(EventFunction(end, place, -margin, end.length + margin, "m"))
     return tuple(functions)
-
-
-def _place(system: System, joint: str) -> Callable[[Array], Array]:
-    return lambda q: place_along_beam(system, joint, q)
 
 
 def _event_function(system: System, q: Array, event: Event) -> EventFunction:

@@ -47,15 +47,12 @@ class OdeForm:
     ----------
     signals : Signals
         What acts, as steps may see it: exchanged at jumps.
-    evaluations : int
-        Of the equations until now.
     """
 
     def __init__(self, problem: Problem, options: IntegrationOptions) -> None:
         system = problem.system
         self.system = system
         self.signals: Signals = problem.signals
-        self.evaluations: int = 0
         self._weights = (1.0, 2.0 * options.alpha, options.beta**2)
         self._torques, self._ws = np.zeros(inputs_of(system.mechanism).acting), system.workspace()
         self._a, self._lam, self._tangent = np.zeros(system.n), np.zeros(system.m), make_tangent(system.packed)
@@ -64,9 +61,6 @@ class OdeForm:
     def size(self) -> int:
         """Number of unknowns."""
         return 2 * self.system.n + 1
-
-    def _count(self) -> None:
-        self.evaluations += 1
 
     def solve(self, t: float, q: Array, v: Array) -> Solved:
         """Accelerations and multipliers."""
@@ -84,7 +78,6 @@ class OdeForm:
             self.system.packed, self.signals, t, self._weights, np.array(y), self._a, self._lam, self._torques,
             self._ws, DEPENDENT_PART, dy,
         )  # fmt: skip
-        self._count()
         return dy
 
     def jacobian(self, t: float, y: Array) -> Array:
@@ -149,7 +142,6 @@ class DescriptorForm(OdeForm):
         """Residual into out (size,)."""
         arguments = (np.array(y), np.array(dy), self._dropped, self._torques, self._ws, out)
         descriptor_residual(self.system.packed, self.signals, t, self._weights, *arguments)
-        self._count()
 
     def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
         """Derivative of the residual by y, plus c times that by dy, in a new array."""
@@ -188,7 +180,6 @@ class StabilisedForm(DescriptorForm):
         arguments = (self._weight, self._torques, self._idle, self._ws, self._tangent, self._phi, self._dphi, out)
         packed, signals = self.system.packed, self.signals
         stabilised_residual(packed, signals, t, np.array(y), np.array(dy), self._dropped, *arguments)
-        self._count()
 
     def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
         """See `DescriptorForm`."""

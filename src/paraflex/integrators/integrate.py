@@ -277,7 +277,10 @@ class Integration:
         mesh = elements_too_few(system, run.problem.limits)
         findings = (*self._ends.findings(solution.q), *filter(None, [self._loose, few]), *mesh)
         solution = replace(solution, findings=findings)
-        _refuse_beam_end(solution, self._crossing)
+        end = None if self._crossing is None else self._crossing.function.event
+        if self._crossing is not None and isinstance(end, BeamEnd) and end.at_end is AtEnd.ERROR:
+            moment = Moment(self._crossing.t, solution.steps)
+            raise _failed(SliderOffBeamError(self._crossing.reached, moment, solution, STAY_ON_BEAM))
         if self.goes_on or self.status in ("interrupted", "stopped"):
             return solution
         raise _failed(self._error(solution))
@@ -317,8 +320,11 @@ class Integration:
             error, cause = SingularPositionError, f"the constraints lose rank, a singular position ({rows}),"
             remedy = _AROUND if options.method.family is Family.ESDIRK else _PASSING_METHODS
         elif run.singular_ahead is not None and code in (NO_CONVERGENCE, ERROR_TEST):
-            error, cause = SingularPositionError, _before_singular(options.method.name, run.singular_ahead)
-            remedy = _PASSING_METHODS
+            error, remedy = SingularPositionError, _PASSING_METHODS
+            cause = (
+                f"a singular position lies ahead, at about t = {run.singular_ahead:.4g} s, which {options.method.name} "
+                "on index-3 equations cannot be relied on to pass; stopped"
+            )
         moment = Moment(now.t, solution.steps + (0 if self._begun is None else self._begun.steps))
         return error(cause, moment, solution, remedy)
 
@@ -327,16 +333,6 @@ def _failed(error: IntegrationError) -> IntegrationError:
     """An error with its partial solution, in which the message is that of the error."""
     error.partial = replace(error.partial, status="failed", message=str(error))
     return error
-
-
-def _refuse_beam_end(solution: Solution, crossing: Crossing | None) -> None:
-    """Raise if a run ends at the end of a beam and its joint has `at_end` "error"."""
-    if crossing is None or not (
-        isinstance(crossing.function.event, BeamEnd) and crossing.function.event.at_end is AtEnd.ERROR
-    ):
-        return
-    moment = Moment(crossing.t, solution.steps)
-    raise _failed(SliderOffBeamError(crossing.reached, moment, solution, STAY_ON_BEAM))
 
 
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
@@ -351,13 +347,6 @@ def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:
         remedy = "allow more steps (max_steps), or choose a coarser tolerance or a shorter duration"
         return Breakdown(f"the run has not ended after {most} steps,", remedy)
     return _NOT_IN_PARTS if code == NO_CONVERGENCE and options.step is not None else CAUSES[code]
-
-
-def _before_singular(method: str, time: float) -> str:
-    return (
-        f"a singular position lies ahead, at about t = {time:.4g} s, which {method} on index-3 equations cannot be "
-        "relied on to pass; stopped"
-    )
 
 
 def _singular_start(run: Run, times: Array, q: Array) -> Array:

@@ -30,11 +30,6 @@ def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:
     return np.array([t for t in knots if any(_jumps(signals, k, t, derivatives) for k, derivatives in looked_at)])
 
 
-def hidden_from(signals: Signals, time: float) -> Signals:
-    """The same signals, each continued smoothly after a time."""
-    return signals._replace(breaks=np.where(signals.breaks >= time, np.inf, signals.breaks))
-
-
 def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
     first, last = int(signals.start[k]), int(signals.start[k + 1]) - 1
     breaks = signals.breaks[first:last]

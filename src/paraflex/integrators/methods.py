@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, suggestion, within
 from paraflex.integrators.guests import BDF as BDF, IDA as IDA, NDF as NDF, RK45 as RK45, Adams as Adams, Radau as Radau
 from paraflex.integrators.method import Family as Family, Method as Method, Treatment as Treatment
 from paraflex.integrators.newmark import (
@@ -70,10 +70,8 @@ def find_method(given: str | Method, parameters: Mapping[str, float] | None = No
                 f"no parameter of {found}", field="parameters", value=name,
                 remedy=suggestion(name, found.parameters) + (f"; it is one of {others}" if others else ""),
             )  # fmt: skip
-    try:
+    with within("parameters"):
         return type(found)(**{name: _whole(x) for name, x in parameters.items()}) if parameters else found
-    except InputError as error:
-        raise error.within("parameters") from None
 
 
 def title_of(name: str) -> str:

@@ -62,7 +62,9 @@ NEAR_ERROR = 0.01
 LEAST_NEAR_ERROR = 8e-11
 # A singular position is near that could be reached in this fraction of the time since the start.
 _NEAR_AHEAD = 0.2
-# Steps are long beside vibrations from so many radians of the slowest one of the mechanism on.
+# Steps are long beside vibrations from so many radians of the slowest one of the mechanism on, all where no body is
+# flexible. Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them.
+# What they follow is slower the more mass a beam carries.
 _FOLLOWS = 20.0
 # The smallest step, as a fraction of the run, and in units of the clock's last digit: by so little a step may differ
 # from what the clock moves by.
@@ -171,7 +173,7 @@ class NativeRun:
 
     def figures(self) -> Figures:
         """See `Run`."""
-        state = self.state
+        state, estimated = self.state, self.scheme.error.size and not self.controls.fixed_step
         return Figures(
             steps=int(state.counts[STEPS]),
             rejected=int(state.counts[REJECTED]),
@@ -182,14 +184,8 @@ class NativeRun:
             constraint_velocity_max=float(state.clock[DPHI_MAX]),
             energy_balance_max=float(state.clock[BALANCE]),
             passages=state.passages[:, : state.counts[PASSAGES]],
-            multiplier_errors=self._multiplier_errors(),
+            multiplier_errors=_FORCE_SAFETY * state.forces[UNRESOLVED] if estimated else None,
         )
-
-    def _multiplier_errors(self) -> Array | None:
-        """See `Solution`."""
-        if self.controls.fixed_step or not self.scheme.error.size:
-            return None
-        return _FORCE_SAFETY * self.state.forces[UNRESOLVED]
 
     def until(self, time: float) -> NativeRun:
         """The same run, whose steps end at a time before its end, where it pauses."""
@@ -254,21 +250,6 @@ def _turning(system: System) -> NDArray[np.int64]:
     return np.array([body.angle for body, one in zip(system.bodies, matters, strict=True) if one], dtype=np.int64)
 
 
-def _long_from(system: System, q: Array) -> float:
-    """Length of steps from which on they are long beside vibrations: all are where no body is flexible.
-
-    Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them. What they
-    follow is slower the more mass a beam carries.
-    """
-    return _FOLLOWS / slowest_deflection(system, q)
-
-
-def _least_step(problem: Problem) -> float:
-    """The smallest step of a run, however large its times [s]."""
-    latest = max(abs(problem.initial.time), abs(float(problem.stops[-1])))
-    return max(_LEAST * problem.span, _DIGITS * float(np.spacing(latest)))
-
-
 def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     """Set up a run."""
     system, initial, span = problem.system, problem.initial, problem.span
@@ -288,6 +269,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     state.clock[TIME], state.clock[STEP] = initial.time, min(first, options.max_step)
     state.clock[CYCLE] = span
     tolerance, phase = options.tolerance_for(system), _PHASES[min(method.order, 4)]
+    latest = max(abs(initial.time), abs(float(problem.stops[-1])))
     controls = Controls(
         tolerance=tolerance,
         span=span,
@@ -295,14 +277,14 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         force_part=options.force_part(system),
         force_control=int(options.control_for(system) is Control.FORCES),
         force_cycles=_FORCE_CYCLES if system.vibrations_die_out else np.inf,
-        long_from=_long_from(system, initial.q),
+        long_from=_FOLLOWS / slowest_deflection(system, initial.q),
         newton_fraction=options.newton_fraction or method.newton_fraction,
         alpha=options.alpha,
         beta=options.beta,
         gain=_BAUMGARTE_GAIN if options.automatic_gains else 0.0,
         treatment=treatment,
         fixed_step=options.step or 0.0,
-        least_step=_least_step(problem),
+        least_step=max(_LEAST * span, _DIGITS * float(np.spacing(latest))),
         max_step=options.max_step,
         near_error=max(NEAR_ERROR * tolerance, LEAST_NEAR_ERROR * system.size),
         turning=_turning(system),

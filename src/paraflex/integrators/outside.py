@@ -123,7 +123,9 @@ class OutsideRun:
         q, v, work = stepper.form.unpack(stepper.y)
         solved = stepper.form.solve(stepper.t, q, v)
         if solved.dependent > self.dependent_rows:
-            self._note_passage(before, stepper.t)
+            # Adjacent steps are of one interval of a singular position.
+            goes_on = self._passages and before <= self._passages[-1][1]
+            self._passages.append((self._passages.pop()[0] if goes_on else before, stepper.t))
         self._instant = Instant(stepper.t, q, v, solved.a, solved.multipliers, work)
         self._note(self._instant)
         times = self.samples.times
@@ -145,12 +147,6 @@ class OutsideRun:
         self._violation = np.maximum(self._violation, largest)
         change = self._energies(instant) - self._energy
         self._balance = max(self._balance, abs(change[0] + change[1] - change[2] - instant.work))
-
-    def _note_passage(self, t0: float, t1: float) -> None:
-        """Record the interval of a singular position; adjacent steps are of one interval."""
-        if self._passages and t0 <= self._passages[-1][1]:
-            t0 = self._passages.pop()[0]
-        self._passages.append((t0, t1))
 
     def _sample(self, t: float, q: Array, v: Array, work: float) -> None:
         out, i, solved = self.samples, self.reached, self._stepper.form.solve(t, q, v)

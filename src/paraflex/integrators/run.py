@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, inputs_of
 from paraflex.errors import InputError
-from paraflex.integrators.jumps import hidden_from, jump_times
+from paraflex.integrators.jumps import jump_times
 from paraflex.integrators.limits import StepLimits, step_limits
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.packed import Signals
@@ -62,7 +62,10 @@ class Problem:
     def signals_from(self, time: float) -> Signals:
         """Signals for steps from a time on: continued beyond the next jump without it."""
         ahead = self.jumps[self.jumps > time]
-        return hidden_from(self.signals, ahead[0]) if ahead.size else self.signals
+        if not ahead.size:
+            return self.signals
+        breaks = self.signals.breaks
+        return self.signals._replace(breaks=np.where(breaks >= ahead[0], np.inf, breaks))
 
 
 @dataclass(frozen=True)

@@ -150,14 +150,15 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
     for chunk in _chunks(run):
         varied.go_through(chunk)
     _check_on_beams(problem, varied.motion)
-    derivatives = [_motion(y) for y in varied.variations]
-    empty = tuple(np.zeros((0, *part.shape)) for part in varied.motion)
+    motion, names = varied.motion, ("sample_q", "sample_v", "sample_a", "sample_lam", "sample_work")
+    derivatives = (
+        np.reshape([getattr(y, name) for y in varied.variations], (len(directions), *part.shape))
+        for name, part in zip(names, motion, strict=True)
+    )
     return RunDerivatives(
         t=problem.times,
-        motion=varied.motion,
-        derivatives=Motion(*(np.stack(parts) for parts in zip(*derivatives, strict=True)))
-        if derivatives
-        else Motion(*empty),
+        motion=motion,
+        derivatives=Motion(*derivatives),
         steps=int(run.state.counts[STEPS]),
         residual=varied.residual,
     )
@@ -306,7 +307,3 @@ def _moved(record, change: Array) -> tuple:
     """A packed system or signals at the points of the kernel's differences."""
     numbers = numbers_of(record)
     return tuple(with_numbers(record, numbers + place * DIFFERENCE_STEP * change) for place in PLACES)
-
-
-def _motion(y: Sensitivity) -> Motion:
-    return Motion(y.sample_q, y.sample_v, y.sample_a, y.sample_lam, y.sample_work)

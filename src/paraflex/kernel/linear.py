@@ -44,16 +44,14 @@ def share(work, port, r, part, c, s):
 
 
 @inlined
-def add_entry(system, work, row, column, value):
-    """Add to an entry of the Schur complement, in its lower half."""
-    high, low = max(row, column), min(row, column)
-    work.schur[system.rows[high].start + low - system.rows[high].first] += value
-
-
-@inlined
 def add_pair_entry(system, work, row, column, same, value):
-    """Add the contribution of two ports to an entry; to a diagonal one two different ports contribute twice."""
-    add_entry(system, work, row, column, value if same or row != column else 2.0 * value)
+    """Add the contribution of two ports to an entry of the Schur complement, in its lower half.
+
+    To a diagonal one two different ports contribute twice.
+    """
+    high, low = max(row, column), min(row, column)
+    twice = 1.0 if same or row != column else 2.0
+    work.schur[system.rows[high].start + low - system.rows[high].first] += twice * value
 
 
 @routine

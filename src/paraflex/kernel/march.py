@@ -60,7 +60,6 @@ from paraflex.kernel.samples import (
     place_samples,
     power_along_curve,
     solve_samples,
-    solve_samples_anew,
     step_work,
     write_energies,
 )
@@ -245,10 +244,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     if long:
         power_along_curve(system, signals, tableau, t, h, march, work)
     first = place_samples(tableau, t, h, long, march, out)
-    if march.counts[NEAR] == 0:
-        solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
-    elif first < march.counts[SAMPLE]:
-        solve_samples_anew(system, signals, controls, t, h, first, march, work, out, aside)
+    solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
     write_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)
     copy(march.stage_v[last], march.v)

@@ -107,14 +107,18 @@ LOAD = np.dtype(
     ],
     align=True,
 )
+# Of what is between two ends, a and b.
+_ENDS = [
+    ("a", np.int64),  # markers of its ends, -1 on the ground; that of a carries an axis, b is measured along it
+    ("b", np.int64),
+    ("ax", np.float64),  # places of ends on the ground
+    ("ay", np.float64),
+    ("bx", np.float64),
+    ("by", np.float64),
+]
 LINE = np.dtype(
     [
-        ("a", np.int64),  # markers of its ends, -1 on the ground
-        ("b", np.int64),
-        ("ax", np.float64),  # places of ends on the ground
-        ("ay", np.float64),
-        ("bx", np.float64),
-        ("by", np.float64),
+        *_ENDS,
         ("stiffness", np.float64),
         ("length", np.float64),
         ("damping", np.float64),
@@ -123,12 +127,7 @@ LINE = np.dtype(
 )
 AXIS_RECORD = np.dtype(
     [
-        ("a", np.int64),  # marker that carries the axis, -1 on the ground
-        ("b", np.int64),  # marker measured along it, -1 on the ground
-        ("ax", np.float64),  # places of ends on the ground
-        ("ay", np.float64),
-        ("bx", np.float64),
-        ("by", np.float64),
+        *_ENDS,
         ("angle", np.float64),  # of the axis against the marker that carries it
         ("row", np.int64),  # -1 for a motor's
         ("weight", np.float64),  # what its value is multiplied by in that row

@@ -18,6 +18,7 @@ from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.run_state import (
     BAUMGARTE,
     CONTRACTION,
+    NEAR,
     PEAK,
     SAMPLE,
     SAMPLE_CHANGE,
@@ -99,48 +100,27 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
     near, and in a step short beside vibrations. Each is a stage of its own, with the g and b of the last one and such
     explicit parts that q and v are those between the stages where the acceleration is. Deflections of flexible bodies
     are not between stages where forces are: they are solved whatever the last one said.
+
+    Each is solved with the factor of the step, or with one made there where that one does not serve: near a singular
+    position, where rows of the step's factor are held, at once.
     """
-    for i in range(first, march.counts[SAMPLE]):
-        needed = out.asked[i] or (h >= controls.long_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
-        if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
-            out.solved[i] = solve_sample(system, signals, controls, i, march, work, out, aside)
-
-
-@routine
-def solve_samples_anew(system, signals, controls, t, h, first, march, work, out, aside):
-    """The same near a singular position, where rows of the step's factor are held: with a factor made at each."""
-    for i in range(first, march.counts[SAMPLE]):
-        if out.times[i] < t + h * (1.0 - SAME_TIME):
-            weights = begin_sample(controls, i, march, out)
-            solved = solve_anew(system, signals, controls, i, weights, march, work, out, aside)
-            out.solved[i] = end_sample(system, i, solved, march, work, out)
-
-
-@routine
-def solve_sample(system, signals, controls, i, march, work, out, aside):
-    """Solve one sample with the factor of the step, or with a factor made there where that one does not serve.
-
-    Whether the sample is the solution; else it is as it was.
-    """
-    g, b, weights = march.clock[STAGE_G], march.clock[STAGE_B], begin_sample(controls, i, march, out)
-    solved = solve_at(
-        system, signals, out.times[i], weights, g, b, march.clock[CONTRACTION], march, work, out.a[i], out.lam[i],
-        march.torques,
-    )  # fmt: skip
-    if not solved:
-        solved = solve_anew(system, signals, controls, i, weights, march, work, out, aside)
-    return end_sample(system, i, solved, march, work, out)
-
-
-@routine
-def begin_sample(controls, i, march, out):
-    """Keep what a sample is; weights of its constraint rows."""
-    explicit_parts(out.q[i], out.v[i], out.a[i], march.clock[STAGE_G], march.clock[STAGE_B], march)
-    copy(out.a[i], march.eq)
-    copy(out.lam[i], march.guess_lam)
+    near, g, b = march.counts[NEAR] > 0, march.clock[STAGE_G], march.clock[STAGE_B]
+    weights = INDEX_1
     if controls.treatment == BAUMGARTE:
-        return constraint_weights(controls, march.clock[TRIED])[0]
-    return INDEX_1
+        weights = constraint_weights(controls, march.clock[TRIED])[0]
+    for i in range(first, march.counts[SAMPLE]):
+        needed = near or out.asked[i] or (h >= controls.long_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
+        if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
+            explicit_parts(out.q[i], out.v[i], out.a[i], g, b, march)
+            copy(out.a[i], march.eq)
+            copy(out.lam[i], march.guess_lam)
+            solved = not near and solve_at(
+                system, signals, out.times[i], weights, g, b, march.clock[CONTRACTION], march, work, out.a[i],
+                out.lam[i], march.torques,
+            )  # fmt: skip
+            if not solved:
+                solved = solve_anew(system, signals, controls, i, weights, march, work, out, aside)
+            out.solved[i] = end_sample(system, i, solved, march, work, out)
 
 
 @routine

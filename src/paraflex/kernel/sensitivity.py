@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from paraflex.kernel.arrays import add, apart, copy, fill
-from paraflex.kernel.compiling import inlined, releases_lock, routine
+from paraflex.kernel.compiling import releases_lock, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.krylov import exact_correction
 from paraflex.kernel.linear import right_hand_side, solve_system
@@ -45,6 +45,9 @@ from paraflex.kernel.stage import equations, note_torques
 from paraflex.kernel.step import input_power
 from paraflex.kernel.tangent import note_slopes, residual_tangent
 
+# Places of the difference from the outside in: what is small first.
+OUTSIDE_IN = (0, 3, 1, 2)
+
 
 def make_piece(signals: Signals) -> Signals:
     """Allocate one piece of every signal."""
@@ -62,36 +65,20 @@ def take_pieces(signals, t, moved, pieces):
             copy(moved[e].coefficients[at], pieces[e].coefficients[2 * k])
 
 
-@inlined
-def gather_residual(system, signals, t, weights, q, v, a, lam, torques, share, sensitivity, work):
-    """Add a share of the residuals of a moved system to R_s."""
-    equations(system, signals, t, weights, q, v, a, lam, torques, work)
-    for j in range(sensitivity.f.size):
-        sensitivity.f[j] += share * work.f[j]
-    for r in range(sensitivity.rows.size):
-        sensitivity.rows[r] += share * work.rows[r]
-
-
 @routine
-def find_parametric(moved, signals, times, weights, q, v, a, lam, torques, sensitivity, work):
-    """R_s of a stage: by four moved systems, signals, times and weights."""
+def find_parametric(moved, signals, controls, t, d_t, length, d_length, q, v, a, lam, torques, sensitivity, work):
+    """R_s of a stage in a step of some length: by four moved systems, signals, times and weights."""
     fill(sensitivity.f, 0.0)
     fill(sensitivity.rows, 0.0)
-    p0, p1, p2, p3 = moved
-    s0, s1, s2, s3 = signals
-    # From the outside in: what is small first.
-    gather_residual(
-        p0, s0, times[0], weights[0], q, v, a, lam, torques, WEIGHTS[0] / DIFFERENCE_STEP, sensitivity, work
-    )
-    gather_residual(
-        p3, s3, times[3], weights[3], q, v, a, lam, torques, WEIGHTS[3] / DIFFERENCE_STEP, sensitivity, work
-    )
-    gather_residual(
-        p1, s1, times[1], weights[1], q, v, a, lam, torques, WEIGHTS[1] / DIFFERENCE_STEP, sensitivity, work
-    )
-    gather_residual(
-        p2, s2, times[2], weights[2], q, v, a, lam, torques, WEIGHTS[2] / DIFFERENCE_STEP, sensitivity, work
-    )
+    for e in OUTSIDE_IN:
+        step, share = PLACES[e] * DIFFERENCE_STEP, WEIGHTS[e] / DIFFERENCE_STEP
+        alpha, beta = sensitivity.gains[e, 0], sensitivity.gains[e, 1]
+        weights = baumgarte_weights(controls, alpha, beta, length + step * d_length)
+        equations(moved[e], signals[e], t + step * d_t, weights, q, v, a, lam, torques, work)
+        for j in range(sensitivity.f.size):
+            sensitivity.f[j] += share * work.f[j]
+        for r in range(sensitivity.rows.size):
+            sensitivity.rows[r] += share * work.rows[r]
 
 
 @routine
@@ -139,44 +126,23 @@ def respond_to_parameter(
     return change
 
 
-@inlined
-def moved_power(system, signals, t, place, i, q, v, dv, lam, torques, sensitivity, work):
-    """Power of the motors and all other forces at one point of the difference."""
-    for j in range(q.size):
-        sensitivity.moved_q[j] = q[j] + place * DIFFERENCE_STEP * sensitivity.q[i, j]
-        sensitivity.moved_v[j] = v[j] + place * DIFFERENCE_STEP * dv[j]
-    for r in range(lam.size):
-        sensitivity.moved_lam[r] = lam[r] + place * DIFFERENCE_STEP * sensitivity.lam[i, r]
-    note_torques(signals, t, torques)
-    return input_power(
-        system, signals, t, sensitivity.moved_q, sensitivity.moved_v, sensitivity.moved_lam, torques, work
-    )
-
-
 @routine
-def power_sensitivity(moved, signals, times, i, q, v, dv, lam, torques, sensitivity, work):
-    """Derivative of the power at stage i, with a velocity v whose derivative is dv."""
-    p0, p1, p2, p3 = moved
-    s0, s1, s2, s3 = signals
-    total = WEIGHTS[0] * moved_power(p0, s0, times[0], PLACES[0], i, q, v, dv, lam, torques, sensitivity, work)
-    total += WEIGHTS[3] * moved_power(p3, s3, times[3], PLACES[3], i, q, v, dv, lam, torques, sensitivity, work)
-    total += WEIGHTS[1] * moved_power(p1, s1, times[1], PLACES[1], i, q, v, dv, lam, torques, sensitivity, work)
-    total += WEIGHTS[2] * moved_power(p2, s2, times[2], PLACES[2], i, q, v, dv, lam, torques, sensitivity, work)
+def power_sensitivity(moved, signals, t, d_t, i, q, v, dv, lam, torques, sensitivity, work):
+    """Derivative of the power at stage i of motors and all other forces, with a velocity v whose derivative is dv."""
+    total = 0.0
+    for e in OUTSIDE_IN:
+        step = PLACES[e] * DIFFERENCE_STEP
+        for j in range(q.size):
+            sensitivity.moved_q[j] = q[j] + step * sensitivity.q[i, j]
+            sensitivity.moved_v[j] = v[j] + step * dv[j]
+        for r in range(lam.size):
+            sensitivity.moved_lam[r] = lam[r] + step * sensitivity.lam[i, r]
+        time = t + step * d_t
+        note_torques(signals[e], time, torques)
+        total += WEIGHTS[e] * input_power(
+            moved[e], signals[e], time, sensitivity.moved_q, sensitivity.moved_v, sensitivity.moved_lam, torques, work
+        )
     sensitivity.power[i] = total / DIFFERENCE_STEP
-
-
-@inlined
-def moved_times(t, d_t):
-    """A time at the points of the difference."""
-    step = DIFFERENCE_STEP * d_t
-    return t + PLACES[0] * step, t + PLACES[1] * step, t + PLACES[2] * step, t + PLACES[3] * step
-
-
-@inlined
-def moved_weights(controls, sensitivity, e, length, d_length):
-    """Weights of the constraints in a step at a point of the difference."""
-    alpha, beta = sensitivity.gains[e, 0], sensitivity.gains[e, 1]
-    return baumgarte_weights(controls, alpha, beta, length + PLACES[e] * DIFFERENCE_STEP * d_length)
 
 
 @routine
@@ -185,15 +151,9 @@ def stage_sensitivity(
     torques, sensitivity, direction, space, work,
 ):  # fmt: skip
     """Derivatives of a stage, or a sample, from those without its own a; the last relative correction."""
-    weights = (
-        moved_weights(controls, sensitivity, 0, length, d_length),
-        moved_weights(controls, sensitivity, 1, length, d_length),
-        moved_weights(controls, sensitivity, 2, length, d_length),
-        moved_weights(controls, sensitivity, 3, length, d_length),
-    )
     note_friction(system, q, v, work.mu, work.compliance)
     take_pieces(signals, t, moved_signals, pieces)
-    find_parametric(moved, pieces, moved_times(t, d_t), weights, q, v, a, lam, torques, sensitivity, work)
+    find_parametric(moved, pieces, controls, t, d_t, length, d_length, q, v, a, lam, torques, sensitivity, work)
     note_torques(signals, t, torques)
     here = baumgarte_weights(controls, controls.alpha, controls.beta, length)
     return respond_to_parameter(
@@ -242,14 +202,13 @@ def sensitivity_steps(
             )  # fmt: skip
             sensitivity.left[k] = max(sensitivity.left[k], left)
             if not long:
-                dv, times = sensitivity.v[i], moved_times(t, d_t)
-                power_sensitivity(moved, pieces, times, i, q, v, dv, lam, torques, sensitivity, work)
+                power_sensitivity(moved, pieces, t, d_t, i, q, v, sensitivity.v[i], lam, torques, sensitivity, work)
         for i in range(last + 1 if long else 0):
             t, d_t = history.t[k] + tableau.c[i] * h, dt + tableau.c[i] * dh
-            q, v, dv, lam, times = history.q[k, i], work.v, work.x, history.lam[k, i], moved_times(t, d_t)
+            q, v, dv, lam = history.q[k, i], work.v, work.x, history.lam[k, i]
             velocity_along_curve(tableau, k, tableau.c[i], 0.0, history, sensitivity, v, dv)
             take_pieces(signals, t, moved_signals, pieces)
-            power_sensitivity(moved, pieces, times, i, q, v, dv, lam, torques, sensitivity, work)
+            power_sensitivity(moved, pieces, t, d_t, i, q, v, dv, lam, torques, sensitivity, work)
         if sensitivity.taken[0] == 0 and sensitivity.times[0] <= history.t[k]:
             keep_sample(0, 0, sensitivity)
             sensitivity.taken[0] = 1

@@ -15,10 +15,10 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.campaign import Result
 from paraflex.errors import as_enum
-from paraflex.findings import Finding, Verdict
+from paraflex.findings import Verdict
 from paraflex.folders import VERIFICATION
 from paraflex.results.dataset import part_of, tracking_dataset
-from paraflex.results.following import HEADLINE, ErrorSpan, Part
+from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.formulas import rms
 from paraflex.results.metrics import METRICS
 from paraflex.results.record import Record
@@ -129,11 +129,12 @@ class Verification(Result):
         """Errors and distances of the models in plain values; None for what a run did not reach."""
         task, reference = self.task, reference_model(self.models)
         part = part_of(task.path, float(task.motion.t[-1]))
+        findings = [*doubtful_numbers(task.mechanism), *([] if part is None else [part.finding()])]
         out = {
             "mechanism": task.mechanism.name,
             "duration": float(task.motion.t[-1]),
             "samples": int(task.motion.t.size),
-            "verdict": Verdict(_findings(task, part)).to_dict(),
+            "verdict": Verdict(findings).to_dict(),
             "part": None if part is None else part.to_dict(),
             "reference": reference,
             "error": self.error.value,
@@ -152,10 +153,6 @@ def reference_model(models: Sequence[str]) -> str:
         if name in models:
             return name
     return models[0]
-
-
-def _findings(task: TrackingTask, part: Part | None) -> list[Finding]:
-    return [*doubtful_numbers(task.mechanism), *([] if part is None else [part.finding()])]
 
 
 def _of_mode(task: TrackingTask, span: ErrorSpan, by_model: Mapping[str, ModelRuns], reference: str) -> dict[str, Any]:

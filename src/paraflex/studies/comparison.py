@@ -141,16 +141,11 @@ class MethodComparison(Result):
     @property
     def data(self) -> xr.Dataset:
         """Every run, (run,): method, tolerance or step, status, error, time and work; NaN for missing values."""
-        columns = {
-            each.name: ("run", [getattr(run, each.name) for run in self.measurements])
-            for each in fields(Measurement)
-            if each.name != "warnings"
-        }
-        numbers = {
-            name: (dim, np.array(values, dtype=str if name in _TEXTS else float))
-            for name, (dim, values) in columns.items()
-        }
-        return xr.Dataset(numbers, attrs={"case": self.case, "mechanism": self.mechanism})
+        columns = {}
+        for name in (each.name for each in fields(Measurement) if each.name != "warnings"):
+            values = [getattr(run, name) for run in self.measurements]
+            columns[name] = ("run", np.array(values, dtype=str if name in _TEXTS else float))
+        return xr.Dataset(columns, attrs={"case": self.case, "mechanism": self.mechanism})
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -217,7 +212,11 @@ class MethodComparison(Result):
             "order": method.order,
             "time_to_reach": {f"{level:g}": self.time_to_reach(name, level) for level in LEVELS},
             "relative_time": self.relative_time(name),
-            "runs": [_without(asdict(run), "method") for run in self.measurements if run.method == name],
+            "runs": [
+                {field: value for field, value in asdict(run).items() if field != "method"}
+                for run in self.measurements
+                if run.method == name
+            ],
         }
 
 
@@ -244,7 +243,3 @@ def _versions() -> dict[str, str | None]:
         except PackageNotFoundError:
             out[package] = None
     return out
-
-
-def _without(values: dict[str, Any], key: str) -> dict[str, Any]:
-    return {name: value for name, value in values.items() if name != key}

@@ -83,7 +83,7 @@ class LawComparison(Result):
     @property
     def metrics(self) -> tuple[str, ...]:
         """Names of the metrics, in the order of the columns."""
-        return metric_names(self.dataset)
+        return tuple(str(name) for name in self.dataset.data_vars if str(name).partition(".")[0] in METRICS)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -133,11 +133,6 @@ def _plain_cell(cell: xr.Dataset, metrics: Sequence[str]) -> dict[str, Any]:
     reason = str(cell["reason"].item())
     words = {"status": str(cell["status"].item())} | ({"reason": reason} if reason else {})
     return words | {name: finite_or_none(float(cell[name].item())) for name in ("time_reached", *metrics)}
-
-
-def metric_names(data: xr.Dataset) -> tuple[str, ...]:
-    """The metrics of a comparison of laws, in the order of their columns."""
-    return tuple(str(name) for name in data.data_vars if str(name).partition(".")[0] in METRICS)
 
 
 def unit_shown(data: xr.Dataset, metric: str) -> DisplayUnit:

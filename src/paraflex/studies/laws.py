@@ -83,7 +83,10 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
             if not getattr(self, name):
                 raise InputError("nothing to compare", field=name, remedy="give one at least")
         for law, together in self.laws.items():
-            _check_law(law, together)
+            kinds = (ControllerDescription, SampledController)
+            if not isinstance(together, list | tuple) or not all(isinstance(one, kinds) for one in together):
+                remedy = "give those of a model, or pf.SampledController(law, name=...)"
+                raise refused(together, f"laws.{law}", "a list of controllers", remedy)
         names = self.metrics or (HEADLINE[self.error], _LARGEST[self.error], *_JUDGED)
         object.__setattr__(self, "metrics", metrics_of(names, self.error, self._task.mechanism))
 
@@ -141,14 +144,6 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
             "error": self.error.value
         }
         return law_dataset(laws, modes, found, columns, members, about)
-
-
-def _check_law(law: str, together: Any) -> None:
-    """None for a list of controllers that have names."""
-    kinds = (ControllerDescription, SampledController)
-    if not isinstance(together, list | tuple) or not all(isinstance(one, kinds) for one in together):
-        remedy = "give those of a model, or pf.SampledController(law, name=...)"
-        raise refused(together, f"laws.{law}", "a list of controllers", remedy)
 
 
 def laws_of(model: Model, names: Sequence[str] = ()) -> dict[str, tuple[ControllerDescription, ...]]:

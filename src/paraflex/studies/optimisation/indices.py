@@ -151,7 +151,8 @@ def load_indices(
     at_most(number * (len(base.parameters) + 2), DESIGNS, "--samples", "too many designs")
     wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].each]
     columns = _columns(wanted, base)
-    points = _salib_sample(base.setting.names, number, chosen)
+    problem = _problem(base.setting.names)
+    points = _salib().sample.sobol.sample(problem, number, calc_second_order=False, seed=chosen)
     designs = np.stack([p.spread(column) for p, column in zip(base.parameters, points.T, strict=True)], axis=1)
     study = SweepStudy(base.name, base.setting, base.parameters, "saltelli", designs, base.members)
     return IndicesStudy(study, columns, number, chosen)
@@ -205,9 +206,12 @@ def _analysed(
         )  # fmt: skip
     values = values.reshape(study.samples, -1)[kept].ravel()
     mean, deviation = float(np.mean(values)), float(np.std(values))
-    varies = deviation > 1e-12 * abs(mean)
-    found = _salib_analyse(study.sweep.setting.names, values, study.seed) if varies else {}
-    none = np.full(len(study.sweep.setting.names), np.nan)
+    found, parameters = {}, study.sweep.setting.names
+    if deviation > 1e-12 * abs(mean):
+        # SALib takes 0 for no seed at all.
+        analyse, seed = _salib().analyze.sobol.analyze, study.seed + 1
+        found = analyse(_problem(parameters), values, calc_second_order=False, seed=seed)
+    none = np.full(len(parameters), np.nan)
     shares = {name: np.asarray(found.get(key, none)) for name, key in _SHARES.items()}
     rest = {"mean": mean, "deviation": deviation, "samples": count, "dropped": study.samples - count}
     return dict(zip(("path", "mode", "metric"), names, strict=True)) | shares | rest
@@ -242,16 +246,6 @@ def _check_samples(number: int) -> None:
             f"Sobol's sequence wants a power of two, {_FEWEST_BASE_SAMPLES} at least", field="--samples", value=number,
             remedy=f"say {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
         )  # fmt: skip
-
-
-def _salib_sample(names: tuple[str, ...], number: int, seed: int) -> Array:
-    salib = _salib()
-    return salib.sample.sobol.sample(_problem(names), number, calc_second_order=False, seed=seed)
-
-
-def _salib_analyse(names: tuple[str, ...], values: Array, seed: int) -> dict[str, Array]:
-    # SALib takes 0 for no seed at all.
-    return _salib().analyze.sobol.analyze(_problem(names), values, calc_second_order=False, seed=seed + 1)
 
 
 def _problem(names: tuple[str, ...]) -> dict[str, Any]:
