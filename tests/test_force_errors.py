@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import paraflex as pf
 from paraflex.designs.derivatives.plans import given_torques
@@ -232,17 +233,24 @@ points = { "slider.B" = [3.32, 0.0] }
 """
 
 
-def test_stresses_of_undamped_beams_have_an_error_beside_them(model):
-    """Where steps do not resolve vibrations, against a run with a thousandth of the tolerance."""
+@pytest.mark.parametrize("balanced", [True, False])
+def test_stresses_of_undamped_beams_have_an_error_beside_them(model, balanced):
+    """Vibrations that steps do not resolve are in it, against a run with a thousandth of the tolerance."""
     runs = (
-        pf.simulate_motion(model(SLOW_CRANK), 7.0, balanced=True, warning=False, options=pf.IntegrationOptions(**more))
+        pf.simulate_motion(
+            model(SLOW_CRANK), 7.0, balanced=balanced, warning=False, options=pf.IntegrationOptions(**more)
+        )
         for more in ({}, {"tolerance": 1e-7})
     )
     found, exact = (load_figures(pf.motion_dataset(run))["beams"]["rod"] for run in runs)
-    off = abs(found["stress_max"] - exact["stress_max"])
-    assert off > 0.03 * exact["stress_max"]
-    assert off < 3.5 * found["stress_error"] < 1.5 * exact["stress_max"]
-    assert exact["stress_error"] < 0.003 * exact["stress_max"]
+    off = abs(found["stress_max"] - exact["stress_max"]) / exact["stress_max"]
+    error = found["stress_error"] / exact["stress_max"]
+    if balanced:
+        assert off < 0.002
+        assert error < 0.003
+    else:
+        assert off < 0.4
+        assert 0.3 < error < 3.0
 
 
 @pytest.mark.parametrize("size", [3e-4, 1e-2, 1.0, 50.0])
@@ -460,6 +468,137 @@ def test_samples_within_short_steps_solve_the_equations_of_motion(tracking, chos
         (np.array([one.a for one in found]), run.solution.a),
     ):
         np.testing.assert_allclose(of_run, exact, rtol=0, atol=1e-4 * np.abs(exact).max())
+
+
+SETTLED = """
+name = "bar on a pin with a spring and a strong damper"
+ground = { O = [0.0, 0.0] }
+[body.bar]
+type = "rigid"
+mass = 0.0757
+inertia = 0.00128
+centre_of_mass = [0.109, 0.0]
+points = { A = [0.0, 0.0], B = [0.54, 0.0] }
+[joint]
+Q = ["ground.O", "bar.A"]
+[spring.s]
+joint = "Q"
+stiffness = 92.0
+[damper.d]
+joint = "Q"
+coefficient = 16.0
+[assembly.a]
+bar = 0.0
+[study]
+duration = 3.0
+samples = 301
+"""
+JUMPS = """
+[load.push]
+type = "force"
+point = "bar.B"
+pieces = [{ until = 0.7, force = [0.0, 0.2] }, { until = 2.0, force = [0.0, -0.02] }, { force = [0.0, 0.3] }]
+"""
+
+
+def test_steps_are_short_after_a_jump_however_long_they_were(model):
+    """After a settled stretch angles were 300 times and joint forces 14 times as large as they are."""
+    run = motion(model(SETTLED + JUMPS))
+    t, solution = run.solution.t, run.solution
+    inertia = 0.00128 + 0.0757 * 0.109**2
+
+    def bar(t, y):
+        push = 0.2 if t < 0.7 else -0.02 if t < 2.0 else 0.3
+        return [y[1], (0.54 * np.cos(y[0]) * push - 92.0 * y[0] - 16.0 * y[1]) / inertia]
+
+    exact, y = np.zeros((2, t.size)), np.zeros(2)
+    for begin, end in ((0.0, 0.7), (0.7, 2.0), (2.0, 3.0)):
+        here = (t >= begin) & (t <= end)
+        found = solve_ivp(bar, (begin, end), y, "Radau", dense_output=True, rtol=1e-9, atol=1e-14)
+        exact[:, here], y = found.sol(t[here]), found.y[:, -1]
+    angle = solution.q[:, 2] - solution.q[0, 2]
+    assert np.max(np.abs(angle - exact[0])) < 1e-3 * np.max(np.abs(exact[0]))
+    assert np.max(np.abs(solution.v[:, 2] - exact[1])) < 1e-3 * np.max(np.abs(exact[1]))
+
+
+@pytest.mark.parametrize("period", [0.2, 0.05])
+def test_steps_are_short_after_a_sampled_torque_has_jumped(model, period):
+    """Joint forces of a beam that a controller has held were hundreds of times too large."""
+    beam = CANTILEVER.replace("elements = ELEMENTS", "elements = 3").replace("thickness = 0.01", "thickness = 0.003")
+    beam = beam.replace("ratios = [0.01]", "stiffness = 0.01")
+    beam = beam.replace('type = "weld"', 'type = "revolute"').replace("FAST", "0")
+    text = (
+        beam
+        + '[spring.s]\njoint = "O"\nstiffness = 5.0\n[damper.d]\njoint = "O"\ncoefficient = 0.5\n[motor]\nhub = "O"\n'
+    )
+    given = model(text.replace("ground = {", "gravity = [0.0, 0.0]\nground = {"))
+
+    def law(t, readings, reference):
+        return [0.02 if t > 0.4 else 0.0]
+
+    runs = [
+        pf.Simulation(given, duration=1.0, samples=501, options=pf.IntegrationOptions(**options)).run(
+            pf.SampledController(law, period=period), warning=False
+        ).solution
+        for options in ({}, {"tolerance": 1e-9})
+    ]  # fmt: skip
+    for name in ("q", "v", "multipliers"):
+        usual, fine = (getattr(run, name) for run in runs)
+        assert np.max(np.abs(usual - fine)) < 0.01 * np.max(np.abs(fine))
+
+
+SLOW = """
+name = "slow slider-crank in a horizontal plane"
+ground = { O = [0.0, 0.0] }
+gravity = [0.0, 0.0]
+[body.crank]
+type = "rigid"
+mass = 1.0
+inertia = 0.01
+centre_of_mass = [0.15, 0.0]
+points = { O = [0.0, 0.0], A = [0.3, 0.0] }
+[body.rod]
+type = "rigid"
+mass = 1.0
+inertia = 0.03
+centre_of_mass = [0.3, 0.0]
+points = { A = [0.0, 0.0], B = [0.6, 0.0] }
+[body.slider]
+type = "rigid"
+mass = 2.0
+inertia = 0.01
+points = { B = [0.0, 0.0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "rod.A"]
+B = ["rod.B", "slider.B"]
+[joint.rail]
+type = "prismatic"
+points = ["ground.O", "slider.B"]
+[prescribed.drive]
+joint = "O"
+angle = "1 + 0.5 * sin(2 * pi * t / PERIOD)"
+[assembly.a]
+crank = 1.0
+rod = -0.434
+slider = 0.0
+[study]
+duration = TIME
+samples = 301
+"""
+
+
+@pytest.mark.parametrize("period", [2.0, 20.0, 200.0])
+def test_forces_of_slow_motions_are_as_exact_as_those_of_fast_ones(model, period):
+    """Baumgarte's terms, stiff beside slow motions, were 1 % of the torque and half of it in the estimate."""
+    runs = [
+        motion(model(SLOW.replace("PERIOD", str(one)).replace("TIME", str(0.75 * one)))) for one in (period, 2.0)
+    ]  # fmt: skip
+    torque, usual = (pf.motion_dataset(run)["drive_torque"].to_numpy()[:, 0] for run in runs)
+    assert np.max(np.abs(torque * (0.5 * period) ** 2 - usual)) < 2e-4 * np.max(np.abs(usual))
+    errors = pf.motion_dataset(runs[0])["drive_torque_error"].to_numpy()
+    assert errors[0] < 1e-3 * np.max(np.abs(torque))
+    assert runs[0].solution.steps < 200
 
 
 CANTILEVER = """

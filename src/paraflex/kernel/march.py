@@ -67,6 +67,8 @@ from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
+# A step after a jump over one in which that moves the mechanism by the tolerance.
+AFTER_JUMP = 1e-3
 # Errors of vibrations rise and fall within a period: the error before has a say as well (Gustafsson 1994). None counts
 # as smaller than this part of what is allowed.
 BY_ERROR, BY_LAST_ERROR, SMALLEST_ERROR = 0.7, 0.4, 1e-3
@@ -157,8 +159,8 @@ def begin(system, signals, controls, march, work):
 def resume(system, signals, controls, march, work, aside):
     """First stage after a jump, its matrix in a workspace aside: the factor in use stays.
 
-    The next step is no longer than in which the change of acceleration moves the mechanism by the tolerance: the error
-    estimate leaves out what a long one makes of a jump.
+    If the change of acceleration would move the mechanism by the tolerance in a step as long as the last one, the next
+    is much shorter than one in which it would: the error estimate leaves out what a long one makes of a jump.
     """
     factor = march.clock[FACTOR_B]
     copy(work.redundant, aside.redundant)
@@ -168,8 +170,8 @@ def resume(system, signals, controls, march, work, aside):
     for j in range(march.eq.size):
         march.eq[j] -= march.stage_a[1, 0, j]
     change = mass_norm(system, aside, march.eq)
-    if controls.fixed_step == 0.0 and change > 0.0:
-        march.clock[STEP] = min(march.clock[STEP], sqrt(2.0 * controls.tolerance / change))
+    if controls.fixed_step == 0.0 and change * march.clock[STEP] ** 2 > 2.0 * controls.tolerance:
+        march.clock[STEP] = AFTER_JUMP * sqrt(2.0 * controls.tolerance / change)
 
 
 @kernel

@@ -26,7 +26,7 @@ from paraflex.kernel.samples import (
     write_energies,
 )
 from paraflex.kernel.stage import equations, note_torques, place
-from paraflex.kernel.step import input_power, stage_start
+from paraflex.kernel.step import baumgarte_gains, input_power, stage_start
 from paraflex.kernel.tangent import note_slopes
 
 # Corrections end where the next is to be expected below this part of what they correct, or where, below the second
@@ -67,10 +67,10 @@ def make_history(steps: int, stages: int, n: int, m: int) -> History:
 @routine
 def baumgarte_weights(controls, alpha, beta, h):
     """Weights of Phi'', Phi' and Phi in a step's stages; without a step, h = 0, those of a first stage."""
-    if controls.gain > 0.0:
-        if h == 0.0:
-            return INDEX_1
-        alpha = beta = controls.gain / h
+    if h > 0.0:
+        alpha, beta = baumgarte_gains(controls, alpha, beta, h)
+    elif controls.gain > 0.0:
+        return INDEX_1
     return 1.0, 2.0 * alpha, beta * beta
 
 

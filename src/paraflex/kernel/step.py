@@ -81,6 +81,8 @@ ROUNDS = 6
 NEWTON_MEMORY = 0.02
 # The part of the error allowed in forces that Newton's iteration may leave, where they are controlled.
 FORCE_FRACTION = 0.03
+# Baumgarte's coefficients are this over the step at most.
+LARGEST_GAIN = 0.3
 # Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
 SAME_TIME = 1e-6
 
@@ -176,17 +178,26 @@ def stage_start(tableau, i, t, h, march):
 
 
 @routine
+def baumgarte_gains(controls, alpha, beta, h):
+    """Baumgarte's coefficients in a step: in long ones no larger than lets violations decay within it.
+
+    Larger ones make of violations that Newton's iteration leaves more than the accelerations of slow motions.
+    """
+    if controls.gain > 0.0:
+        return controls.gain / h, controls.gain / h
+    return min(alpha, LARGEST_GAIN / h), min(beta, LARGEST_GAIN / h)
+
+
+@routine
 def constraint_weights(controls, h):
     """Weights of Phi'', Phi' and Phi in the stage equations, and the `gains` of `filtered_error`."""
     if controls.treatment == POSITION:
         return (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     if controls.treatment == GGL:
         return (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)
-    alpha, beta = controls.alpha, controls.beta
-    if controls.gain > 0.0:
-        alpha = beta = controls.gain / h
     if controls.treatment == PROJECTION:
         return INDEX_1, (0.0, 0.0, 0.0)
+    alpha, beta = baumgarte_gains(controls, controls.alpha, controls.beta, h)
     return (1.0, 2.0 * alpha, beta * beta), (1.0, alpha, beta)
 
 
