@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.special
 
+import paraflex as pf
 from paraflex import plots
 from paraflex.errors import InputError, IntegrationError
 from paraflex.files import library_file, load
@@ -289,3 +290,14 @@ def test_loops_that_do_not_close_are_said_so_with_the_gap(tmp_path):
     assert done.returncode == 2
     assert f"{file}: assembly: the loops do not close: a gap of 0.2 m remains in far" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_datasets_name_the_options_of_their_run():
+    """They named those of the model, or the default, unless they were told once more."""
+    options = pf.IntegrationOptions(method="esdirk4", tolerance=1e-6, alpha=7.0)
+    motion = pf.motion_dataset(pf.simulate_motion(pf.load("pendulum"), 0.1, samples=5, warning=False, options=options))
+    task = pf.plan(pf.load("five_bar"), duration=0.01, samples=5)
+    tracking = pf.tracking_dataset([task.simulate("++", warning=False, options=options)])
+    for data in (motion, tracking):
+        found = [data.attrs[name] for name in ("integration_method", "tolerance", "baumgarte_alpha")]
+        assert found == ["esdirk4", 1e-6, 7.0]

@@ -384,4 +384,5 @@ def _solution(
         method=options.method.name,
         **{one.name: getattr(figures, one.name) for one in fields(figures) if one.name != "passages"},
         event="" if crossing is None else str(crossing.function.event),
+        options=options,
     )

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.findings import Finding
+
+if TYPE_CHECKING:
+    from paraflex.integrators.options import IntegrationOptions
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,8 @@ class Solution:
         Whether the samples are equilibria, numbered in place of times.
     acting : (c,) array, optional
         Numbers of the constraint rows that act; all by default.
+    options : IntegrationOptions, optional
+        By which it was found; None of another model.
     """
 
     t: Array
@@ -89,6 +95,7 @@ class Solution:
     findings: tuple[Finding, ...] = ()
     resting: bool = False
     acting: NDArray[np.int64] | None = None
+    options: IntegrationOptions | None = None
 
     def instant(self, sample: int, digits: int = 3) -> str:
         """In a text, which sample it is: "t = 0.125 s", or "step 3"."""

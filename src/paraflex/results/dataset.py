@@ -51,7 +51,7 @@ def tracking_dataset(
         Of one task; runs that did not finish hold NaN after their last sample and say so in `status`, and in `event`
         and `event_time` where that stopped them. Runs of finite segments are reported as the links they were cut from.
     options : IntegrationOptions, optional
-        Kept as provenance.
+        Kept as provenance; those of the first run by default.
     parameters : dict, optional
         Kept as provenance: the model as read, and what was asked for.
     error : ErrorSpan or str
@@ -108,7 +108,7 @@ def tracking_dataset(
     out = with_totals(xr.Dataset(data, coords=coordinates))
     out = out.assign(metric_variables(out, KEPT_METRICS, task.path.duration))
     label(out, mechanism)
-    out.attrs = provenance(task.system, records[0].method, options, parameters) | {
+    out.attrs = provenance(task.system, records[0].method, options or records[0].options, parameters) | {
         "motion_end": task.path.duration,
         "after": task.after.value,
         "path_length_run": length_fraction(task.path, float(motion.t[-1])),

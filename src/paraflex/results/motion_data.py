@@ -55,7 +55,7 @@ def motion_dataset(
         One that did not finish holds NaN after its last sample and says so in `status`; of one that an event stopped
         the time ends with the event.
     options : IntegrationOptions, optional
-        Kept as provenance.
+        Kept as provenance; those of the run by default.
     parameters : dict, optional
         Kept as provenance: the model as read, and what was asked for.
     findings : iterable of Finding
@@ -96,7 +96,7 @@ def motion_dataset(
     coordinates = {"time": run.times, "coordinate": names, **link_coordinates(system, links)}
     out = with_totals(xr.Dataset(data, coords=coordinates))
     label(out, mechanism)
-    out.attrs = provenance(system, title_of(solution.method), options, parameters) | {
+    out.attrs = provenance(system, title_of(solution.method), options or solution.options, parameters) | {
         "kind": "motion",
         "singular_positions": json.dumps(solution.singular_positions),
     }

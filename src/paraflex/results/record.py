@@ -12,6 +12,7 @@ from paraflex.control.loop import ControllerRecord
 from paraflex.control.runs import ControlledTracking
 from paraflex.dynamics.points import PointMotion, point_motion
 from paraflex.findings import Finding
+from paraflex.integrators import IntegrationOptions
 from paraflex.results.links import Links, system_links
 from paraflex.tracking import TrackingRun, TrackingTask
 from paraflex.validity import Validity
@@ -61,6 +62,8 @@ class Record(Links):
         What of its results is not plausible.
     controllers : tuple of ControllerRecord
         What each did, where torques were those of controllers.
+    options : IntegrationOptions, optional
+        By which it was integrated; None by another program.
     """
 
     task: TrackingTask
@@ -73,6 +76,7 @@ class Record(Links):
     validity: Validity | None = None
     doubts: tuple[Finding, ...] = ()
     controllers: tuple[ControllerRecord, ...] = ()
+    options: IntegrationOptions | None = None
 
 
 def record(run: TrackingRun) -> Record:
@@ -88,6 +92,7 @@ def record(run: TrackingRun) -> Record:
         **{each.name: getattr(links, each.name) for each in fields(Links)},
         task=whole,
         method=run.method,
+        options=solution.options,
         mode=run.mode.name,
         torque=torque,
         condition=run.condition,
