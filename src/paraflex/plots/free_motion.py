@@ -50,9 +50,8 @@ def coordinates(data: xr.Dataset) -> Figure:
     names = names_of(data, "coordinate")
     values = data["coordinate_value"].transpose("time", "coordinate").values
     travel = np.nan_to_num(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))
-    groups = {
-        kind: [k for k, name in enumerate(names) if _kind(name) == kind and travel[k] > ROUNDING] for kind in _KINDS
-    }
+    kinds = [name.rpartition(".")[2].rstrip("0123456789") for name in names]
+    groups = {kind: [k for k, one in enumerate(kinds) if one == kind and travel[k] > ROUNDING] for kind in _KINDS}
     groups = {kind: members for kind, members in groups.items() if members} or {"phi": list(range(len(names)))[:1]}
     bodies = names_of(data, "body")
     figure, axes = panels(len(groups), 1)
@@ -135,7 +134,3 @@ def moving_points(run: xr.Dataset) -> list[int]:
             shown.append(int(k))
     first = [k for k in shown if names[k] == followed]
     return first + sorted(k for k in shown[:MOST_LINES] if k not in first)
-
-
-def _kind(name: str) -> str:
-    return name.rpartition(".")[2].rstrip("0123456789")

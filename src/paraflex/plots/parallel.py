@@ -8,7 +8,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -63,7 +63,8 @@ def _draw_designs(panel: Axes, places: Array, judged: Array, judge: str) -> None
     order = np.argsort(-judged, kind="stable")
     shown = order[np.unique(np.linspace(0, order.size - 1, min(order.size, _LINES)).astype(int))]
     rows = np.arange(places.shape[1])
-    colours = _colours()
+    # From dark to light, also in grey.
+    colours = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, _LIGHTEST, 256)))
     lines = [np.column_stack([places[k], rows]) for k in shown]
     width = 0.7 if len(lines) < 200 else 0.35
     panel.add_collection(LineCollection(lines, colors=colours(judged[shown]), linewidths=width, alpha=0.8))
@@ -86,8 +87,3 @@ def _draw_axes(panel: Axes, labels: list[str], low: Array, high: Array) -> None:
     panel.set_ylim(len(labels) - 0.75, -0.5)
     panel.set_xlim(-0.02, 1.02)
     panel.set_frame_on(False)
-
-
-def _colours() -> Colormap:
-    """Colours from dark to light, also in grey."""
-    return ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, _LIGHTEST, 256)))
