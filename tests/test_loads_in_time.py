@@ -94,7 +94,8 @@ def test_an_impulse_gives_its_momentum_and_steps_end_where_it_jumps():
     np.testing.assert_allclose(run.solution.v[1:, 0], np.array([0.0, 1.0, 1.0]) / MASS, rtol=0, atol=1e-12)
     np.testing.assert_allclose(run.solution.q[2:, 0], np.array([0.099, 0.199]) / MASS, rtol=0, atol=1e-12)
     assert run.solution.work[-1] == pytest.approx(0.5 / MASS, rel=1e-9)
-    assert run.solution.steps < 60
+    # From each jump they grow as from the start.
+    assert run.solution.steps < 120
 
 
 def test_a_beam_under_a_step_load_swings_to_twice_its_deflection():

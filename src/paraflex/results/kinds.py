@@ -27,23 +27,11 @@ _MADE_BY = {
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """Kind: "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking".
-
-    Raises
-    ------
-    InputError
-        It is of none.
-    """
+    """Kind: "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking"."""
     if "model" in data.dims:
         return "verification"
     kind = str(data.attrs.get("kind"))
-    if kind in _MADE_BY:
-        return kind
-    if "mode" not in data.coords:
-        raise InputError(
-            "no results of paraflex", field="data", remedy="give what open_results or tracking_dataset returns"
-        )
-    return "tracking"
+    return kind if kind in _MADE_BY else "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:
@@ -52,10 +40,12 @@ def check_kind(data: xr.Dataset, *kinds: str) -> None:
     Raises
     ------
     InputError
-        It is of another.
+        It is of another, or of none.
     """
     if kind_of(data) not in kinds:
         raise wrong_kind(kind_of(data), kinds)
+    if kind_of(data) == "tracking" and "mode" not in data.coords:
+        raise InputError("no results of paraflex", field="data", remedy="give what open_results returns")
 
 
 def wrong_kind(kind: str, kinds: Iterable[str], field: str = "data") -> InputError:
