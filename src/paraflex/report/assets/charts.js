@@ -53,8 +53,11 @@ const charts = (() => {
 
   // What is far below the largest value is no more than rounding, or the start at rest.
   const MOST_DECADES = 5;
-  // Within one decade there may be no power of ten: Plotly then places numbers between them.
-  const steps = (range) => !range || range[1] - range[0] > 1.5 ? { dtick: 1 } : { nticks: 6 };
+  // Over less than two decades ones, twos and fives stand; within one there may be none, and Plotly chooses.
+  const steps = (range) => {
+    const decades = range ? range[1] - range[0] : 2;
+    return decades > 1.5 ? { dtick: 1 } : decades > 0.7 ? { dtick: "D2" } : { nticks: 6 };
+  };
 
   function decades(chart) {
     let low = Infinity, high = 0;
