@@ -33,6 +33,8 @@ EXPRESSION_LETTERS = 200
 PARAMETER_CHAIN = 100
 # Elements of a beam: results converge with ten, and its modes come from a dense matrix of four rows an element.
 ELEMENTS = 64
+# Finite segments of a beam, each a body: more would only take time.
+SEGMENTS = 1000
 # The shortest run [s]: in a picosecond nothing of a mechanism has moved, and its fifth power is still a number.
 SHORTEST = 1e-12
 # Shape functions of a bar: the tenth sine is far above what a motion excites.

@@ -574,7 +574,7 @@ def _pair(value: Sequence[float], field: str) -> tuple[float, float]:
 def _points(values: Sequence[Sequence[float]], field: str, at_least: int, columns: Sequence[int] = (2,)) -> Array:
     try:
         points = np.array(values, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         points = np.zeros((0, 0))
     shaped = points.ndim == 2 and points.shape[1] in columns and len(points) >= at_least
     if not (shaped and np.all(np.isfinite(points))):

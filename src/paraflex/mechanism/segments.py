@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import SpanProperties
+from paraflex.limits import SEGMENTS, at_most
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.cut import Cut
 from paraflex.mechanism.damping import stiffness_damping
@@ -194,6 +195,7 @@ def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, in
             raise InputError("no flexible beam", field="segments", value=name, remedy=suggestion(name, names))
         if count < 1:
             raise InputError("a beam needs at least one segment", field=f"segments.{name}", value=count, remedy="say 8")
+        at_most(count, SEGMENTS, f"segments.{name}")
     for name in names:
         if name not in counts:
             raise InputError(
