@@ -244,8 +244,8 @@ def test_a_motion_without_a_path_takes_what_its_own_run_shows(tmp_path):
     done = paraflex("run", "slider_crank_flexible", "--reduced", "2", "--out", "r", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     numbers = json.loads((tmp_path / "r" / "summary.json").read_text())
-    # The tolerance of each of the two runs is 1e-5 m.
-    assert numbers["reduction"]["distance"] < 2e-5
+    # The tolerance of each of the two runs is 1e-5 m; two shapes are left out.
+    assert numbers["reduction"]["distance"] < 2.5e-5
     assert (numbers["reduction"]["states"], numbers["reduction"]["full_states"]) == (4, 8)
     assert "2 of 4 flexible coordinates, 4 of 8 states: points are up to" in done.stdout
     assert "Reduced bodies" in (tmp_path / "r" / "report.html").read_text()
