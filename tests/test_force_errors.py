@@ -470,7 +470,7 @@ def test_samples_within_short_steps_solve_the_equations_of_motion(tracking, chos
         np.testing.assert_allclose(of_run, exact, rtol=0, atol=1e-4 * np.abs(exact).max())
 
 
-SETTLED = """
+AT_REST = """
 name = "bar on a pin with a spring and a strong damper"
 ground = { O = [0.0, 0.0] }
 [body.bar]
@@ -502,8 +502,8 @@ pieces = [{ until = 0.7, force = [0.0, 0.2] }, { until = 2.0, force = [0.0, -0.0
 
 
 def test_steps_are_short_after_a_jump_however_long_they_were(model):
-    """After a settled stretch angles were 300 times and joint forces 14 times as large as they are."""
-    run = motion(model(SETTLED + JUMPS))
+    """After a stretch at rest angles were 300 times and joint forces 14 times as large as they are."""
+    run = motion(model(AT_REST + JUMPS))
     t, solution = run.solution.t, run.solution
     inertia = 0.00128 + 0.0757 * 0.109**2
 

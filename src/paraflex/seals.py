@@ -15,7 +15,7 @@ from typing import BinaryIO
 from paraflex.errors import InputError
 
 NETCDF, PARQUET = b"\x89HDF", b"PAR1"
-# Files without a seal that this process has read: they may hold anything.
+# The last file without a seal that this process has read, if any: it may hold anything.
 unsealed: list[Path] = []
 _MARK = b"paraflex"
 _DIGEST = 24
@@ -53,9 +53,11 @@ def check_seal(file: Path, remedy: str) -> None:
     """
     try:
         with file.open("rb") as stream:
-            whole = _is_whole(stream, file)
+            sealed, whole = _state(stream)
     except OSError as error:
         raise unreadable(error, file) from error
+    if not sealed:
+        unsealed[:] = [file]
     if not whole:
         raise damaged(file, "not as it was written", remedy)
 
@@ -76,15 +78,15 @@ def damaged(file: Path, why: str, remedy: str) -> InputError:
     return InputError(f"damaged: {why}", field=str(file), remedy=remedy)
 
 
-def _is_whole(stream: BinaryIO, file: Path) -> bool:
+def _state(stream: BinaryIO) -> tuple[bool, bool]:
+    """Whether a file has a seal, and whether it is as it was written, as far as that can be seen."""
     start, end = _place(stream)
     start = max(start - _SEAL, 0)
     stream.seek(start)
     found = stream.read(_SEAL)
     if not found.startswith(_MARK):
-        unsealed.append(file)
-        return end <= _named_end(stream, end)
-    return found[len(_MARK) :] == _digest(stream, start, start + _SEAL)
+        return False, end <= _named_end(stream, end)
+    return True, found[len(_MARK) :] == _digest(stream, start, start + _SEAL)
 
 
 def _place(stream: BinaryIO) -> tuple[int, int]:

@@ -116,9 +116,10 @@ def filtered_error(system, g, gains, march, work, slow):
 def note_lost_vibrations(system, controls, h, g, march, work):
     """Keep the multipliers of undamped vibrations that a step loses since it is much longer than the last one.
 
-    Of the accelerations a = A phi of a vibration (K - omega^2 M) phi + Phi_q^T nu = 0 the filter's multipliers are
-    g^2 A nu / (1 + g^2 omega^2), and those of the vibration A nu / omega^2; of motions without deflection they are
-    zero. Twice filtered, vibrations that are resolved are too. At the stages of the last step it has all phases.
+    A vibration with acceleration A phi, (K - omega^2 M) phi + Phi_q^T nu = 0, has multipliers A nu / omega^2. Filtering
+    its acceleration gives g^2 A nu / (1 + g^2 omega^2): all of them if it is much faster than the step, nothing for
+    motions without deflection. Filtering twice leaves out vibrations that are resolved. The stages of the last step
+    have all phases.
     """
     fill(march.forces[LOST], 0.0)
     if not isinf(controls.force_cycles) or h < GROWN * march.clock[LAST_STEP]:

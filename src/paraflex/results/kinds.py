@@ -42,9 +42,10 @@ def check_kind(data: xr.Dataset, *kinds: str) -> None:
     InputError
         It is of another, or of none.
     """
-    if kind_of(data) not in kinds:
-        raise wrong_kind(kind_of(data), kinds)
-    if kind_of(data) == "tracking" and "mode" not in data.coords:
+    kind = kind_of(data)
+    if kind not in kinds:
+        raise wrong_kind(kind, kinds)
+    if kind == "tracking" and "mode" not in data.coords:
         raise InputError("no results of paraflex", field="data", remedy="give what open_results returns")
 
 

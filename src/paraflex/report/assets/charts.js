@@ -55,8 +55,8 @@ const charts = (() => {
   const MOST_DECADES = 5;
   // Over less than two decades ones, twos and fives stand; within one there may be none, and Plotly chooses.
   const steps = (range) => {
-    const decades = range ? range[1] - range[0] : 2;
-    return decades > 1.5 ? { dtick: 1 } : decades > 0.7 ? { dtick: "D2" } : { nticks: 6 };
+    const span = range ? range[1] - range[0] : 2;
+    return span > 1.5 ? { dtick: 1 } : span > 0.7 ? { dtick: "D2" } : { nticks: 6 };
   };
 
   function decades(chart) {
