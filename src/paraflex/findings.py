@@ -115,6 +115,7 @@ _DOUBTFUL = {
     "stress-over-strength": "The stress in a beam exceeds the strength of its material: the safety factor is below 1.",
     "deflection-large": "A link bends so far that it is more a spring than a link.",
     "energy-unbalanced": "Energy and work of a run do not balance: it is not accurate, or unstable.",
+    "errors-grow": "A free motion makes so much of small errors that another tolerance leads elsewhere.",
     "forces-unresolved": "Forces of joints or drives may be off by more than 1 % of their largest values.",
     "speed-large": "A body moves, or a drive turns, as fast as no mechanism does.",
     "amplifier-beyond": "A motor takes more current or voltage than its amplifier gives.",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,8 @@ class ControlledTracking(Controlled, TrackingRun):
 @dataclass(frozen=True)
 class ControlledMotion(Controlled, MotionRun):
     """A run without a path under torques that were given from one instant to the next."""
+
+    open_loop: ClassVar[bool] = False
 
     @property
     def in_time(self) -> bool:
