@@ -54,7 +54,13 @@ def test_errors_that_grow_are_found(angles, duration, grows):
     assert bool(found(run)) is grows
 
 
-def test_the_finding_says_from_when_on_and_how_often_it_is_asked_it_is_sought_once(monkeypatch):
+@pytest.mark.parametrize("method", ["tr-bdf2", "generalised-alpha", "radau"])
+def test_they_are_found_whatever_the_method(method):
+    assert found(simulate(chain((2.0, 2.5)), 15.0, method=method))
+    assert not found(simulate(chain((-1.3, -1.2)), 2.0, method=method))
+
+
+def test_the_finding_says_from_when_on_and_is_sought_once(monkeypatch):
     run = simulate(chain((2.0, 2.5)), 40.0)
     (text,) = found(run)
     assert "100 times the tolerance" in text
