@@ -40,7 +40,9 @@ def collecting() -> Iterator[None]:
         try:
             yield
         finally:
-            _print_rest()
+            for text in dict.fromkeys([*map(str, Verdict([*_found, *_elsewhere])), *_others]):
+                if text not in _printed:
+                    typer.echo(f"warning: {text}", err=True)
 
 
 def collected(more: Iterable[Finding] = ()) -> Verdict:
@@ -62,9 +64,3 @@ def apart() -> Iterator[None]:
 def printed(findings: Iterable[Finding]) -> None:
     """Note that these need not be printed when the command ends."""
     _printed.update(map(str, findings))
-
-
-def _print_rest() -> None:
-    for text in dict.fromkeys([*map(str, Verdict([*_found, *_elsewhere])), *_others]):
-        if text not in _printed:
-            typer.echo(f"warning: {text}", err=True)

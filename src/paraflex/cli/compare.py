@@ -16,7 +16,7 @@ from paraflex.cli.commands.results import CompareRequest
 from paraflex.cli.ending import say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.tables import plain_table, print_titled
-from paraflex.folders import RUN_COMPARISON, ResultsFolder
+from paraflex.folders import RUN_COMPARISON
 from paraflex.results.comparison import MotionPair, NumberPair, RunComparison, compare
 from paraflex.results.metrics import metric_label
 from paraflex.units import printed_unit
@@ -33,21 +33,17 @@ def compare_command(request: CompareRequest) -> int:
         found = compare(request.first, request.second, request.modes)
     if request.out is not None:
         with hold_results(request.out, RUN_COMPARISON, force=request.force) as folder:
-            _write(found, folder)
+            from paraflex.plots.compare import save_overlays
+
+            # Numbers first, then figures.
+            with folder.replaced() as new:
+                write_json(new / "compare.json", found.to_dict())
+            with folder.amended() as new:
+                save_overlays(found, new / "figures")
     tell(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, doubts=())
     if request.out is not None and not request.json:
         say_where(began, "numbers and figures", Path(request.out))
     return COMPLETE
-
-
-def _write(found: RunComparison, folder: ResultsFolder) -> None:
-    """Numbers first, then figures."""
-    from paraflex.plots.compare import save_overlays
-
-    with folder.replaced() as new:
-        write_json(new / "compare.json", found.to_dict())
-    with folder.amended() as new:
-        save_overlays(found, new / "figures")
 
 
 def print_compared(console: Console, found: RunComparison) -> None:

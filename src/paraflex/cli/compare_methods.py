@@ -28,7 +28,9 @@ from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_ca
 def compare_methods_command(request: CompareMethodsRequest) -> int:
     """Run all methods, write what they took and how far off they are; the exit code."""
     model = asked_model(request.model)
-    options, methods = _options(request), _methods(request)
+    options = _options(request)
+    with renamed("--method"):
+        methods = [find_method(name).name for name in request.methods or METHODS]
     # Every check that needs no computing comes before the first minute is spent.
     mode = _mode(model, request)
     with hold_results(request.out, COMPARISON, force=request.force) as folder:
@@ -78,11 +80,6 @@ def _options(request: CompareMethodsRequest) -> ComparisonOptions:
             steps=tuple(request.steps),
             limit=default.limit if request.limit is None else request.limit,
         )
-
-
-def _methods(request: CompareMethodsRequest) -> list[str]:
-    with renamed("--method"):
-        return [find_method(name).name for name in request.methods or METHODS]
 
 
 def _mode(model: Model, request: CompareMethodsRequest) -> str | None:

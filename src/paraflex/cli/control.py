@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 from paraflex.campaign import Workers
 from paraflex.checks import check_planned
@@ -71,17 +70,13 @@ def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, 
     with flagged(request):
         chosen = {name: getattr(request, name) for name in ("tolerance", "method", "step")}
         options = model.study.integration(chosen)
+        asked = {
+            "laws": {name: [one.name for one in together] for name, together in laws.items()},
+            "paths": list(paths),
+            "modes": [mode.name for mode in modes],
+            "reduced": model.study.reduced,
+        }
         return LawStudy(
             reduced_tasks(model, tasks, modes), laws, modes, options, request.metrics, ErrorSpan(model.study.error),
-            asked_of(model, _asked(model, laws, paths, modes) | options.to_dict()),
+            asked_of(model, asked | options.to_dict()),
         )  # fmt: skip
-
-
-def _asked(model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> dict[str, Any]:
-    """Laws, paths and modes compared, for provenance."""
-    return {
-        "laws": {name: [one.name for one in together] for name, together in laws.items()},
-        "paths": list(paths),
-        "modes": [mode.name for mode in modes],
-        "reduced": model.study.reduced,
-    }

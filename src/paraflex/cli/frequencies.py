@@ -35,7 +35,10 @@ def frequencies(
     state = start if request.at is None else _pose_at(model, rigid, start, assembly, request.at, request.path)
     state = undeformed(system, rigid, state)
     if request.balanced:
-        state = _balanced(system, state, motors)
+        try:
+            state = static_equilibrium(system, state, motors)
+        except AssemblyError as error:
+            raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
     held = natural_frequencies(system, state, motors, count=LOWEST) if motors else None
     free = natural_frequencies(system, state, torque_at=motors, count=LOWEST)
     is_equilibrium = free.acceleration < BALANCED
@@ -49,13 +52,6 @@ def frequencies(
         "motors_free_hz": hertz(free.frequencies),
         "growing": max(_growing(free), 0 if held is None else _growing(held)),
     }
-
-
-def _balanced(system: System, state: State, held: list[str]) -> State:
-    try:
-        return static_equilibrium(system, state, held)
-    except AssemblyError as error:
-        raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
 
 
 def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:

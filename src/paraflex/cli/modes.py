@@ -34,7 +34,9 @@ def modes_command(request: ModesRequest) -> None:
     """
     model, path = asked_model(request.model), request.path
     effort = _effort(model, path)
-    named = _named_modes(model)
+    # Those of [mode] tables, and others of the study.
+    studied = [parse_mode(model.mechanism, name) for name in model.study.modes]
+    named = list(dict.fromkeys([*model.mechanism.modes, *studied]))
     rows, more = [_row(mode, effort) for mode in named], 0
     if not named and model.mechanism.motors:
         rows, more = _possible_rows(model, effort)
@@ -59,12 +61,6 @@ def _effort(model: Model, path: str | None) -> Effort | None:
     return placed.plan(
         followed, mechanism=rigid, duration=placed.driven_for(followed), samples=_SAMPLES, warning=False
     ).effort
-
-
-def _named_modes(model: Model) -> list[ActuationMode]:
-    """Modes of [mode] tables, and others of the study."""
-    studied = [parse_mode(model.mechanism, name) for name in model.study.modes]
-    return list(dict.fromkeys([*model.mechanism.modes, *studied]))
 
 
 def _row(mode: ActuationMode, effort: Effort | None) -> dict[str, Any]:

@@ -29,8 +29,10 @@ def sweep_command(request: SweepRequest) -> int:
     # Tables say which parts of paths are run by the verdict's findings.
     parts = {path: part.to_dict() for path, part in study.setting.parts().items()} if request.json else {}
 
-    more = {"part": parts, "verdict": verdict.to_dict()}
-    tell(_figures(result) | more, lambda _: _report(console, result), as_json=request.json, doubts=verdict)
+    figures = {"folder": str(result.folder), "table": str(result.table), **result.to_dict()}
+    session = {"fresh": result.fresh, "seconds": result.seconds, "interrupted": result.interrupted}
+    more = session | {"part": parts, "verdict": verdict.to_dict()}
+    tell(figures | more, lambda _: _report(console, result), as_json=request.json, doubts=verdict)
     if request.report and result.done:
         _write_report(console, folder, result)
     return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)
@@ -75,12 +77,6 @@ def _report(console: Console, result: SweepResult) -> None:
     else:
         stopped = "interrupted; " if result.interrupted else ""
         console.print(f"{stopped}so far: {result.table}; the same command goes on from there", soft_wrap=True)
-
-
-def _figures(result: SweepResult) -> dict:
-    places = {"folder": str(result.folder), "table": str(result.table)}
-    session = {"fresh": result.fresh, "seconds": result.seconds, "interrupted": result.interrupted}
-    return places | result.to_dict() | session
 
 
 def _clock(seconds: float) -> str:

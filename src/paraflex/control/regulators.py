@@ -171,7 +171,14 @@ def _regulator(
     Q[n:, n:] = np.diag([1.0 / (largest[name] * time) ** 2 for name, time in times.items()])
     R = np.diag([1.0 / efforts[name] ** 2 for name in motors])
     check_reach(used, used.B, "effort", "is not reached by the motors", "choose other motors")
-    P = _riccati(A, B, Q, R)
+    try:
+        P = riccati(A, B, Q, R)
+    except (np.linalg.LinAlgError, ValueError):
+        raise InputError(
+            "no feedback is the best one", field="deviations",
+            remedy="let deviations see all that moves freely or vibrates undamped, and integrate no more outputs than "
+            "there are motors, none of which follows from others",
+        ) from None  # fmt: skip
     gain = scipy.linalg.solve(R + B.T @ P @ B, B.T @ P @ A, assume_a="pos")
     poles = np.linalg.eigvals(A - B @ gain)
     return Regulator(plant, motors, _of_all(gain, plant, used), tuple(times), poles)
@@ -192,17 +199,6 @@ def _with_integrals(plant: SampledPlant, names: Sequence[str]) -> tuple[Array, A
     n, more = len(plant.states), len(names)
     A = np.block([[plant.A, np.zeros((n, more))], [rows, np.eye(more)]])
     return A, np.vstack([plant.B, np.zeros((more, plant.B.shape[1]))])
-
-
-def _riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
-    try:
-        return riccati(A, B, Q, R)
-    except (np.linalg.LinAlgError, ValueError):
-        raise InputError(
-            "no feedback is the best one", field="deviations",
-            remedy="let deviations see all that moves freely or vibrates undamped, and integrate no more outputs than "
-            "there are motors, none of which follows from others",
-        ) from None  # fmt: skip
 
 
 def _disturbances(plant: SampledPlant, regulator: Regulator, given: Any, effort: Any) -> Array:

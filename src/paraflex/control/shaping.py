@@ -92,7 +92,11 @@ class Shaper(CheckedFields):
                 object.__setattr__(self, name, values.ravel().tolist())
         super().__post_init__()
         self._check_modes()
-        self._check_tolerance()
+        if self.kind is not ShaperKind.EI and self.tolerance != type(self).tolerance:
+            raise InputError("only an EI shaper has a tolerance", field="tolerance", value=self.tolerance,
+                             remedy='leave it out, or choose "ei"')  # fmt: skip
+        _check_fraction(self.tolerance)
+        _ = self._impulses
         at_most((_ORDERS.get(self.kind, 2) + 1) ** len(self.frequencies), SHAPER_IMPULSES, "frequencies",
                 "too many: the shaper has so many impulses")  # fmt: skip
 
@@ -113,13 +117,6 @@ class Shaper(CheckedFields):
                 f"there are {len(self.frequencies)} frequencies and {len(self.damping)} damping ratios",
                 field="damping", remedy="give one for all, or one for each frequency",
             )  # fmt: skip
-
-    def _check_tolerance(self) -> None:
-        if self.kind is not ShaperKind.EI and self.tolerance != type(self).tolerance:
-            raise InputError("only an EI shaper has a tolerance", field="tolerance", value=self.tolerance,
-                             remedy='leave it out, or choose "ei"')  # fmt: skip
-        _check_fraction(self.tolerance)
-        _ = self._impulses
 
     @property
     def times(self) -> Array:

@@ -461,20 +461,16 @@ class Simulation:
         try:
             self._integration.march(until, on_progress=on_progress)
         finally:
-            self._note_inside()
+            # Note which torques acted in the compiled time loop.
+            if self._loop is not None:
+                self._loop.keep_last()
+                for t, torques in self._loop.torques_acted(len(self._torques.log)):
+                    self._torques.note(t, torques)
         failure = None if self._loop is None else self._loop.failure
         if failure is not None:
             raise failure
         if not (self._integration.goes_on or self.ended):
             self.result()
-
-    def _note_inside(self) -> None:
-        """Note which torques acted in the compiled time loop."""
-        if self._loop is None:
-            return
-        self._loop.keep_last()
-        for t, torques in self._loop.torques_acted(len(self._torques.log)):
-            self._torques.note(t, torques)
 
 
 def _projecting(options: IntegrationOptions) -> IntegrationOptions:

@@ -101,7 +101,12 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     Abandoned
         See `watch`.
     """
-    _check_versions(setting)
+    for name, wanted in setting.versions.items():
+        if versions()[name] != wanted:
+            raise InputError(
+                f"a worker has {name} {versions()[name]}, the sweep was begun with {wanted}", field="--cluster",
+                remedy="give workers the same installation: results must not depend on the worker",
+            )  # fmt: skip
     rows, kept = [_blank(setting, task, mode) for mode in setting.modes], {}
     try:
         planned, options = ready(setting, task)
@@ -113,7 +118,9 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
         measured, run = measured_mode(planned, row["mode"], options, setting.metrics, watch)
         row |= measured
         if run is not None and setting.trajectories:
-            kept[row["id"]] = _trajectory(run, options, row)
+            # Of two runs of one design all must be equal.
+            data = dataset_of(run, options).drop_vars("wall_time", errors="ignore")
+            kept[row["id"]] = data.assign_attrs({name: row[name] for name in ("run", "id", "design")})
     return Outcome(task, rows, kept)
 
 
@@ -280,23 +287,6 @@ def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:
     if isinstance(run, MotionRun):
         return motion_dataset(run, options=options)
     return tracking_dataset([run], options=options)
-
-
-def _trajectory(run: Runs, options: IntegrationOptions, row: Row) -> xr.Dataset:
-    data = dataset_of(run, options)
-    # Of two runs of one design all must be equal.
-    return data.drop_vars("wall_time", errors="ignore").assign_attrs(
-        {"run": row["run"], "id": row["id"], "design": row["design"]}
-    )
-
-
-def _check_versions(setting: Setting) -> None:
-    for name, wanted in setting.versions.items():
-        if versions()[name] != wanted:
-            raise InputError(
-                f"a worker has {name} {versions()[name]}, the sweep was begun with {wanted}", field="--cluster",
-                remedy="give workers the same installation: results must not depend on the worker",
-            )  # fmt: skip
 
 
 def _compile(mechanism: Mechanism) -> None:

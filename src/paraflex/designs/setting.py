@@ -173,7 +173,9 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
     InputError
         Anything that does not fit the mechanism, whatever designs are taken.
     """
-    model = read_model(_mechanism(table.mechanism, folder), table.set)
+    name, beside = table.mechanism, folder / table.mechanism
+    own = name not in library_names() and not is_generated(name) and exists(beside)
+    model = read_model(str(beside) if own else name, table.set)
     runs = STATICS
     if table.statics is not None:
         check_of_statics(table.model_fields_set)
@@ -227,11 +229,6 @@ def _with_statics(model: Model, said: Mapping[str, Any]) -> Model:
         return replace(model_from(data, model.source, model.text), settings=model.settings)
     except InputError as error:
         raise error.in_file("") from None
-
-
-def _mechanism(name: str, folder: FilePath) -> str:
-    beside = folder / name
-    return str(beside) if name not in library_names() and not is_generated(name) and exists(beside) else name
 
 
 def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> Varied:

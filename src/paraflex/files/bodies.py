@@ -54,7 +54,8 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
     if isinstance(body, RigidTable):
         return RigidBody(name, **_given(body))
     if isinstance(body, ModalTable):
-        return _modal_body(name, body)
+        points = {key: ModalPoint(**dict(point)) for key, point in body.points.items()}
+        return ModalBody(name, **_given(body) | {"points": points, "damping": _damping(body.damping, name)})
     lumps = []
     for point, lump_name in body.lumps.items():
         lump = _named(table.lump, lump_name, f"body.{name}.lumps.{point}", "lump")
@@ -145,12 +146,6 @@ def _assumed_modes_beam(
         damping=_damping(table.damping, name),
         flexible=table.flexible,
     )
-
-
-def _modal_body(name: str, table: ModalTable) -> ModalBody:
-    """A body by its own matrices."""
-    points = {key: ModalPoint(**dict(point)) for key, point in table.points.items()}
-    return ModalBody(name, **_given(table) | {"points": points, "damping": _damping(table.damping, name)})
 
 
 def _given(table: RigidTable | ModalTable) -> dict[str, Any]:

@@ -30,18 +30,15 @@ def document_text(data: Mapping[str, Any], text: str = "") -> str:
         A file that holds other data. What is alike stays as it is written there, comments and all.
     """
     written = _written(data, text)
-    # Where a table cannot be changed in place it is written anew, without its comments.
-    differing = _differing(tomllib.loads(written), data)
-    return _written(data, text, differing) if differing else written
-
-
-def _differing(found: Mapping[str, Any], data: Mapping[str, Any]) -> set[str]:
-    """Keys of what differs, or is of another order; of a body's own fields, and of the file's tables, any will do."""
-    return {
+    found = tomllib.loads(written)
+    # Where a table cannot be changed in place it is written anew, without its comments: where something differs, or is
+    # of another order; of a body's own fields, and of the file's tables, any will do.
+    differing = {
         key
         for key in found.keys() | data.keys()
         if found.get(key) != data.get(key) or (isinstance(data[key], dict) and list(found[key]) != list(data[key]))
     }
+    return _written(data, text, differing) if differing else written
 
 
 def _written(data: Mapping[str, Any], text: str, anew: Collection[str] = ()) -> str:

@@ -10,7 +10,6 @@ from typing import Any
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.control.described import NONE, ControllerDescription, check_together
 from paraflex.control.shaped import shape_torques
-from paraflex.control.shaping import Shaper
 from paraflex.equilibria.given import StaticsDefaults, conditions
 from paraflex.errors import InputError, renamed, suggestion, within
 from paraflex.files.controllers import read_controllers
@@ -404,8 +403,9 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
         "orientation": table.study.orientation or 0.0,
         "torques": read_torques(table),
         "controllers": tuple(table.study.controllers),
-        "shaper": _study_shaper(table),
     }
+    with within("study"):
+        said["shaper"] = None if table.study.shaper is None else read_shaper(table.study.shaper)
     study = StudyDefaults(**said)
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
@@ -423,11 +423,6 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     with renamed("study.controllers", only="controllers"):
         model.acting()
     return model
-
-
-def _study_shaper(table: ModelTable) -> Shaper | None:
-    with within("study"):
-        return None if table.study.shaper is None else read_shaper(table.study.shaper)
 
 
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:

@@ -92,7 +92,12 @@ def model_tables(
         },
         "motor": {motor.name: motor.joint for motor in mechanism.motors},
         "prescribed": {each.name: _prescribed(each, mechanism) for each in mechanism.prescribed},
-        **_forces(mechanism),
+        # Springs, dampers, friction and loads.
+        **{
+            group.table: {one.name: ({"type": one.kind} if len(group.kinds) > 1 else {}) | _member(one) for one in many}
+            for group, many in grouped(mechanism)
+            if group.kinds
+        },
         "end_effector": {} if mechanism.end_effector is None else fields_said(mechanism.end_effector),
         "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
         "mode": {mode.name: mode.motors for mode in mechanism.modes},
@@ -105,15 +110,6 @@ def model_tables(
         "statics": fields_said(model.statics),
     }
     return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
-
-
-def _forces(mechanism: Mechanism) -> dict[str, Any]:
-    """Springs, dampers, friction and loads."""
-    return {
-        group.table: {one.name: ({"type": one.kind} if len(group.kinds) > 1 else {}) | _member(one) for one in members}
-        for group, members in grouped(mechanism)
-        if group.kinds
-    }
 
 
 def _member(member: Any) -> dict[str, Any]:

@@ -154,7 +154,12 @@ def hold_folder(
                 raise unwritable(error, field, ELSEWHERE, str(path)) from error
             yield ResultsFolder(path, kind, locks=locks, remedy=remedy)
     finally:
-        _remove_empty(path, made)
+        # Folders that were made for results of which nothing came.
+        with suppress(OSError):
+            if path in made and {file.name for file in path.iterdir()} == {LOCK}:
+                (path / LOCK).unlink()
+            for each in made:
+                each.rmdir()
 
 
 @contextmanager
@@ -181,12 +186,3 @@ def added_to(folder: Path) -> Iterator[Path]:
                 yield stack.enter_context(held.amended()) / folder.relative_to(results)
                 return
         yield folder
-
-
-def _remove_empty(folder: Path, made: Sequence[Path]) -> None:
-    """Remove folders that were made for results of which nothing came."""
-    with suppress(OSError):
-        if folder in made and {file.name for file in folder.iterdir()} == {LOCK}:
-            (folder / LOCK).unlink()
-        for each in made:
-            each.rmdir()

@@ -46,13 +46,12 @@ def mode_shapes(data: xr.Dataset, mode: str | None = None, count: int = 4, theme
     rows = {holding: shown for holding, shown in rows.items() if shown}
     if not rows:
         raise InputError("nothing vibrates", field="data", remedy="look at the poles")
-    scenes = {one: _scene(data, one) for shown in rows.values() for one in shown}
+    scenes = {
+        one: replace(scene(modal_motion(data, one, _QUARTER, 0.6 * SWING), _QUARTER, 2.0), trail=None, followed=None)
+        for shown in rows.values()
+        for one in shown
+    }
     return _panels(rows, scenes, mode, theme_name)
-
-
-def _scene(data: xr.Dataset, one: DrawnMode) -> Scene:
-    found = scene(modal_motion(data, one, _QUARTER, 0.6 * SWING), _QUARTER, 2.0)
-    return replace(found, trail=None, followed=None)
 
 
 def _panels(rows: dict[str, list[DrawnMode]], scenes: dict[DrawnMode, Scene], mode: str, theme_name: str) -> Figure:

@@ -95,7 +95,8 @@ def _charts(one: ControllerData, runs: Sequence[str]) -> Iterator[Chart]:
     few = one.data.isel({SAMPLE: slice(None, None, every)})
     times = few[SAMPLE].values
     note = "Solid as they act, after the delay and until the next sample; dotted those of the law."
-    torques = Chart(f"torques-{one.name}", f"Controller {one.name}: torques", _label(one, few, OUTPUT), note=note)
+    label = f"torque [{', '.join(dict.fromkeys(one.units[name] for name in names_of(few, OUTPUT)))}]"
+    torques = Chart(f"torques-{one.name}", f"Controller {one.name}: torques", label, note=note)
     given, wanted = (few[name].transpose(..., SAMPLE, OUTPUT).values for name in (GIVEN, WANTED))
     curves = []
     for r in range(len(runs)):
@@ -118,10 +119,6 @@ def _charts(one: ControllerData, runs: Sequence[str]) -> Iterator[Chart]:
                     x, y = _stairs(times, shown.factor * values[r, :, p])
                     curves.append(Curve(text_symbol(name), y, x, look(p), run=r, shown=(r,)))
         yield replace(chart, curves=curves)
-
-
-def _label(one: ControllerData, data: xr.Dataset, dim: str) -> str:
-    return f"torque [{', '.join(dict.fromkeys(one.units[name] for name in names_of(data, dim)))}]"
 
 
 def _stairs(times: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -98,7 +98,11 @@ def linear_dataset(
         ((model, ()) for model in models), ((model, motors_of(model)) for model in models)
     ))  # fmt: skip
     maps = [zero_maps(model) for model in models]
-    names = {key: _names(models, key) for key in ("states", "inputs", "outputs")}
+    # Names and units of all models.
+    names = {
+        key: {one.name: one.unit for model in models for one in getattr(model, key)}
+        for key in ("states", "inputs", "outputs")
+    }
     data = _matrices(models, names) | _motions(free, held) | _zeros(maps) | _drawings(models, free, held)
     data["unbalanced"] = ("mode", np.array([model.unbalanced for model in models]))
     frequency = _frequencies(free, held, [zero for each in maps for zero in each.values()])
@@ -154,11 +158,6 @@ def _check(models: Sequence[LinearModel]) -> None:
             "not linear models of different modes of one mechanism", field="models", value=", ".join(modes) or "none",
             remedy="give one of pf.linearise for each mode",
         )  # fmt: skip
-
-
-def _names(models: Sequence[LinearModel], key: str) -> dict[str, str]:
-    """Names and units of the states, inputs or outputs of all models."""
-    return {one.name: one.unit for model in models for one in getattr(model, key)}
 
 
 def _matrices(models: Sequence[LinearModel], named: dict[str, dict[str, str]]) -> dict[str, Any]:

@@ -143,7 +143,8 @@ class Change:
             self.stepped: Stepped[Described] = complex_step(here, self.near, self.stencil)
             self.there: Described = self.stepped.value
             self.system: System = build_system(self.there.mechanism, planned.system)
-            self._check_layout()
+            if not all(same_layout(each.packed, planned.system.packed) for each in self.beside):
+                raise another_layout()
         except InputError as error:
             raise error.at(f"vary.{self.name}") from None
         self.closure: PathClosure = PathClosure(planned.mechanism.rigid(), here.orientation, here.end)
@@ -164,10 +165,6 @@ class Change:
             f"has no derivative, for near it {trouble}", field=f"vary.{self.name}", value=task.values[k],
             remedy="leave it out",
         )  # fmt: skip
-
-    def _check_layout(self) -> None:
-        if not all(same_layout(each.packed, self.planned.system.packed) for each in self.beside):
-            raise another_layout()
 
     @cached_property
     def packed(self) -> Array:

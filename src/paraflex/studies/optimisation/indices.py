@@ -68,7 +68,10 @@ class IndicesResult(SweptResult):
             .reset_index()
             .reindex(columns=list(_ROW_COLUMNS))
         )
-        plain = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
+        plain = [
+            {name: finite_or_none(value) if isinstance(value, float) else value for name, value in row.items()}
+            for row in table.to_dict("records")
+        ]
         return {"kind": "indices", "name": self.sweep.name, "indices": plain}
 
 
@@ -147,7 +150,11 @@ def load_indices(
         sampling = SamplingTable(kind=RANDOM, number=1, seed=chosen)
         base = make_study(table.model_copy(update={"sampling": sampling}), folder)
     number = samples if samples is not None else table.sampling.number or _BASE_SAMPLES
-    _check_samples(number)
+    if number < _FEWEST_BASE_SAMPLES or number & (number - 1):
+        raise InputError(
+            f"Sobol's sequence wants a power of two, {_FEWEST_BASE_SAMPLES} at least", field="--samples", value=number,
+            remedy=f"say {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
+        )  # fmt: skip
     at_most(number * (len(base.parameters) + 2), DESIGNS, "--samples", "too many designs")
     wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].each]
     columns = _columns(wanted, base)
@@ -228,24 +235,12 @@ def _dataset(study: IndicesStudy, found: Sequence[Mapping[str, Any]]) -> xr.Data
     return xr.Dataset(shares | rest, of | {"parameter": list(names)})
 
 
-def _plain(value: Any) -> Any:
-    return finite_or_none(value) if isinstance(value, float) else value
-
-
 def _columns(names: list[str], base: SweepStudy) -> tuple[str, ...]:
     known = [column for name in base.setting.metrics for column in METRICS[name].columns(base.members)]
     for name in names:
         if name not in known:
             raise InputError("not a metric of the study", field="--metric", value=name, remedy=suggestion(name, known))
     return tuple(dict.fromkeys(names))
-
-
-def _check_samples(number: int) -> None:
-    if number < _FEWEST_BASE_SAMPLES or number & (number - 1):
-        raise InputError(
-            f"Sobol's sequence wants a power of two, {_FEWEST_BASE_SAMPLES} at least", field="--samples", value=number,
-            remedy=f"say {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
-        )  # fmt: skip
 
 
 def _problem(names: tuple[str, ...]) -> dict[str, Any]:
