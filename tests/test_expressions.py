@@ -88,6 +88,7 @@ def test_parameters_may_be_expressions_of_others_in_any_order():
         ({"a": "leng", "length": 1.0}, 'unknown parameter "leng" (got \'leng\'); did you mean "length"?'),
         ({"a": True}, "parameters.a: neither a number nor an expression"),
         ({"a": [1.0]}, "parameters.a: neither a number nor an expression"),
+        ({"a": "2 * b", "b": {"c": 1.0}}, "parameters.b: neither a number nor an expression"),
         ({"a": math.inf}, "parameters.a: not a finite number"),
         ({"a-b": 1.0}, "parameters.a-b: not usable as a name"),
         ({"pi": 3.0}, "parameters.pi: not usable as a name"),

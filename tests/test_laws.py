@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.interpolate
 
+import paraflex as pf
 from paraflex.dynamics import constant_signals, pack_signals
 from paraflex.errors import InputError
 from paraflex.files import load
@@ -121,6 +122,17 @@ def test_expressions_without_finite_derivatives_are_refused_with_the_time(text, 
 
 
 # --- Laws from files ----------------------------------------------------------------------------------------------
+
+
+def test_a_speed_without_an_assembly_is_refused_by_what_needs_one(tmp_path):
+    (tmp_path / "model.toml").write_text(
+        'name = "arm"\nground = { O = [0.0, 0.0] }\n[body.arm]\ntype = "rigid"\nmass = 2.0\ninertia = 0.3\n'
+        "centre_of_mass = [0.4, 0.0]\npoints = { O = [0.0, 0.0] }\n[joint]\nO = ['ground.O', 'arm.O']\n"
+        '[prescribed.drive]\njoint = "O"\nspeed = 1.0\n[study]\nduration = 1.0\n'
+    )
+    model = pf.load(tmp_path / "model.toml")
+    with pytest.raises(InputError, match="the mechanism has none; add an"):
+        pf.simulate_motion(model)
 
 
 def test_constant_speed_as_ever(tmp_path):

@@ -144,6 +144,8 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
             raise InputError("not usable as a name", field=field, value=name, remedy="letters, digits and _; not pi")
         if isinstance(entry, bool) or not isinstance(entry, (int, float, str)):
             raise InputError("neither a number nor an expression", field=field, value=entry, remedy="give one of them")
+    for name, entry in table.items():
+        field = f"parameters.{name}"
         with expressed_in(field, entry):
             value = value_of(name, ())
         if not math.isfinite(value):

@@ -77,7 +77,9 @@ def _place(mechanism: Members, ref: PointRef, poses: dict[str, Pose]) -> Place |
 
 
 def joint_value(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:
-    """A joint's angle or travel at approximate poses of the bodies; None if a place is not known."""
+    """A joint's angle or travel at approximate poses of the bodies; None if a pose or place is not known."""
+    if any(not ref.on_ground and ref.body not in poses for ref in (joint.a, joint.b)):
+        return None
     turn_a, turn_b = (0.0 if ref.on_ground else poses[ref.body].angle for ref in (joint.a, joint.b))
     if not joint.slides:
         return turn_b - turn_a
