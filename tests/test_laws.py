@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import scipy.interpolate
 
-import paraflex as pf
 from paraflex.dynamics import constant_signals, pack_signals
 from paraflex.errors import InputError
 from paraflex.files import load
@@ -130,9 +129,9 @@ def test_a_speed_without_an_assembly_is_refused_by_what_needs_one(tmp_path):
         "centre_of_mass = [0.4, 0.0]\npoints = { O = [0.0, 0.0] }\n[joint]\nO = ['ground.O', 'arm.O']\n"
         '[prescribed.drive]\njoint = "O"\nspeed = 1.0\n[study]\nduration = 1.0\n'
     )
-    model = pf.load(tmp_path / "model.toml")
+    model = load(tmp_path / "model.toml")
     with pytest.raises(InputError, match="the mechanism has none; add an"):
-        pf.simulate_motion(model)
+        simulate_motion(model)
 
 
 def test_constant_speed_as_ever(tmp_path):
