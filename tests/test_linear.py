@@ -427,6 +427,16 @@ def test_what_cannot_be_linearised_is_named(raparm_at_q):
         linearise(bare)
 
 
+def test_a_pose_has_no_time_and_a_motion_no_pose():
+    model = pf.load("five_bar")
+    task = model.plan()
+    with pytest.raises(InputError, match="at: means nothing for a pose at rest"):
+        linearise(model, at=0.05)
+    for given in ({"assembly": model.mechanism.assemblies[0].name}, {"balanced": True}):
+        with pytest.raises(InputError, match=f"{next(iter(given))}: means nothing for a motion"):
+            linearise(task, **given)
+
+
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
 def test_times_and_frequencies_are_finite(wrong):
     model = pf.load("five_bar")

@@ -107,8 +107,9 @@ def linearise(
     Raises
     ------
     InputError
-        An unknown mode, point or motion, nothing that could be an input, a time that the motion does not have, a
-        mechanism without any freedom, or coordinates of the end-effector that do not describe its motion.
+        An unknown mode, point or motion, nothing that could be an input, a time that the motion does not have, a time
+        for a mechanism or a pose for a motion, a mechanism without any freedom, or coordinates of the end-effector that
+        do not describe its motion.
     AssemblyError
         The loops do not close, or there is no equilibrium.
     SingularPositionError
@@ -145,7 +146,15 @@ def sought_motion(
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
 ) -> Sought:
     """The point of a motion that is linearised about: see `linearise`."""
-    if isinstance(source, TrackingTask | TrackingRun | MotionRun):
+    moves = isinstance(source, TrackingTask | TrackingRun | MotionRun)
+    others = {"assembly": assembly, "start": start, "balanced": balanced or None} if moves else {"at": at}
+    for name, value in others.items():
+        if value is not None:
+            raise InputError(
+                f"means nothing for a {'motion' if moves else 'pose at rest'}", field=name, value=value,
+                remedy="leave it out, or give the mechanism" if moves else "leave it out, or give a plan or a run",
+            )  # fmt: skip
+    if moves:
         motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
         point = motion.point(0 if at is None else nearest_sample(motion.times, at))
         return Sought(chart, point, ports, motion.about)
