@@ -255,8 +255,8 @@ def _grown_errors(run: MotionRun) -> Iterator[Finding]:
     except IntegrationError as error:
         second = error.partial
     ratio = _COARSER
-    if isinstance(options.method, NativeMethod):
-        # Other limits of steps may have left them nearly as they were.
+    if isinstance(options.method, NativeMethod) and not first.singular_positions:
+        # Other limits of steps may have left them nearly as they were; near singular positions they are kept.
         ratio = min(
             ratio, (first.steps * second.t.size / (max(second.steps, 1) * first.t.size)) ** options.method.order
         )

@@ -348,8 +348,9 @@ def _with_envelope(rows: list[dict], ports: list[list[dict]]) -> list[dict]:
         for port in body_ports:
             for row in range(port["row"], port["row"] + port["rows"]):
                 first[row] = min(first[row], low)
+    second = {port["row"] + 1 for body_ports in ports for port in body_ports if port["rows"] == 2}
     out, start = [], 0
     for i, row in enumerate(rows):
-        out.append(row | {"first": first[i], "start": start})
+        out.append(row | {"second": i in second, "first": first[i], "start": start})
         start += i + 1 - first[i]
     return out

@@ -23,6 +23,8 @@ DEPENDENT_ROW = 1e-12
 SINGULAR_PART = 1e-10
 # A row redundant at the start that has this part left is so no longer: the start was a singular position.
 INDEPENDENT = 1e-3
+# The square of a second row beside its first is taken as no less than this part of it: below is rounding.
+LEAST_SQUARE = 1e-6
 
 
 @inlined
@@ -100,6 +102,17 @@ def add_schur(system, i, work):
                     add_pair_entry(system, work, port.row + r, other.row + q, l == k, weight * value)
 
 
+@inlined
+def own_square(square, product, first_square):
+    """Square of the second of two rows that hold a point, without what it has in common with the first.
+
+    Both would seem to depend on each other where a body turns about the point far more easily than it moves.
+    """
+    if first_square <= 0.0:
+        return square
+    return max(square - product * product / first_square, LEAST_SQUARE * square)
+
+
 @routine
 def factor_schur(system, work, dependent_part):
     """Cholesky factor of the Schur complement in place, row by row within the envelope.
@@ -107,10 +120,14 @@ def factor_schur(system, work, dependent_part):
     Returns the number of dependent rows found; each gets multiplier zero, which leaves the accelerations those of
     the pseudo-inverse (Eq. 59) as long as the constraints are consistent.
     """
-    dependent = 0
+    dependent, before = 0, 0.0
     work.least[0] = 1.0
     for i in range(system.rows.size):
         first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
+        own = work.schur[start + i]
+        if system.rows[i].second:
+            own = own_square(own, work.schur[start + i - 1], before)
+        before = work.schur[start + i]
         for j in range(first, i):
             first_j, start_j = system.rows[j].first, system.rows[j].start - system.rows[j].first
             total = work.schur[start + j]
@@ -126,8 +143,8 @@ def factor_schur(system, work, dependent_part):
             work.redundant[i] = 0.0
         # Springs give: their rows never depend on others.
         counts = system.rows[i].kind == CONSTRAINT and work.redundant[i] == 0.0
-        if counts and pivot < work.least[0] * diagonal:
-            work.least[0], work.least[1] = pivot / diagonal, i
+        if counts and pivot < work.least[0] * own:
+            work.least[0], work.least[1] = pivot / own, i
         if pivot > max(dependent_part, work.redundant[i]) * diagonal:
             work.schur[start + i] = 1.0 / sqrt(pivot)
         else:

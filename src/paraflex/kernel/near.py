@@ -15,7 +15,7 @@ from math import sqrt
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import constraint_values
-from paraflex.kernel.linear import solve_system
+from paraflex.kernel.linear import own_square, solve_system
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.projection import NO_VIOLATION, largest_violation, least_change
 from paraflex.kernel.run_state import (
@@ -146,7 +146,22 @@ def rest_of_row(system, work, i, scratch):
         follows += work.schur[start + k] * scratch[k]
         square += work.schur[start + k] * work.schur[start + k]
     inverse = work.schur[start + i]
-    return follows, inverse, 1.0 / sqrt(1.0 + square * inverse * inverse)
+    if inverse == 0.0:
+        return follows, inverse, 1.0
+    pivot = 1.0 / (inverse * inverse)
+    own = pivot + square
+    if system.rows[i].second:
+        first_before, before = system.rows[i - 1].first, system.rows[i - 1].start - system.rows[i - 1].first
+        diagonal = work.schur[before + i - 1]
+        product = first_square = 0.0
+        if diagonal > 0.0:
+            product, first_square = work.schur[start + i - 1] / diagonal, 1.0 / (diagonal * diagonal)
+            for k in range(max(first, first_before), i - 1):
+                product += work.schur[start + k] * work.schur[before + k]
+            for k in range(first_before, i - 1):
+                first_square += work.schur[before + k] * work.schur[before + k]
+        own = own_square(own, product, first_square)
+    return follows, inverse, min(sqrt(pivot / own), 1.0)
 
 
 @routine

@@ -155,6 +155,7 @@ ROW = np.dtype(
         ("compliance", np.float64),
         ("limit", np.float64),  # of friction: lambda = limit tanh(rate / (compliance limit))
         ("unit", np.float64),  # what Phi is compared with: the size of the mechanism for a length, 1 for an angle
+        ("second", np.int64),  # whether it is the second of two rows that hold one point
         ("first", np.int64),  # first column of the row in the envelope of the Schur complement
         ("start", np.int64),  # and where that column is stored
     ],
