@@ -39,9 +39,9 @@ from paraflex.validity import Validity, assess, doubtful_results, moved_far, war
 
 # Remedy of a balanced start that is not found.
 UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
-# Errors of a free motion are looked for with a tolerance so many times as large: what that changes is at most so many
-# times the error. They are found where they are more than the second part of a radian and of the size of the mechanism,
-# or of what a coordinate moves by, where that is less; but not where it moves by less than the third part of these.
+# Errors of a free motion are looked for with a tolerance so many times as large, which multiplies them by as much at
+# most. They are found above the second part of a radian and of the mechanism's size, or of what a coordinate moves by
+# where that is less, but not less than the third part of these.
 _COARSER, _GROWN, _SMALL = 100.0, 1e-3, 0.01
 
 
@@ -257,9 +257,8 @@ def _grown_errors(run: MotionRun) -> Iterator[Finding]:
     ratio = _COARSER
     if isinstance(options.method, NativeMethod) and not first.singular_positions:
         # Other limits of steps may have left them nearly as they were; near singular positions they are kept.
-        ratio = min(
-            ratio, (first.steps * second.t.size / (max(second.steps, 1) * first.t.size)) ** options.method.order
-        )
+        saved = first.steps * second.t.size / (max(second.steps, 1) * first.t.size)
+        ratio = min(ratio, saved**options.method.order)
     q = first.q[: second.t.size] / system.units
     errors = np.abs(second.q / system.units - q) / np.clip(np.ptp(q, axis=0), _SMALL, 1.0) / max(ratio - 1.0, 0.1)
     grown = np.max(errors, axis=1) > _GROWN

@@ -149,17 +149,13 @@ def rest_of_row(system, work, i, scratch):
     if inverse == 0.0:
         return follows, inverse, 1.0
     pivot = 1.0 / (inverse * inverse)
-    own = pivot + square
-    if system.rows[i].second:
-        first_before, before = system.rows[i - 1].first, system.rows[i - 1].start - system.rows[i - 1].first
-        diagonal = work.schur[before + i - 1]
-        product = first_square = 0.0
-        if diagonal > 0.0:
-            product, first_square = work.schur[start + i - 1] / diagonal, 1.0 / (diagonal * diagonal)
-            for k in range(max(first, first_before), i - 1):
-                product += work.schur[start + k] * work.schur[before + k]
-            for k in range(first_before, i - 1):
-                first_square += work.schur[before + k] * work.schur[before + k]
+    own, before = pivot + square, system.rows[i - 1].start - first
+    if system.rows[i].second and work.schur[before + i - 1] > 0.0:
+        diagonal = 1.0 / work.schur[before + i - 1]
+        product, first_square = work.schur[start + i - 1] * diagonal, diagonal * diagonal
+        for k in range(first, i - 1):
+            product += work.schur[start + k] * work.schur[before + k]
+            first_square += work.schur[before + k] * work.schur[before + k]
         own = own_square(own, product, first_square)
     return follows, inverse, min(sqrt(pivot / own), 1.0)
 
