@@ -115,7 +115,7 @@ def test_a_spring_acts_on_the_slope_of_a_beam(geometry):
     found = 2 * np.pi / solution.t[-1] * (peak + 0.5 * (left - right) / (left - 2 * middle + right))
     assert found == pytest.approx(omega, rel=0.01)
     total = solution.kinetic_energy + solution.strain_energy
-    assert solution.energy_balance_max < 0.05 * total[0]
+    assert solution.energy_balance_max < 0.12 * total[0]
 
 
 def first_frequency(mass_per_length, EI, length, stiffness):
