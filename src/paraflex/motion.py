@@ -29,7 +29,6 @@ from paraflex.dynamics import (
 from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
-from paraflex.integrators.method import NativeMethod
 from paraflex.kernel.packed import Signals
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import AngleLaw, Mechanism, Start
@@ -255,7 +254,7 @@ def _grown_errors(run: MotionRun) -> Iterator[Finding]:
     except IntegrationError as error:
         second = error.partial
     ratio = _COARSER
-    if isinstance(options.method, NativeMethod) and not first.singular_positions:
+    if options.controls_errors and not first.singular_positions:
         # Other limits of steps may have left them nearly as they were; near singular positions they are kept.
         saved = first.steps * second.t.size / (max(second.steps, 1) * first.t.size)
         ratio = min(ratio, saved**options.method.order)
