@@ -1,6 +1,7 @@
 """Run the tests as on other processors and report the assertions that rounding may fail.
 
-    python tests/any_processor.py [FILE ...] [--setting NAME | --by-commit] [--folder FOLDER] [--table]
+    python tests/any_processor.py [FILE ...] [--setting NAME] [--folder FOLDER] [--table]
+    python tests/any_processor.py --by-commit
 
 OPENBLAS_CORETYPE selects the routines that OpenBLAS uses on another processor; NUMBA_CPU_NAME compiles the kernels for
 another one. Sums then have another order, products are fused or not, and results differ by rounding. The tests run
@@ -20,8 +21,8 @@ occurrence, as far as all settings reach.
 The script prints a Markdown table and exits with 1 if a test fails or an assertion is reported. The whole suite takes
 twenty minutes per setting on two cores, and some minutes more where kernels are compiled for another processor (Numba
 keeps these apart in its cache). `--folder` keeps the records, and `--table` evaluates those without running
-anything. `--by-commit`, for CI, runs the numerical files under one setting other than the first, which depends on the
-commit, so that all of them are used in turn.
+anything. `--by-commit`, for CI, only prints one setting other than the first as variables of the environment. It
+depends on the commit, so that all of them are used in turn.
 """
 
 from __future__ import annotations
@@ -45,14 +46,6 @@ SETTINGS: dict[str, dict[str, str]] = {
     **{f"kernels {name}": {"NUMBA_CPU_NAME": name} for name in ("generic", "haswell")},
 }
 MOST_USED, MOVED, MOST_SPREAD = 1.0 / 3.0, 0.01, 0.1
-# Files of linear algebra and time integration that take some three minutes on two cores.
-NUMERICAL = (
-    "andrews", "beam_frames", "body_terms", "closure", "consistency", "contacts", "dwell", "equilibrium", "events",
-    "exact_derivatives", "following", "integrator", "krylov", "laws_compared", "laws_inside",
-    "linear", "linear_reduced", "linear_simulated", "linearise", "loads", "loads_in_time", "margins", "methods",
-    "optimisation", "reduced_along", "regulators", "rows", "segments", "sensitivities",
-    "spectra", "springs", "statics", "stress", "tracking",
-)  # fmt: skip
 
 
 @dataclass
@@ -163,17 +156,18 @@ def main() -> int:
     """The exit code: 1 if a test failed or rounding may fail one."""
     reader = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     reader.add_argument("tests", nargs="*", help="files of tests; all by default")
-    which = reader.add_mutually_exclusive_group()
-    which.add_argument("--setting", action="append", choices=list(SETTINGS), help="one or more; all by default")
-    which.add_argument("--by-commit", action="store_true", help="numerical files, one setting by the commit")
+    reader.add_argument("--setting", action="append", choices=list(SETTINGS), help="one or more; all by default")
+    reader.add_argument("--by-commit", action="store_true", help="print one setting, by the commit")
     reader.add_argument(
         "--workers", default="auto", help="processes of each run; as many as there are cores by default"
     )
     reader.add_argument("--folder", type=Path, help="for records and results; a temporary one by default")
     reader.add_argument("--table", action="store_true", help="of what is in the folder; nothing is run")
     given = reader.parse_args()
-    settings = [setting_of_commit()] if given.by_commit else given.setting or list(SETTINGS)
-    tests = given.tests or [str(TESTS / f"test_{name}.py") for name in NUMERICAL if given.by_commit]
+    if given.by_commit:
+        print(*(f"{name}={value}" for name, value in SETTINGS[setting_of_commit()].items()))
+        return 0
+    settings = given.setting or list(SETTINGS)
     with tempfile.TemporaryDirectory() as temporary:
         folder = (given.folder or Path(temporary)).absolute()
         folder.mkdir(parents=True, exist_ok=True)
@@ -181,7 +175,7 @@ def main() -> int:
             settings = [setting for setting in settings if files_of(setting, folder)[1].exists()]
         for setting in settings if not given.table else ():
             print(f"--- {setting}", flush=True)
-            run_tests(setting, tests, folder, given.workers)
+            run_tests(setting, given.tests, folder, given.workers)
         runs = {setting: read_run(setting, folder) for setting in settings}
     print(table(runs))
     return 1 if any(run.failed for run in runs.values()) or excesses(list(runs.values())) else 0

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -102,6 +104,9 @@ def test_every_setting_has_its_turn(monkeypatch):
     assert found == others
 
 
-def test_numerical_files_are_there():
-    files = {file.stem for file in any_processor.TESTS.glob("test_*.py")}
-    assert {f"test_{name}" for name in any_processor.NUMERICAL} <= files
+def test_the_setting_of_a_commit_is_printed_for_the_environment():
+    done = subprocess.run(
+        [sys.executable, any_processor.__file__, "--by-commit"], capture_output=True, text=True, check=True
+    )
+    name, _, value = done.stdout.strip().partition("=")
+    assert {name: value} in any_processor.SETTINGS.values()

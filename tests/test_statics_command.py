@@ -59,6 +59,8 @@ def test_loads_beyond_buckling_are_said_and_drawn(tmp_path):
     assert done.returncode == 0
     assert "warning: 1 of 5 equilibria are unstable" in done.stdout
     assert "buckling at 0.8635 of what is given, as seen from the start" in done.stdout
+    # Each leaf between its clamps, which stay where they are: four times as much.
+    assert "as seen from the start (next 3.454)\n" in done.stdout
     assert pytest.approx(2.0 * math.pi**2 * EI / LENGTH**2, rel=1e-3) == 100.0 * 0.8635
     assert (tmp_path / "b" / "figures" / "buckling_shapes.png").exists()
 

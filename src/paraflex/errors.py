@@ -135,9 +135,13 @@ def warn_user(warning: ParaflexWarning) -> None:
 
 
 def suggestion(name: object, known: Iterable[str]) -> str:
-    """A remedy for an unknown name: the nearest known one, or all of them if several are as near."""
+    """A remedy for an unknown name: the nearest known one, or all of them if several are as near.
+
+    Where no name is near, one of whose words is near stands for it: "center" for "centre_of_mass".
+    """
     known = list(known)
     near = get_close_matches(str(name), known, n=2)
+    near = near or [each for each in known if get_close_matches(str(name), each.split("_"), n=1)]
     alike = [SequenceMatcher(None, str(name), each).ratio() for each in near]
     if near and len(set(alike)) == len(alike):
         return f'did you mean "{near[0]}"?'

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from paraflex.errors import InputError, listed
+from paraflex.errors import InputError, suggestion
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.fields import check_units, field_at
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
@@ -212,9 +212,7 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
         return InputError("is missing", field=field, remedy=f"give {description}")
     if kind == "extra_forbidden":
         known = sorted(model.model_fields) if model is not None else []
-        near = get_close_matches(str(location[-1]), known, n=1)
-        remedy = f'did you mean "{near[0]}"?' if near else f"known here: {listed(known)}"
-        remedy = _above(schema, str(location[-1])) or remedy
+        remedy = _above(schema, str(location[-1])) or suggestion(location[-1], known)
         return InputError("unknown field", field=field, value=value, remedy=remedy)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _tag_problem(_tags(schema, problem["loc"]), field, value)
