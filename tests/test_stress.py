@@ -36,6 +36,7 @@ from paraflex.mechanism import (
 )
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset
+from paraflex.results.numbers import single
 
 L, WIDTH, THICK = 0.8, 0.02, 0.005
 BAR, STEEL = Section.rectangle(WIDTH, THICK), Material(2.1e11, 7800.0, 3e8)
@@ -280,3 +281,9 @@ def test_the_moment_at_a_motor_is_its_torque_with_one_element():
     root = data["section_moment"].values[:, 0]
     # Measured 1.1e-4 of the largest.
     np.testing.assert_allclose(root, -torque, rtol=0, atol=2e-4 * np.abs(torque).max())
+
+
+def test_numbers_beyond_single_precision_stay_double():
+    assert single(np.array([1.0, np.nan])).dtype == np.float32
+    large = np.array([1e39, np.nan])
+    assert single(large) is large

@@ -16,6 +16,7 @@ from paraflex.mechanism import Mechanism
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
 from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
+from paraflex.results.numbers import single
 from paraflex.results.outlines import chord_deflections
 from paraflex.results.sensors import READING, SENSOR
 from paraflex.results.storage import origin
@@ -171,7 +172,7 @@ def link_variables(links: Links, mechanism: Mechanism) -> Variables:
         "kinetic_energy": ((), links.kinetic_energy),
         "strain_energy": ((), links.strain_energy),
         "work": ((), links.work),
-        **{name: (dims, x.astype(np.float32)) for name, (dims, x) in drawing_variables(links.drawing).items()},
+        **{name: (dims, single(x)) for name, (dims, x) in drawing_variables(links.drawing).items()},
         **_load_variables(links, mechanism),
     }
 

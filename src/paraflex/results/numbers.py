@@ -25,6 +25,11 @@ def largest(values: Array) -> float | None:
     return float(known.max()) if known.size else None
 
 
+def single(values: Array) -> Array:
+    """Numbers in single precision, or as they are where one of them would overflow."""
+    return values if (largest(values) or 0.0) > np.finfo(np.float32).max else values.astype(np.float32)
+
+
 def units_of_each(array: xr.DataArray, number: int) -> list[str]:
     """Units of so many members of a variable: its own of all where it does not say them one by one."""
     each = str(array.attrs.get("units_each", "")).split(", ")

@@ -18,7 +18,7 @@ from paraflex.results.drawing import system_drawing
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
-from paraflex.results.numbers import by_label, finite_or_none, stacked
+from paraflex.results.numbers import by_label, finite_or_none, single, stacked
 from paraflex.results.run_traces import StaticsTraces
 from paraflex.results.storage import origin
 from paraflex.results.validity import validity_summary, validity_variables
@@ -169,7 +169,7 @@ def _buckling_shapes(found: Statics) -> dict[str, Any]:
     out = np.full((steps * count, *drawn.shape[1:]), np.nan)
     out[known] = system_drawing(found.system, moved[known]).shape - np.repeat(drawn, count, axis=0)[known]
     out[known] /= np.linalg.norm(out[known], axis=2).max(axis=1)[:, None, None]
-    values = out.reshape(steps, count, *drawn.shape[1:]).astype(np.float32)
+    values = single(out.reshape(steps, count, *drawn.shape[1:]))
     return {"buckling_shape": (("step", "buckling_number", "station", "axis"), values)}
 
 

@@ -13,7 +13,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.dynamics.sections import SectionLoads, Sections, sections_of
 from paraflex.results.loads import OF_BEAMS
-from paraflex.results.numbers import largest
+from paraflex.results.numbers import largest, single
 
 # Dimensions besides time, and values at the samples reached.
 Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
@@ -85,8 +85,8 @@ def section_variables(found: SectionResult, bodies: list[str]) -> Variables:
         if own.any() and np.isfinite(found.loads.modulus[:, own]).any():
             along[:, b] = np.fmax.reduce(stress[:, own], axis=1)
     out: Variables = {
-        "section_moment": ((SECTION,), found.loads.moment[:, :number].astype(np.float32)),
-        "section_force": ((SECTION,), found.loads.force[:, :number].astype(np.float32)),
+        "section_moment": ((SECTION,), single(found.loads.moment[:, :number])),
+        "section_force": ((SECTION,), single(found.loads.force[:, :number])),
         "stress": (("body",), along),
     }
     if found.sections.contacts:
