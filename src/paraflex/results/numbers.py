@@ -27,7 +27,7 @@ def largest(values: Array) -> float | None:
 
 def single(values: Array) -> Array:
     """Numbers in single precision, or as they are where one of them would overflow."""
-    return values if (largest(values) or 0.0) > np.finfo(np.float32).max else values.astype(np.float32)
+    return values if (largest(values) or 0.0) > float(np.finfo(np.float32).max) else values.astype(np.float32)
 
 
 def units_of_each(array: xr.DataArray, number: int) -> list[str]:
