@@ -240,7 +240,7 @@ class Coordinates:
         return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant], acting)
 
     def choose(self, tangents: PointTangents, without: Collection[int] = ()) -> Chosen:
-        """Choose minimal coordinates at a pose, without the given ones of `measured`.
+        """Choose minimal coordinates at a pose, with the exception of those of `measured` in `without`.
 
         Raises
         ------

@@ -110,8 +110,8 @@ class SumRelation(Relation):
     name : str
         Name of the relation.
     weights : mapping of str to float
-        Weights by joint, with units such that all products have the same unit. The multiplier of the constraint row,
-        scaled by a joint's weight, is the negative torque or force on that joint.
+        Weights by joint, with units such that all products have the same unit. The multiplier of the constraint row is
+        the negative torque or force on the joint of largest weight; that on another joint is in the ratio of weights.
     phase : float, optional
         Value of the sum; by default its value in the first assembly, which a mechanism fills in.
     """

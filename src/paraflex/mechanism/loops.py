@@ -13,7 +13,8 @@ def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:
 
     Bodies and the ground are the nodes of a graph, joints its edges. A spanning tree is grown from the ground by
     breadth-first search; every other joint closes a loop with the tree paths from its bodies to their common ancestor.
-    The number of loops is that of joints less that of bodies, and loops near the ground are short.
+    With a connection to the ground the number of loops is that of joints less that of bodies. Loops near the ground are
+    short.
     """
     parent = _tree(mechanism)
     in_tree = {entry[0] for entry in parent.values() if entry is not None}
