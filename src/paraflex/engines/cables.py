@@ -1,4 +1,4 @@
-"""Rigid bodies and ANCF cables: the motion of a mechanism's links from Exudyn's coordinates."""
+"""Motion of rigid bodies and ANCF cables from the coordinates of Exudyn."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from paraflex.results.outlines import Outline, turned
 
 Columns = NDArray[np.int64]
 
-# Points of Gauss quadrature: as many as Exudyn takes for a cable's virtual work, and what mass of sixth degree needs.
+# Numbers of Gauss points: those of Exudyn for a cable's virtual work, and those for a mass integrand of sixth degree.
 _AXIAL_POINTS, _BENDING_POINTS, _MASS_POINTS = 5, 3, 4
 # Cubic Hermite polynomials in z = x/L, ascending powers; position and slope of the first node, then of the second.
 _CUBIC = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
-# The power of L that scales each.
+# Power of L that scales each polynomial.
 _LENGTH_POWER = np.array([0, 1, 0, 1])
 
 
 class RigidState(NamedTuple):
-    """Pose and velocity of a body at the start [m, rad, m/s, rad/s]."""
+    """Initial pose and velocity of a body [m, rad, m/s, rad/s]."""
 
     x: float
     y: float
@@ -36,13 +36,13 @@ class RigidState(NamedTuple):
     w: float
 
     def direction(self, x: float, y: float) -> tuple[list[float], list[float]]:
-        """A vector of the body frame in the ground frame, and its rate."""
+        """Return a vector of the body frame in the ground frame, and its rate."""
         c, s = float(np.cos(self.phi)), float(np.sin(self.phi))
         X, Y = c * x - s * y, s * x + c * y
         return [X, Y], [-self.w * Y, self.w * X]
 
     def point(self, x: float, y: float) -> tuple[list[float], list[float]]:
-        """Position and velocity of a point of the body frame."""
+        """Return position [m] and velocity [m/s] of a point of the body frame."""
         (X, Y), (dX, dY) = self.direction(x, y)
         return [self.x + X, self.y + Y], [self.vx + dX, self.vy + dY]
 
@@ -54,10 +54,11 @@ class Trajectory:
     Attributes
     ----------
     t : (k,) array
+        Times of the steps [s].
     states : (3, k, n) array
-        Coordinates and their two derivatives.
+        Coordinates and their first and second derivatives.
     multipliers : (k, m) array
-        As Exudyn gives them.
+        Multipliers with the sign convention of Exudyn.
     """
 
     t: Array
@@ -65,12 +66,12 @@ class Trajectory:
     multipliers: Array
 
     def thinned(self, every: int) -> Trajectory:
-        """Every n-th step."""
+        """Return the trajectory at every n-th step."""
         return Trajectory(self.t[::every], self.states[:, ::every], self.multipliers[::every])
 
 
 class Turn(NamedTuple):
-    """Angle, rate and acceleration of the material at a point, each (k,)."""
+    """Angle [rad], rate and angular acceleration of the material at a point, each (k,)."""
 
     angle: Array
     rate: Array
@@ -79,42 +80,42 @@ class Turn(NamedTuple):
 
 @dataclass(frozen=True)
 class Ground:
-    """The ground, an object of the engine with a number."""
+    """Ground of the mechanism, with the number of its object in the engine."""
 
     item: int
     points: Mapping[str, tuple[float, float]]
     start: ClassVar[float] = 0.0
 
     def place(self, point: str) -> dict[str, Any]:
-        """Marker of a named point, as arguments of Exudyn."""
+        """Return the arguments of Exudyn for a marker at a named point."""
         return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
 
     def motion(self, point: str, history: Trajectory) -> PointMotion:
-        """Motion of a named point, which is at rest."""
+        """Return the motion of a named point, which is at rest."""
         still = np.zeros((history.t.size, 2))
         return PointMotion(still + self.points[point], still, still)
 
     def turn(self, point: str, history: Trajectory) -> Turn:
-        """Zero: the ground does not move."""
+        """Return zeros: the ground does not move."""
         return Turn(*np.zeros((3, history.t.size)))
 
 
 @dataclass(frozen=True)
 class RigidLink:
-    """A rigid body; its coordinates are those of its centre of mass.
+    """Rigid body, with the coordinates of its centre of mass.
 
     Attributes
     ----------
     item : int
-        The engine's number of the object.
+        Number of the object in the engine.
     columns : (3,) array of int
-        Its coordinates among all: x, y, angle.
+        Indices of the coordinates x, y and angle.
     points : mapping
-        Named points, from the centre of mass [m].
+        Named points relative to the centre of mass, in the body frame [m].
     mass, inertia : float
-        [kg, kg m^2]
+        Mass [kg] and moment of inertia about the centre of mass [kg m^2].
     start : float
-        Angle at the start [rad].
+        Initial angle [rad].
     """
 
     item: int
@@ -125,11 +126,11 @@ class RigidLink:
     start: float
 
     def place(self, point: str) -> dict[str, Any]:
-        """Marker of a named point, as arguments of Exudyn."""
+        """Return the arguments of Exudyn for a marker at a named point."""
         return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
 
     def motion(self, point: str, history: Trajectory) -> PointMotion:
-        """Motion of a named point."""
+        """Return the motion of a named point."""
         r, v, a = history.states[:, :, self.columns[:2]]
         angle, rate, acceleration = self.frame(history)
         x, y = self.points[point]
@@ -139,68 +140,69 @@ class RigidLink:
         return PointMotion(r + arm, v + w * across, a + dw * across - w**2 * arm)
 
     def curve(self, drawn: Outline, history: Trajectory) -> Array:
-        """Places of the stations of the body (k, s, 2) [m]."""
-        # Any of its joints gives the distance of the body's frame from the centre of mass.
+        """Return the positions of the stations of the body (k, s, 2) [m]."""
+        # Any point gives the offset of the body frame from the centre of mass.
         point, station = next(iter(drawn.points.items()))
         places = drawn.places - drawn.places[station] + self.points[point]
         return turned(history.states[0][:, self.columns[:2]], self.frame(history).angle, places)
 
     def turn(self, point: str, history: Trajectory) -> Turn:
-        """Rotation of the material at a named point."""
+        """Return the rotation of the material at a named point."""
         return self.frame(history)
 
     def frame(self, history: Trajectory) -> Turn:
-        """Rotation of the body."""
+        """Return the rotation of the body."""
         return Turn(*history.states[:, :, self.columns[2]])
 
     def chord(self, history: Trajectory) -> Turn:
-        """Rotation of the body."""
+        """Return the rotation of the body."""
         return self.frame(history)
 
     def tip(self, history: Trajectory) -> Array:
-        """Zero: a rigid body has no deflection."""
+        """Return zeros: a rigid body has no deflection."""
         return np.zeros((history.t.size, 3))
 
     @property
     def masses(self) -> tuple[int, ...]:
-        """The engine's objects with distributed mass."""
+        """Numbers of the engine's objects with distributed mass."""
         return (self.item,)
 
     @property
     def lumped(self) -> list[tuple[dict[str, Any], float]]:
-        """Places and masses of lumps: none."""
+        """Positions and masses of lumps; empty for a rigid body."""
         return []
 
     def weighted(self, history: Trajectory) -> Array:
-        """Sum of mass times position (k, 2) [kg m]."""
+        """Return the first moment of mass, in the ground frame (k, 2) [kg m]."""
         return self.mass * history.states[0][:, self.columns[:2]]
 
     def kinetic_energy(self, history: Trajectory) -> Array:
-        """Kinetic energy of the body [J]."""
+        """Return the kinetic energy of the body (k,) [J]."""
         return 0.5 * history.states[1][:, self.columns] ** 2 @ [self.mass, self.mass, self.inertia]
 
     def strain_energy(self, history: Trajectory) -> Array:
-        """Zero for a rigid body."""
+        """Return zeros: a rigid body has no strain energy."""
         return np.zeros(history.t.size)
 
 
 @dataclass(frozen=True)
 class Cable:
-    """A row of ANCF cables, cubic in positions r and slope vectors r' = dr/dx of its nodes.
+    """Chain of ANCF cable elements, cubic in the positions r and slope vectors r' = dr/dx of the nodes.
 
     Attributes
     ----------
     mesh : BeamMesh
+        Mesh of the beam.
     spans : tuple of SpanProperties
-        One an element.
+        Mass and stiffness of each element.
     items : tuple of int
-        The engine's numbers of the elements.
+        Numbers of the elements in the engine.
     columns : (2 nodes, 2) array of int
-        Coordinates x, y among all, of r and r' of each node in turn.
+        Indices of the coordinates x and y of r and r', alternating node by node.
     lumps : (nodes, 2) array
-        Mass and moment of inertia lumped at each node [kg, kg m^2].
+        Lumped mass and moment of inertia at each node [kg, kg m^2].
     start : float
-        Angle at the start [rad].
+        Initial angle [rad].
     """
 
     mesh: BeamMesh
@@ -216,7 +218,7 @@ class Cable:
         return self.mesh.points
 
     def place(self, point: str) -> dict[str, Any]:
-        """Marker of a named point, as arguments of Exudyn."""
+        """Return the arguments of Exudyn for a marker at a named point."""
         return self._at(self.points[point])
 
     def _at(self, node: int) -> dict[str, Any]:
@@ -225,11 +227,11 @@ class Cable:
         return {"bodyNumber": self.items[element], "localPosition": [along, 0.0, 0.0]}
 
     def motion(self, point: str, history: Trajectory) -> PointMotion:
-        """Motion of a named point."""
+        """Return the motion of a named point."""
         return PointMotion(*history.states[:, :, self.columns[2 * self.points[point]]])
 
     def curve(self, drawn: Outline, history: Trajectory) -> Array:
-        """Places of the stations of the centre line (k, s, 2) [m]."""
+        """Return the positions of the stations of the centre line (k, s, 2) [m]."""
         x, nodes = drawn.places[:, 0], self.mesh.nodes
         element = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, self.mesh.n_elements - 1)
         rows = np.zeros((x.size, len(self.columns)))
@@ -239,19 +241,19 @@ class Cable:
         return rows @ history.states[0][:, self.columns]
 
     def turn(self, point: str, history: Trajectory) -> Turn:
-        """Rotation of the tangent at a named point."""
+        """Return the rotation of the tangent at a named point."""
         return self._tangent(self.points[point], history)
 
     def frame(self, history: Trajectory) -> Turn:
-        """Rotation of the tangent at the first end."""
+        """Return the rotation of the tangent at the first end."""
         return self._tangent(0, history)
 
     def chord(self, history: Trajectory) -> Turn:
-        """Rotation of the line from the first end to the last."""
+        """Return the rotation of the chord from the first to the last end."""
         return turn_of(self.start, *self._line(history))
 
     def tip(self, history: Trajectory) -> Array:
-        """Axial, transverse displacement and slope (k, 3) of the last end against the tangent at the first."""
+        """Return axial and transverse displacement and slope (k, 3) of the last end from the tangent at the first."""
         phi = self.frame(history).angle
         x, y = self._line(history)[0].T
         c, s = np.cos(phi), np.sin(phi)
@@ -260,22 +262,22 @@ class Cable:
 
     @property
     def masses(self) -> tuple[int, ...]:
-        """The engine's objects with distributed mass."""
+        """Numbers of the engine's objects with distributed mass."""
         return self.items
 
     @property
     def lumped(self) -> list[tuple[dict[str, Any], float]]:
-        """Places and masses of the lumps."""
+        """Positions and masses of the lumps."""
         return [(self._at(node), float(mass)) for node, (mass, _) in enumerate(self.lumps) if mass > 0.0]
 
     def weighted(self, history: Trajectory) -> Array:
-        """Sum of mass times position (k, 2) [kg m]."""
+        """Return the first moment of mass, in the ground frame (k, 2) [kg m]."""
         q = history.states[0][:, self.columns]
         weights, rows = self._quadrature(_MASS_POINTS, 0)
         return (weights * self._along("mass_per_length", _MASS_POINTS)) @ (rows @ q) + self.lumps[:, 0] @ q[:, ::2]
 
     def kinetic_energy(self, history: Trajectory) -> Array:
-        """1/2 int rho A |r_t|^2 dx, and the lumps' 1/2 m |r_t|^2 + 1/2 J |r'_t|^2 [J]."""
+        """Compute 1/2 int rho A |r_t|^2 dx, plus 1/2 m |r_t|^2 + 1/2 J |r'_t|^2 of the lumps [J]."""
         weights, rows = self._quadrature(_MASS_POINTS, 0)
         weights = weights * self._along("mass_per_length", _MASS_POINTS)
         mass = np.diag(self.lumps.ravel()) + (rows.T * weights) @ rows
@@ -283,7 +285,7 @@ class Cable:
         return 0.5 * np.sum(v * (mass @ v), axis=(1, 2))
 
     def strain_energy(self, history: Trajectory) -> Array:
-        """1/2 int EA (|r'| - 1)^2 + EI (r' x r'' / |r'|^2)^2 dx [J]."""
+        """Compute 1/2 int EA (|r'| - 1)^2 + EI (r' x r'' / |r'|^2)^2 dx [J]."""
         q = history.states[0][:, self.columns]
         weights, rows = self._quadrature(_AXIAL_POINTS, 1)
         strain = np.linalg.norm(rows @ q, axis=2) - 1.0
@@ -294,7 +296,7 @@ class Cable:
         return 0.5 * (axial + curvature**2 @ (weights * self._along("bending_stiffness", _BENDING_POINTS)))
 
     def rounding(self, reference: Array) -> float:
-        """Rounding error of the axial force: EA times that of positions over the element length, at its largest [N]."""
+        """Return the largest rounding error of the axial force, EA times that of positions over element length [N]."""
         far = float(np.max(np.abs(reference[self.columns[::2]])))
         stiffest = float(np.max(self._along("axial_stiffness", 1) / np.diff(self.mesh.nodes)))
         return float(np.finfo(float).eps) * stiffest * far
@@ -303,15 +305,15 @@ class Cable:
         return turn_of(self.start, *history.states[:, :, self.columns[1::2][node]])
 
     def _line(self, history: Trajectory) -> Array:
-        """Vector from the first end to the last, with two derivatives (3, k, 2)."""
+        """Return the vector from the first to the last end, with two derivatives (3, k, 2)."""
         return history.states[:, :, self.columns[-2]] - history.states[:, :, self.columns[0]]
 
     def _along(self, quantity: str, count: int) -> Array:
-        """A property of the spans at the Gauss points of every element."""
+        """Return a property of the elements at their Gauss points."""
         return np.repeat([getattr(span, quantity) for span in self.spans], count)
 
     def _quadrature(self, count: int, order: int) -> tuple[Array, Array]:
-        """Gauss points along the beam: weights [m], and rows from r and r' at the nodes to a derivative of r."""
+        """Return Gauss weights [m] along the beam, and rows from r and r' at the nodes to a derivative of r."""
         z, weights = np.polynomial.legendre.leggauss(count)
         lengths = np.diff(self.mesh.nodes)
         rows = np.zeros((lengths.size, count, len(self.columns)))
@@ -325,31 +327,34 @@ Link = RigidLink | Cable
 
 @dataclass(frozen=True)
 class Linkage:
-    """The ground, and the bodies of a mechanism in its order."""
+    """Ground and bodies of a mechanism, in its order."""
 
     ground: Ground
     bodies: Mapping[str, Link]
 
     def part(self, ref: PointRef) -> Link | Ground:
-        """The body of a point, or the ground."""
+        """Return the body of a point, or the ground."""
         return self.ground if ref.on_ground else self.bodies[ref.body]
 
     def motion(self, ref: PointRef, history: Trajectory) -> PointMotion:
-        """Motion of a named point."""
+        """Return the motion of a named point."""
         return self.part(ref).motion(ref.point, history)
 
     def gap(self, joint: Joint, history: Trajectory) -> Array:
-        """Vector from side a of a joint to side b, with two derivatives (3, k, 2)."""
+        """Return the vector from point a to point b of a joint, with two derivatives (3, k, 2)."""
         return np.subtract(self.motion(joint.b, history), self.motion(joint.a, history))
 
     def joint_turn(self, joint: Joint, history: Trajectory) -> Turn:
-        """Rotation of the material at side b of a joint relative to that at side a."""
+        """Return the rotation of the material at point b of a joint relative to that at point a."""
         a, b = (self.part(ref).turn(ref.point, history) for ref in (joint.a, joint.b))
         return Turn(*np.subtract(b, a))
 
 
 def turn_of(start: float, d: Array, v: Array, a: Array) -> Turn:
-    """Angle of a vector (k, 2) from its value at the start, from its first two derivatives."""
+    """Return the continuous angle of a vector d (k, 2), which begins near `start` [rad], with two derivatives.
+
+    v and a are the first and second derivatives of d.
+    """
     angle = np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
     angle += 2.0 * np.pi * np.round((start - angle[:1]) / (2.0 * np.pi))
     square = np.sum(d**2, axis=1)
@@ -362,6 +367,6 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _shape(z: Array, length: float, order: int) -> Array:
-    """Cubic shape functions (points, 4) at x = z L, or a derivative of them along the beam."""
+    """Evaluate the cubic shape functions (points, 4), or one of their x-derivatives, at x = z L."""
     coefficients = np.polynomial.polynomial.polyder(_CUBIC, order, axis=1)
     return np.polynomial.polynomial.polyval(z, coefficients.T).T * float(length) ** (_LENGTH_POWER - order)

@@ -1,4 +1,4 @@
-"""Common parts of adapters: importing an engine, refusing unsupported members, steps that end at samples."""
+"""Common functions of the adapters: import of an engine, checks of a mechanism, steps that end at samples."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from paraflex.errors import InputError
 from paraflex.mechanism import FlexibleBeam, Mechanism, given_shapes, grouped, with_actuators
 from paraflex.tracking import TrackingTask
 
-# Names of the engines as users and Python's packages know them, and in print.
+# Package names of the engines, by which users refer to them, and their names in messages.
 _ENGINE_NAMES = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}
 ENGINES = tuple(_ENGINE_NAMES)
 
 
 def check_dwell(name: str, task: TrackingTask) -> None:
-    """Check that motors are free after the path: adapters of engines have no brakes.
+    """Check that motors are free after the path, because the adapters have no brakes.
 
     Raises
     ------
     InputError
-        They are to be held.
+        The task holds the motors after the path.
     """
     if task.holds:
         refuse(_ENGINE_NAMES[name], 'brakes after the path (after = "hold")', "study.after")
 
 
 def with_rotors(task: TrackingTask) -> TrackingTask:
-    """The same task with lumps at joints in place of actuators, for programs that build bodies of their own."""
+    """Return the task with lumps at joints in place of actuators, for engines that build their own bodies."""
     return replace(task, mechanism=with_actuators(task.mechanism))
 
 
@@ -42,7 +42,7 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     Raises
     ------
     InputError
-        It is not, or cannot.
+        The engine is not installed, or does not support a member of the mechanism.
     """
     beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam)]
     beyond = {
@@ -76,12 +76,12 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
 
 
 def import_engine(name: str) -> Any:
-    """The engine's module.
+    """Import the engine's module.
 
     Raises
     ------
     InputError
-        It is not installed.
+        The engine is not installed.
     """
     try:
         return import_module(name)
@@ -92,12 +92,12 @@ def import_engine(name: str) -> Any:
 
 
 def refuse(engine: str, what: str, field: str) -> NoReturn:
-    """Raise the error that the adapter of an engine does not support a part of a mechanism.
+    """Raise the error for a part of a mechanism that an engine's adapter does not support.
 
     Raises
     ------
     InputError
-        Always.
+        The error is always raised.
     """
     raise InputError(
         f"{engine} cannot express {what}", field=field, remedy="leave out this engine, or that part of the model"
@@ -105,12 +105,12 @@ def refuse(engine: str, what: str, field: str) -> NoReturn:
 
 
 def steps_between(times: Array, step: float) -> int:
-    """The fewest equal steps between two samples that are no longer than a step.
+    """Return the least number of equal steps between two samples with a step size of at most `step` [s].
 
     Raises
     ------
     InputError
-        A step that is not positive.
+        The step size is not positive.
     """
     if not (np.isfinite(step) and step > 0.0):
         raise InputError("must be positive", field="step", value=step, remedy="give it in seconds")

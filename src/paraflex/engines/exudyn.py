@@ -1,8 +1,8 @@
-"""A tracking task run in Exudyn: beams as planar ANCF cables, geometrically exact, driven by the same torques.
+"""Simulation of a tracking task in Exudyn: beams as geometrically exact planar ANCF cables, with the same torques.
 
-A second opinion from another formulation and another integrator. Cables bend and stretch by the true curvature and
-length of their centre line (cubic in position and slope vector, nodes where paraflex has them); there is no floating
-frame, no assumption of small slopes.
+The comparison is with another formulation and another integrator. Bending and stretching of cables are given by the
+exact curvature and length of the centre line (cubic in position and slope vector, with the nodes of paraflex). There is
+no floating frame and no assumption of small slopes.
 """
 
 from __future__ import annotations
@@ -30,25 +30,26 @@ from paraflex.results.outlines import outlines
 from paraflex.results.record import Record
 from paraflex.tracking import TrackingTask
 
-# Newton's residual, a norm over all coordinates, is as good as zero at this many times the rounding of one inner force.
+# Newton's residual, a norm over all coordinates, is zero to rounding at this multiple of an internal force's rounding.
 _FLOOR = 100.0
 
 
 @dataclass(frozen=True)
 class ExudynOptions:
-    """How Exudyn discretises and integrates: generalised alpha with fixed steps, constraints on positions (index 3).
+    """Options of Exudyn: generalised alpha with fixed step size and constraints on positions (index 3).
 
     Attributes
     ----------
     step : float
-        Longest step; it is cut to divide the spacing of the task's samples [s].
+        Largest step size [s], 5e-5 by default; it is reduced to divide the spacing of the task's samples.
     refinement : int
-        Multiplies the elements of every span of every beam.
+        Factor of the number of elements on every span of every beam, 1 by default.
     tolerance : float
-        Of Newton's residual, relative.
+        Relative tolerance of Newton's residual, 1e-6 by default.
     spectral_radius : float
-        Of generalised alpha at high frequency: below 1 it damps, 0 all in one step. 1 is the trapezoidal rule, which
-        damps nothing, with constraints on velocities (index 2).
+        Spectral radius of generalised alpha at high frequency, 0.9 by default: values below 1 give numerical damping, 0
+        asymptotic annihilation in one step. 1 selects the trapezoidal rule without numerical damping, with constraints
+        on velocities (index 2).
     """
 
     step: float = 5e-5
@@ -58,7 +59,7 @@ class ExudynOptions:
 
     @property
     def method(self) -> str:
-        """The scheme in words."""
+        """Name of the integration scheme."""
         return "Exudyn, trapezoidal rule" if self.spectral_radius == 1.0 else "Exudyn, generalised alpha"
 
     def __post_init__(self) -> None:
@@ -75,32 +76,33 @@ class ExudynOptions:
 
 
 def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: ExudynOptions | None = None) -> Record:
-    """Drive the mechanism in Exudyn with the feed-forward torques of a mode.
+    """Simulate the mechanism in Exudyn, driven by the feed-forward torques of a mode.
 
-    The geometry of the mechanism, its reference conditions and its kinds of curvature are paraflex's own and mean
-    nothing here.
+    Geometry, reference conditions and kinds of curvature of the mechanism are properties of paraflex's formulation and
+    have no effect here.
 
     Parameters
     ----------
     task : TrackingTask
-        Of one in finite segments the uncut mechanism is simulated: Exudyn has cables of its own.
+        Tracking task. The original mechanism of a task in finite segments is simulated, with cables in place of beams.
     mode : str or ActuationMode
-        Its name, signs ("+-+-") or motor names ("tau1,tau5").
+        Actuation mode: its name, signs ("+-+-") or motor names ("tau1,tau5").
     options : ExudynOptions, optional
+        Options of discretisation and integration.
 
     Returns
     -------
     Record
-        Reported as links.
+        Results by link.
 
     Raises
     ------
     InputError
-        Exudyn is not installed, or the mechanism has what this engine cannot express: prescribed angles.
+        Exudyn is not installed, or does not support a member of the mechanism, such as a prescribed angle.
     ActuationError, SingularActuationError
         The mode cannot drive the mechanism along the path.
     IntegrationError
-        Exudyn gave up; the error carries a Record of what was computed.
+        Exudyn fails; the error has a Record of the samples computed.
     """
     options = options or ExudynOptions()
     task = task.whole or task
@@ -122,7 +124,7 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
 
 
 def _last_moment(record: Record, history: Trajectory) -> Moment:
-    """The last step that was finished; the end-effector at the last sample before it."""
+    """Return the moment of the last completed step, with the end-effector's position at the last sample before it."""
     places = record.end_effector.position
     position = (float(places[-1, 0]), float(places[-1, 1])) if len(places) else None
     return Moment(float(history.t[-1]) if history.t.size else 0.0, record.figures["steps"], position)
@@ -133,7 +135,7 @@ def _last_moment(record: Record, history: Trajectory) -> Moment:
 
 @dataclass
 class _Engine:
-    """Exudyn's modules and the system under construction; the container must live as long as the system."""
+    """Modules of Exudyn and the system under construction; the container must live as long as the system."""
 
     exu: Any
     items: Any
@@ -145,13 +147,13 @@ class _Engine:
         return self.mbs.AddObject(getattr(self.items, kind)(**settings))
 
     def node(self, kind: str, place: list[float], velocity: list[float]) -> tuple[int, Columns]:
-        """A node and the indices of its coordinates, which Exudyn numbers node after node."""
+        """Add a node and return its number and the indices of its coordinates, which are numbered node by node."""
         node = getattr(self.items, kind)(referenceCoordinates=place, initialVelocities=velocity)
         first, self.coordinates = self.coordinates, self.coordinates + len(place)
         return self.mbs.AddNode(node), np.arange(first, self.coordinates)
 
     def marker(self, linkage: Linkage, ref: PointRef) -> int:
-        """Markers of position and rotation of the material at a point."""
+        """Add a marker for position and rotation of the material at a point."""
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(**linkage.part(ref).place(ref.point)))
 
     def markers(self, linkage: Linkage, joint: Joint) -> list[int]:
@@ -166,7 +168,7 @@ def _start_engine() -> _Engine:
 
 @contextmanager
 def _silent(exu: Any) -> Iterator[None]:
-    """Context without Exudyn's printed failures, which are exceptions here."""
+    """Suppress Exudyn's printed errors and warnings; failures are exceptions here."""
     before = exu.config.printToConsole, exu.config.suppressWarnings
     exu.config.printToConsole, exu.config.suppressWarnings = False, True
     try:
@@ -176,7 +178,7 @@ def _silent(exu: Any) -> Iterator[None]:
 
 
 class _Model(NamedTuple):
-    """The model in Exudyn: links; loads of each motor and their signs; multipliers of each joint."""
+    """Model in Exudyn: links, loads of each motor with their signs, and indices of the multipliers of each joint."""
 
     linkage: Linkage
     loads: list[list[tuple[int, float]]]
@@ -257,13 +259,13 @@ def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: RigidState) -> Cable:
     for lump in beam.lumps:
         lumps[mesh.points[lump.point]] += lump.mass, lump.inertia
     for node in np.flatnonzero(lumps.any(axis=1)):
-        # Kinetic energy J/2 |r'_t|^2: that of the turning cross-section as long as |r'| = 1, to within the strain.
+        # Kinetic energy J/2 |r'_t|^2 is that of the rotating cross-section for |r'| = 1, with an error of the strain.
         engine.add("ObjectGenericODE2", nodeNumbers=[nodes[node]], massMatrix=np.diag(np.repeat(lumps[node], 2)))
     return Cable(mesh, spans, tuple(items), np.reshape(columns, (-1, 2)), lumps, pose.phi)
 
 
 def _add_motor(engine: _Engine, linkage: Linkage, joint: Joint) -> list[tuple[int, float]]:
-    """Loads on the material at both sides of a joint, as numbers with signs."""
+    """Add torque loads on the material at both sides of a joint, and return their numbers with signs."""
     return [
         (engine.mbs.AddLoad(engine.items.LoadTorqueVector(markerNumber=engine.marker(linkage, ref))), sign)
         for ref, sign in ((joint.a, -1.0), (joint.b, 1.0))
@@ -272,8 +274,8 @@ def _add_motor(engine: _Engine, linkage: Linkage, joint: Joint) -> list[tuple[in
 
 
 def _add_spring(engine: _Engine, linkage: Linkage, joint: Joint, spring: TorsionalSpring) -> None:
-    """A spring between the material at both sides of a joint."""
-    # Exudyn counts the angle on from its start, and starts within half a turn of zero.
+    """Add a spring between the material at both sides of a joint."""
+    # Exudyn's angle is continuous and starts within half a turn of zero.
     turns = 2.0 * np.pi * np.round((linkage.part(joint.b).start - linkage.part(joint.a).start) / (2.0 * np.pi))
     state = engine.items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1)
     engine.add(
@@ -290,9 +292,9 @@ def _add_spring(engine: _Engine, linkage: Linkage, joint: Joint, spring: Torsion
 
 @dataclass
 class _Recorder:
-    """Applies the torques and records the state at every step; Exudyn calls it before and after each step.
+    """Callbacks of Exudyn before and after each step, which apply the torques and record the state.
 
-    Torques are those at the end of the step, where generalised alpha takes its forces.
+    The torques are those at the end of the step, at which generalised alpha evaluates forces.
     """
 
     loads: list[list[tuple[int, float]]]
@@ -303,14 +305,14 @@ class _Recorder:
     finite: bool = True
 
     def before(self, mbs: Any, _: float) -> bool:
-        """Set the torques of the step that begins."""
+        """Set the torques of the next step."""
         for torque, sides in zip(self.torques[len(self.states)], self.loads, strict=True):
             for load, sign in sides:
                 mbs.SetLoadParameter(load, "loadVector", [0.0, 0.0, sign * torque])
         return True
 
     def after(self, mbs: Any, _: float) -> bool:
-        """Record the state, that of the start too; False ends the run."""
+        """Record the state, including the initial one; return False to end the run."""
         data = mbs.systemData
         state = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()
         self.finite = bool(np.isfinite(state).all())
@@ -320,7 +322,7 @@ class _Recorder:
         return self.finite and not self.interrupts
 
     def verdict(self) -> str:
-        """Reason why a run without an exception stopped early; empty if it did not."""
+        """Return why a run without an exception ended early; empty if it is complete."""
         if not self.finite:
             return "the solution is no longer finite"
         if len(self.states) == len(self.torques):
@@ -331,20 +333,20 @@ class _Recorder:
 def _run(
     engine: _Engine, model: _Model, task: TrackingTask, torques: FeedForward, substeps: int, options: ExudynOptions
 ) -> tuple[Trajectory, dict[str, Any]]:
-    """Integrate; the counts contain the reason why the run stopped early, if it did."""
+    """Integrate, and return the trajectory and the statistics, with the reason of an early end as `message`."""
     times = task.motion.t
     grid = np.linspace(times[0], times[-1], substeps * (times.size - 1) + 1)
     recorder = _Recorder(model.loads, torques.evaluate(grid))
     solver, mbs, cause = engine.exu.MainSolverImplicitSecondOrder(), engine.mbs, ""
     reference = mbs.systemData.GetODE2Coordinates(engine.exu.ConfigurationType.Reference)
-    # No residual gets smaller than the force that rounding makes of nothing in the stiffest element.
+    # The residual cannot become smaller than the rounding error of the force in the stiffest element.
     rounding = [link.rounding(reference) for link in model.linkage.bodies.values() if isinstance(link, Cable)]
     settings = _settings(engine.exu, grid, options, _FLOOR * max(rounding, default=0.0))
     recorder.before(mbs, grid[0])
     mbs.SetPreStepUserFunction(recorder.before)
     mbs.SetPostStepUserFunction(recorder.after)
     try:
-        # Raised in a function that Exudyn calls, Ctrl-C would pass for a failure of that.
+        # A KeyboardInterrupt raised within a callback would be reported as a failure of the callback.
         with uninterrupted() as recorder.interrupts:
             if solver.InitializeSolver(mbs, settings):
                 solver.SolveSteps(mbs, settings)
@@ -356,7 +358,7 @@ def _run(
         mbs.SetPostStepUserFunction(0)
     cause, k = cause or recorder.verdict(), len(recorder.states)
     states = np.reshape(recorder.states, (k, 3, reference.size)).swapaxes(0, 1)
-    # Exudyn 1.13 has a method for the sum, GetODE2CoordinatesTotal, which corrupts memory.
+    # GetODE2CoordinatesTotal of Exudyn 1.13 returns this sum but corrupts memory.
     states[0] += reference
     figures = {
         "status": "failed" if cause else "complete",
@@ -383,7 +385,7 @@ def _settings(exu: Any, grid: Array, options: ExudynOptions, floor: float) -> An
     integration.newton.absoluteTolerance = max(integration.newton.absoluteTolerance, floor)
     undamped = options.spectral_radius == 1.0
     integration.generalizedAlpha.spectralRadius = options.spectral_radius
-    # Without damping constraints on positions are unstable; Exudyn has those on velocities for Newmark's rule only.
+    # Constraints on positions are unstable without damping; Exudyn has those on velocities for Newmark's method only.
     integration.generalizedAlpha.useNewmark = integration.generalizedAlpha.useIndex2Constraints = undamped
     return settings
 
@@ -431,7 +433,7 @@ def _record(
         points=points.position,
         point_velocity=points.velocity,
         point_acceleration=points.acceleration,
-        # Exudyn's multipliers are on the left of the equations, with the constraint p_b - p_a.
+        # Sign: Exudyn's multipliers are on the left-hand side of the equations, with the constraint p_b - p_a.
         joint_force=-samples.multipliers[:, model.rows],
         joint_moment=np.full((len(samples.t), len(mechanism.joints)), np.nan),
         multiplier=np.full((len(samples.t), task.system.m), np.nan),
@@ -452,12 +454,12 @@ def _record(
 
 
 def _drawing(mechanism: Mechanism, linkage: Linkage, history: Trajectory) -> Drawing:
-    """Bodies by the engine's own shape functions."""
+    """Return the drawing of the bodies, evaluated with the engine's own shape functions."""
     bodies = linkage.bodies
     shapes = {one.body: bodies[one.body].curve(one, history) for one in outlines(mechanism)}
 
     def frame(name: str) -> tuple[Array, Array]:
-        # Joints that slide along beams, which need more than an angle, are refused.
+        # Joints that slide along beams would need more than an angle, but they are not supported.
         return shapes[name][:, 0], bodies[name].frame(history).angle
 
     return drawing(mechanism, shapes, lambda ref: linkage.part(ref).turn(ref.point, history).angle, frame)
@@ -468,13 +470,13 @@ def _largest(values: Array) -> float:
 
 
 def _work(linkage: Linkage, mechanism: Mechanism, torques: FeedForward, history: Trajectory) -> Array:
-    """Work of the motors, by the trapezoidal rule over the steps."""
+    """Compute the work of the motors by the trapezoidal rule over the steps [J]."""
     power = np.sum(torques.evaluate(history.t) * _motor_speeds(linkage, mechanism, history), axis=1)
     return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(history.t))])[: power.size]
 
 
 def _motor_speeds(linkage: Linkage, mechanism: Mechanism, history: Trajectory) -> Array:
-    """Speeds of all motors (k, motors) [rad/s]."""
+    """Return the speeds of all motors (k, motors) [rad/s]."""
     joints = [mechanism.joint(motor.joint) for motor in mechanism.motors]
     return np.array([linkage.joint_turn(joint, history).rate for joint in joints]).reshape(-1, history.t.size).T
 

@@ -1,7 +1,8 @@
-"""MuJoCo: a mechanism of finite segments as a tree of hinges, with loops closed by equality constraints.
+"""Simulation in MuJoCo: finite segments as a tree of hinges, with loops closed by equality constraints.
 
-MuJoCo works in joint angles. Joints with springs come into the tree first, then those with motors; what is left closes
-loops. Springs are explicit there, so the step must resolve the stiffest pair of segments; RK4 is the scheme.
+MuJoCo uses joint angles as coordinates. Joints with springs or gears enter the tree first, then those with motors; the
+remaining joints close loops. Springs are explicit, so the step size must resolve the stiffest pair of segments. The
+integrator is RK4.
 """
 
 from __future__ import annotations
@@ -28,14 +29,14 @@ from paraflex.mechanism import GROUND, ActuationMode, Joint, Mechanism, Relation
 from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun, TrackingTask
 
-# Shares of a step in the work of the motors, stage by stage.
+# Weights of the RK4 stages, for the work of the motors.
 _RK4 = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
-# MuJoCo's constraints are springs with a time constant, given in steps; two is the stiffest it allows.
+# Time constant of MuJoCo's constraints, which are springs, in steps; two is the smallest that it allows.
 _TIME_CONSTANT = 2.0
-# How nearly a constraint is enforced; MuJoCo cuts it off here.
+# Impedance of a constraint: 1 enforces it exactly; this is the upper limit of MuJoCo.
 _IMPEDANCE = 0.9999
 _SOLVER_TOLERANCE = 1e-12
-# Callbacks and warnings are global in MuJoCo: one run at a time.
+# Callbacks and warnings are global in MuJoCo, so runs are serialised.
 _ONE_AT_A_TIME = threading.Lock()
 
 
@@ -46,9 +47,10 @@ class MuJoCoOptions:
     Attributes
     ----------
     step : float
-        Longest time step [s]; it is cut to divide the time between samples.
+        Largest step size [s], 1/30000 by default; it is reduced to divide the time between samples.
     segments : int
-        On the longest flexible beam, others by their length, where the task is not of segments already.
+        Number of segments of the longest flexible beam, 8 by default; other beams have a number in proportion to their
+        length. It has no effect if the task has finite segments already.
     """
 
     step: float = 1.0 / 30000.0
@@ -56,26 +58,28 @@ class MuJoCoOptions:
 
 
 def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJoCoOptions | None = None) -> Record:
-    """Drive the mechanism of finite segments with the torques of a mode, in MuJoCo.
+    """Simulate the mechanism of finite segments in MuJoCo, driven by the feed-forward torques of a mode.
 
     Parameters
     ----------
     task : TrackingTask
-        Cut into segments or not.
+        Tracking task, with or without finite segments.
     mode : str or ActuationMode
+        Actuation mode: its name, signs ("+-+-") or motor names ("tau1,tau5").
     options : MuJoCoOptions, optional
+        Options of the integration.
 
     Returns
     -------
     Record
-        Reported as links. Joint forces are not known.
+        Results by link of the original mechanism. Joint forces are not available.
 
     Raises
     ------
     InputError
-        MuJoCo is not installed, or the mechanism has a prescribed angle, which this engine cannot express.
+        MuJoCo is not installed, or does not support a member of the mechanism, such as a prescribed angle.
     IntegrationError
-        The run diverges; it carries the Record of what was computed.
+        The run diverges; the error has the Record of the samples computed.
     """
     check_engine("mujoco", task.mechanism)
     check_dwell("mujoco", task)
@@ -104,7 +108,7 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
 
 
 def _model(mujoco: Any, system: System, tree: Tree, step: float) -> Any:
-    """The model of the tree, with all angles zero in its reference pose."""
+    """Return MuJoCo's model of the tree, with all angles zero in the reference pose."""
     spec = mujoco.MjSpec()
     spec.option.timestep = step
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
@@ -142,7 +146,7 @@ def _add_springs(spec: Any, mechanism: Mechanism, tree: Tree) -> None:
 
 
 def _add_relation(mujoco: Any, spec: Any, one: Relation, tree: Tree, step: float) -> None:
-    """Let the hinge of the second joint follow that of the first, by a polynomial of degree one."""
+    """Add a relation of two hinges as an equality constraint with a polynomial of degree one."""
     hinge = {link.joint.name: link for link in tree.links}
     first, second = (hinge[name] for name in one.joints)
     of_joints = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
@@ -161,7 +165,7 @@ def _close(mujoco: Any, spec: Any, system: System, joint: Joint, bodies: dict, s
 
 
 def _add_equality(spec: Any, name: str, kinds: tuple[Any, Any], pair: list[str], step: float) -> Any:
-    """An equality constraint of two objects of one kind, as stiff as steps allow."""
+    """Add an equality constraint of two objects of the same type, as stiff as the step size allows."""
     equality = spec.add_equality(name=name, type=kinds[0], objtype=kinds[1], name1=pair[0], name2=pair[1])
     equality.solref = [_TIME_CONSTANT * step, 1.0]
     equality.solimp = [_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0]
@@ -170,7 +174,7 @@ def _add_equality(spec: Any, name: str, kinds: tuple[Any, Any], pair: list[str],
 
 @dataclass(frozen=True)
 class _JointMotion:
-    """Results of MuJoCo at the samples reached: positions, velocities, accelerations of its joints; energies."""
+    """Results of MuJoCo at the samples reached: joint angles with two derivatives, energies, work and error message."""
 
     joints: tuple[Array, Array, Array]
     energy: Array
@@ -185,7 +189,7 @@ class _JointMotion:
 def _march(mujoco: Any, model: Any, task: TrackingTask, torques: FeedForward, tree: Tree, count: int) -> _JointMotion:
     times, step = task.motion.t, model.opt.timestep
     data = mujoco.MjData(model)
-    # MuJoCo numbers the joints in an order of its own.
+    # MuJoCo has its own order of joints.
     order = np.array([model.joint(link.name).dofadr[0] for link in tree.links])
     data.qpos[order], data.qvel[order] = joint_state(task, tree)
     halves = times[0] + 0.5 * step * np.arange(2 * count * (times.size - 1) + 1)
@@ -224,7 +228,7 @@ def _march(mujoco: Any, model: Any, task: TrackingTask, torques: FeedForward, tr
 
 @contextmanager
 def _control_of(mujoco: Any, control: Any) -> Iterator[list[str]]:
-    """MuJoCo's global hooks for one run: torques at every stage, and its warnings, of which a reset is one."""
+    """Set MuJoCo's global callbacks for one run: torques at every stage, and a list of warnings, such as resets."""
     warnings: list[str] = []
     with _ONE_AT_A_TIME:
         mujoco.set_mjcb_control(control)
@@ -242,7 +246,7 @@ def _solution(
     system, times = task.system, task.motion.t
     signals, _ = still_signals(task.mechanism, float(times[-1]))
     gaps = [system.constraints(signals, t, *state) for t, *state in zip(times, q, v, strict=False)]
-    # MuJoCo counts weight as potential energy; here it does work.
+    # MuJoCo includes gravity in the potential energy; here it is part of the work.
     scratch = make_scratch(system.packed)
     weight = np.array([weight_work(system.packed, state, scratch) for state in q])
     kinetic, strain = motion.energy[:, 1], motion.energy[:, 0] + weight

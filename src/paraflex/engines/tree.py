@@ -1,4 +1,4 @@
-"""A mechanism as a tree of bodies on hinges, for engines in joint coordinates, and its motion body by body."""
+"""Mechanism as a tree of bodies on hinges, for engines with joint coordinates, and the motion of its bodies."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from paraflex.tracking import TrackingTask
 
 @dataclass(frozen=True)
 class Link:
-    """A body hinged to its parent in the tree, or to the ground."""
+    """Body connected by a hinge to its parent in the tree, which may be the ground."""
 
     name: str
     joint: Joint
 
     @property
     def sign(self) -> float:
-        """Sign of the joint's angle relative to the hinge's, which is that of the child relative to the parent."""
+        """Sign of the joint angle relative to the hinge angle, which is that of the child relative to the parent."""
         return 1.0 if self.joint.b.body == self.name else -1.0
 
     @property
     def own(self) -> PointRef:
-        """The hinge's place on the body."""
+        """Point of the hinge on the body."""
         return self.joint.b if self.sign > 0.0 else self.joint.a
 
     @property
     def other(self) -> PointRef:
-        """The hinge's place on the parent."""
+        """Point of the hinge on the parent."""
         return self.joint.a if self.sign > 0.0 else self.joint.b
 
     @property
     def parent(self) -> str:
-        """The parent body, or the ground."""
+        """Name of the parent body, or of the ground."""
         return self.other.body
 
 
@@ -48,11 +48,11 @@ class Tree:
     Attributes
     ----------
     links : tuple of Link
-        One a body; its hinge's angle is the coordinate of that number.
+        One link per body, in the order of the coordinates, which are the hinge angles.
     closing : tuple of Joint
         Joints that close loops.
     angles : mapping of str to (links,) array
-        Weights of the hinges' angles in each body's angle; zero for the ground.
+        Weights of the hinge angles in the angle of each body; zero for the ground.
     """
 
     links: tuple[Link, ...]
@@ -60,17 +60,17 @@ class Tree:
     angles: dict[str, Array]
 
     def relative_angle(self, joint: Joint) -> Array:
-        """Weights (links,) of the hinges' angles in the angle of a joint of the mechanism."""
+        """Return the weights (links,) of the hinge angles in the angle of a joint of the mechanism."""
         return self.angles[joint.b.body] - self.angles[joint.a.body]
 
 
 def spanning_tree(mechanism: Mechanism) -> Tree:
-    """Connect all bodies with the ground, by joints with springs or gears first and then by those with motors.
+    """Return a spanning tree from the ground, of joints with springs or gears first, then of those with motors.
 
     Raises
     ------
     InputError
-        A body that nothing joins to the ground.
+        No joints connect a body with the ground.
     """
     held = {spring.joint for spring in mechanism.springs} | {name for one in mechanism.relations for name in one.joints}
     driven = {motor.joint for motor in mechanism.motors}
@@ -98,7 +98,7 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
 
 
 def _split(joints: list[Joint]) -> tuple[list[Joint], list[Joint]]:
-    """Joints that join separate parts, in order, and those that close loops (Kruskal)."""
+    """Separate the joints that connect separate parts, in order, from those that close loops (Kruskal)."""
     group: dict[str, str] = {}
 
     def root(name: str) -> str:
@@ -118,7 +118,7 @@ def _split(joints: list[Joint]) -> tuple[list[Joint], list[Joint]]:
 
 
 def joint_state(task: TrackingTask, tree: Tree) -> tuple[Array, Array]:
-    """Angles and rates of the hinges at the task's start, each (links,)."""
+    """Return angles and rates of the hinges at the start of a task, each (links,)."""
 
     def angle(state: Array, name: str) -> float:
         return 0.0 if name == GROUND else state[task.system.body(name).angle]
@@ -131,12 +131,12 @@ def joint_state(task: TrackingTask, tree: Tree) -> tuple[Array, Array]:
 
 
 def body_motion(system: System, tree: Tree, hinges: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-    """Coordinates of rigid bodies, velocities and accelerations (k, n) from those of the hinges (k, links)."""
+    """Compute coordinates, velocities and accelerations of rigid bodies (k, n) from those of the hinges (k, links)."""
     k = hinges[0].shape[0]
     q, v, a = out = tuple(np.zeros((k, system.n)) for _ in range(3))
 
     def arm(ref: PointRef) -> tuple[Array, Array, Array]:
-        """Vector from a body's origin to a point of it, and its derivatives."""
+        """Return the vector from a body's origin to one of its points, with two derivatives."""
         angle = system.body(ref.body).angle
         x, y = system.marker(ref).x0
         c, s, w = np.cos(q[:, angle]), np.sin(q[:, angle]), v[:, angle, None]

@@ -1,4 +1,4 @@
-"""Flexible beams: element, mesh, reference conditions, shape integrals, eigenmodes; independent of mechanisms."""
+"""Flexible beams: element, mesh, reference conditions, shape integrals and eigenmodes, independent of mechanisms."""
 
 from paraflex.fem.assumed import (
     AssumedShapes as AssumedShapes,

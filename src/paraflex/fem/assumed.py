@@ -1,7 +1,8 @@
-"""Assumed modes: a straight bar that deforms in shape functions of the user's own choice (Ritz).
+"""Assumed modes: a straight bar whose deformation is a combination of user-defined shape functions (Ritz method).
 
-Transverse displacement w = sum t_k(x/L) u_k, axial displacement sum a_k(x/L) u_k, the transverse coordinates first. The
-functions fix the body frame: sines hold it to the chord, polynomials from x^2 on to the tangent at the first end.
+The transverse displacement is sum t_k(x/L) u_k and the axial displacement sum a_k(x/L) u_k, with the transverse
+coordinates first. The functions define the body frame: sines attach it to the chord, polynomials that start with x^2
+to the tangent at the first end.
 """
 
 from __future__ import annotations
@@ -18,22 +19,22 @@ from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
 from paraflex.fem.integrals import ShapeIntegrals, SpanProperties, bar_integrals
 
-# Gauss points beyond those that resolve the waves, for products of sines to be integrated to rounding.
+# Additional Gauss points, so that products of sines are integrated to rounding.
 _EXTRA_GAUSS_POINTS = 16
-# Functions, each scaled to one, with a singular value below this fraction of the largest are dependent.
+# Normalised functions with a singular value below this fraction of the largest are linearly dependent.
 _DEPENDENT = 1e-10
-# A combination of functions with this fraction of the largest strain energy, at equal mass, is a rigid motion.
+# A combination of functions with less than this fraction of the largest strain, at equal mass, is a rigid motion.
 _RIGID = 1e-7
 
 
 @dataclass(frozen=True)
 class Sine:
-    """A sine with a number of half waves along the bar, sin(n pi z) with z = x/L."""
+    """Sine shape function sin(n pi z), z = x/L, with n the number of half waves along the bar."""
 
     half_waves: int
 
     def evaluate(self, z: Array, derivative: int = 0) -> Array:
-        """Values at z (k,), or values of a derivative by z."""
+        """Evaluate the function, or one of its derivatives with respect to z, at z (k,)."""
         k = self.half_waves * pi
         wave = (np.sin, np.cos)[derivative % 2](k * z)
         return (-1) ** (derivative // 2) * k**derivative * wave
@@ -41,12 +42,12 @@ class Sine:
 
 @dataclass(frozen=True)
 class Polynomial:
-    """A polynomial in z = x/L by its coefficients, ascending: (0, 0, 1) is z^2."""
+    """Polynomial in z = x/L with coefficients in ascending order: (0, 0, 1) is z^2."""
 
     coefficients: tuple[float, ...]
 
     def evaluate(self, z: Array, derivative: int = 0) -> Array:
-        """Values at z (k,), or values of a derivative by z."""
+        """Evaluate the function, or one of its derivatives with respect to z, at z (k,)."""
         derived = np.polynomial.polynomial.polyder(np.array(self.coefficients) * 1.0, derivative)
         return cast(Array, np.polynomial.polynomial.polyval(z, derived))
 
@@ -55,7 +56,7 @@ ShapeFunction = Sine | Polynomial
 
 
 class PlacedLump(NamedTuple):
-    """A lumped mass [kg] and moment of inertia [kg m^2] at a place along a bar [m]."""
+    """Lumped mass [kg] and moment of inertia [kg m^2] at a position x along a bar [m]."""
 
     x: float
     mass: float
@@ -64,7 +65,7 @@ class PlacedLump(NamedTuple):
 
 @dataclass(frozen=True)
 class AssumedShapes:
-    """Shape functions of a bar of a given length [m]."""
+    """Transverse and axial shape functions of a bar of a given length [m]."""
 
     length: float
     transverse: tuple[ShapeFunction, ...]
@@ -72,19 +73,19 @@ class AssumedShapes:
 
     @property
     def count(self) -> int:
-        """Number of functions, and of coordinates."""
+        """Number of shape functions, which is the number of coordinates."""
         return len(self.transverse) + len(self.axial)
 
     def transverse_rows(self, x: Array, derivative: int = 0) -> Array:
-        """Transverse displacement (k, transverse) per coordinate at x (k,), or a derivative by x."""
+        """Evaluate the transverse displacement per coordinate (k, transverse) at x (k,) [m], or its x-derivative."""
         return _columns(self.transverse, x / self.length, derivative) / self.length**derivative
 
     def axial_rows(self, x: Array, derivative: int = 0) -> Array:
-        """Axial displacement (k, axial) per coordinate at x (k,), or a derivative by x."""
+        """Evaluate the axial displacement per coordinate (k, axial) at x (k,) [m], or its x-derivative."""
         return _columns(self.axial, x / self.length, derivative) / self.length**derivative
 
     def shape_at(self, x: float) -> tuple[Array, Array]:
-        """Shape matrix N (2, count) and slope row N2' (count,) of the point at x [m]."""
+        """Return the shape matrix N (2, count) and the slope row N2' (count,) of the point at x [m]."""
         place, n = np.array([x]) * 1.0, len(self.transverse)
         kind = np.result_type(place, self.length)
         N, slope = np.zeros((2, self.count), kind), np.zeros(self.count, kind)
@@ -93,7 +94,7 @@ class AssumedShapes:
         return N, slope
 
     def quadrature(self) -> tuple[Array, Array]:
-        """Gauss points [m] and weights [m]: exact for products of polynomials, to rounding for those of sines."""
+        """Return Gauss points and weights [m], exact for products of polynomials, to rounding for those of sines."""
         functions = (*self.transverse, *self.axial)
         degree = max((len(f.coefficients) for f in functions if isinstance(f, Polynomial)), default=1)
         waves = max((f.half_waves for f in functions if isinstance(f, Sine)), default=0)
@@ -104,26 +105,29 @@ class AssumedShapes:
 
 
 def assumed_integrals(shapes: AssumedShapes, span: SpanProperties, lumps: Sequence[PlacedLump] = ()) -> ShapeIntegrals:
-    """Integrals of a bar of assumed modes with lumps.
+    """Compute the shape integrals of a bar of assumed modes with lumps.
 
-    Its flexible coordinates are combinations of the functions of unit modal mass: powers of x are so nearly dependent
-    that their mass matrix is of little use. D leads back to the functions' own coordinates.
+    The flexible coordinates are combinations of the shape functions with a unit mass matrix, because powers of x are
+    nearly dependent and their own mass matrix is ill-conditioned. D maps them to the functions' own coordinates.
 
     Parameters
     ----------
     shapes : AssumedShapes
+        Shape functions of the bar.
     span : SpanProperties
+        Mass and stiffness of the bar.
     lumps : sequence of PlacedLump
-        A lumped mass enters exactly as a point of the continuum does.
+        Lumped masses and moments of inertia, by default none. A lumped mass enters like a point of the continuum.
 
     Returns
     -------
     ShapeIntegrals
+        Constants of the bar in the mass-orthonormal coordinates.
 
     Raises
     ------
     InputError
-        No functions, or functions that are linearly dependent or contain a rigid motion of the bar.
+        There are no functions, or they are linearly dependent or contain a rigid motion of the bar.
     """
     if not shapes.count:
         raise InputError("has no shape functions", field="transverse", remedy="give some, or make it a rigid body")
@@ -158,7 +162,7 @@ def _columns(functions: Sequence[ShapeFunction], z: Array, derivative: int) -> A
 
 
 def _basis(moving: Array, strains: Array, field: str) -> Array:
-    """Combinations (n, n) of n functions with unit mass matrix, from square roots of mass and stiffness matrices."""
+    """Return the combinations (n, n) of n functions with unit mass matrix, from square roots of mass and stiffness."""
     sizes = np.linalg.norm(moving.real, axis=0)
     if not sizes.size:
         return np.zeros((0, 0))
@@ -181,7 +185,7 @@ def _basis(moving: Array, strains: Array, field: str) -> Array:
 
 
 def _triangle(matrix: Numbers) -> Numbers:
-    """R of a matrix Q R, of a complex step with its derivative: R^T R = A^T A."""
+    """Return the factor R of A = Q R, R^T R = A^T A; for a complex step A + i h dA, R + i h dR."""
     R = np.asarray(np.linalg.qr(np.real(matrix), mode="r"))
     if not np.iscomplexobj(matrix):
         return R

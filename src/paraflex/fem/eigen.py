@@ -1,4 +1,4 @@
-"""Eigenpairs of stiffness and mass matrices, accurate for soft modes too, and their derivatives by a complex step."""
+"""Eigenpairs of stiffness and mass matrices, accurate also for soft modes, and their complex-step derivatives."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ import scipy.linalg
 from paraflex.arrays import Numbers
 from paraflex.errors import InputError
 
-# Two eigenvalues closer than this part of them are one, whose modes have no derivatives if a parameter couples them;
-# a coupling of less than this part of the eigenvalue is rounding.
+# Two eigenvalues with a smaller relative difference are repeated; their modes have no derivatives if a parameter
+# couples them. A smaller relative coupling is rounding.
 _ONE, _COUPLED = 1e-9, 1e-9
-# A pair that is coupled by more than this fraction of its difference is not corrected.
+# A pair whose coupling exceeds this fraction of its difference is not corrected.
 _COUPLED_BY = 0.1
 
 
 def eigenpairs(K: Numbers, M: Numbers) -> tuple[Numbers, Numbers]:
-    """Eigenvalues, ascending, and eigenvectors V of K x = lambda M x, with V^T M V = 1.
+    """Solve K x = lambda M x for the eigenvalues, ascending, and the eigenvectors V with V^T M V = 1.
 
-    Matrices K + i h dK and M + i h dM with a tiny h give values and vectors plus i h times their derivatives.
+    Complex-step matrices K + i h dK and M + i h dM give values and vectors plus i h times their derivatives.
 
     Parameters
     ----------
     K, M : (n, n) arrays
-        Symmetric, M positive definite.
+        Stiffness and mass matrix, both symmetric, M positive definite.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         M is not positive definite.
     InputError
-        Derivatives of modes of one frequency that part as a parameter changes.
+        Derivatives are requested of modes with a repeated frequency that separates as the parameter changes.
     """
     stiffness, mass = np.ascontiguousarray(np.real(K)), np.ascontiguousarray(np.real(M))
     values, vectors = scipy.linalg.eigh(stiffness, mass)
@@ -42,15 +42,22 @@ def eigenpairs(K: Numbers, M: Numbers) -> tuple[Numbers, Numbers]:
 
 
 def eigen_derivatives(values: Numbers, vectors: Numbers, dK: Numbers, dM: Numbers) -> tuple[Numbers, Numbers]:
-    """Derivatives of eigenvalues and of eigenvectors with unit modal mass, by those of the matrices.
+    """Compute the derivatives of eigenvalues and mass-normalised eigenvectors from those of the matrices.
 
     dlambda_j = v_j^T (dK - lambda_j dM) v_j and dv_j = sum_i v_i C_ij, where C_ij (lambda_j - lambda_i) is
     v_i^T (dK - lambda_j dM) v_j and C_jj = -1/2 v_j^T dM v_j.
 
+    Parameters
+    ----------
+    values, vectors : (n,) and (n, n) arrays
+        Eigenvalues and eigenvectors as `eigenpairs` returns them.
+    dK, dM : (n, n) arrays
+        Derivatives of the stiffness and the mass matrix.
+
     Raises
     ------
     InputError
-        See `eigenpairs`.
+        A repeated frequency separates as the parameter changes.
     """
     moved_mass = vectors.T @ dM @ vectors
     coupling = vectors.T @ dK @ vectors - moved_mass * values
@@ -71,9 +78,9 @@ def eigen_derivatives(values: Numbers, vectors: Numbers, dK: Numbers, dM: Number
 
 
 def _refined(K: Numbers, M: Numbers, values: Numbers, vectors: Numbers) -> tuple[Numbers, Numbers]:
-    """One correction of all pairs (Ogita and Aishima 2018): errors become relative to each eigenvalue.
+    """Refine all eigenpairs by one step of Ogita and Aishima (2018), so that errors are relative to each eigenvalue.
 
-    The stiffness of a beam's modes spans many powers of ten, and the error of a dense solver is a part of the largest.
+    The modal stiffness of a beam spans many powers of ten, and the error of a dense solver is relative to the largest.
     """
     off = np.eye(values.size) - vectors.T @ M @ vectors
     in_modes = vectors.T @ K @ vectors

@@ -1,8 +1,8 @@
-"""The planar beam element: linear axial, quintic Hermite transverse displacement (Eqs. 3-6).
+"""Planar beam element with linear axial and quintic Hermite transverse displacement (Eqs. 3-6).
 
-Two nodes with four coordinates each: axial displacement, transverse displacement, slope, curvature. The
-lumped masses and moments of inertia at its ends are point contributions and enter in `fem.integrals`; without
-them this is the common element (Remark 1).
+The element has two nodes with four coordinates each: axial displacement, transverse displacement, slope and
+curvature. Lumped masses and moments of inertia at its ends are point contributions, which enter in `fem.integrals`;
+without them this is the common element (Remark 1).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _HERMITE = np.array(
         [0.0, 0.0, 0.0, 0.5, -1.0, 0.5],
     ]
 )
-# The power of l that scales each row: a nodal slope or curvature is per metre, z is not.
+# Power of l that scales each row: nodal slopes and curvatures are derivatives by x, not by z.
 _LENGTH_POWER = np.array([0, 1, 2, 0, 1, 2])
 _TRANSVERSE_COLUMNS = [TRANSVERSE, SLOPE, CURVATURE, 4 + TRANSVERSE, 4 + SLOPE, 4 + CURVATURE]
 _AXIAL_COLUMNS = [AXIAL, 4 + AXIAL]
@@ -36,26 +36,27 @@ _AXIAL_COLUMNS = [AXIAL, 4 + AXIAL]
 
 @cache
 def _coefficients(derivative: int) -> Array:
-    """Coefficients of the derivatives of the Hermite polynomials with respect to z: (powers, 6)."""
+    """Return the coefficients (powers, 6) of a derivative of the Hermite polynomials with respect to z."""
     rows = np.polynomial.polynomial.polyder(_HERMITE, derivative, axis=1)
     return np.ascontiguousarray(rows.T, dtype=np.float64)
 
 
 def axial_shape(x: Array, length: float, derivative: int = 0) -> Array:
-    """Axial displacement per nodal coordinate (first row of Eq. 5) or its x-derivative.
+    """Evaluate the axial displacement per nodal coordinate (first row of Eq. 5) or its x-derivative.
 
     Parameters
     ----------
     x : (n,) array
         Positions from the first node [m].
     length : float
-        Of the element [m].
+        Length of the element [m].
     derivative : int
-        Order of the derivative with respect to x.
+        Order of the derivative with respect to x, by default 0.
 
     Returns
     -------
     (n, 8) array
+        Rows per coordinate of the element.
     """
     z = np.asarray(x) / length
     rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE), dtype=z.dtype)
@@ -67,20 +68,21 @@ def axial_shape(x: Array, length: float, derivative: int = 0) -> Array:
 
 
 def transverse_shape(x: Array, length: float, derivative: int = 0) -> Array:
-    """Transverse displacement per nodal coordinate (second row of Eq. 5) or its x-derivative.
+    """Evaluate the transverse displacement per nodal coordinate (second row of Eq. 5) or its x-derivative.
 
     Parameters
     ----------
     x : (n,) array
         Positions from the first node [m].
     length : float
-        Of the element [m].
+        Length of the element [m].
     derivative : int
-        Order of the derivative with respect to x: 1 is the slope, 2 the curvature.
+        Order of the derivative with respect to x, by default 0: 1 is the slope, 2 the curvature.
 
     Returns
     -------
     (n, 8) array
+        Rows per coordinate of the element.
     """
     z = np.asarray(x) / length
     rows = np.zeros((z.size, 2 * COORDINATES_PER_NODE), dtype=z.dtype)

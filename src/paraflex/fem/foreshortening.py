@@ -1,8 +1,8 @@
-"""Second-order geometry of a beam: bending moves its points towards its first end.
+"""Second-order geometry of a beam: foreshortening, by which bending moves its points towards its first end.
 
-With the axial coordinates taken as the stretch of the centre line, a point stands at
-s(x) = x0 + N u - 1/2 e_x f(x), f(x) = int_0^x (N2' u)^2 dx. Everything that moves is a mass point: Gauss points along
-the beam, where slopes are taken too, then the lumps.
+The axial coordinates describe the stretch of the centre line, so the position of a point in the body frame is
+s(x) = x0 + N u - 1/2 e_x f(x) with f(x) = int_0^x (N2' u)^2 dx. The beam is a set of mass points: the Gauss points
+along it, at which the slopes are evaluated as well, then the lumps.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from paraflex.fem.mesh import BeamMesh
 
 @dataclass(frozen=True)
 class MassPoints:
-    """A beam as k mass points, the first g of them its Gauss points.
+    """Representation of a beam by k mass points, the first g of which are its Gauss points.
 
     Attributes
     ----------
     x : (k,) array
-        Place along the undeformed beam [m].
+        Positions along the undeformed beam [m].
     mass, inertia : (k,) arrays
-        [kg], [kg m^2]; Gauss points have no moment of inertia.
+        Masses [kg] and moments of inertia [kg m^2]; those of Gauss points are zero.
     N : (k, 2, nf) array
         Displacement per flexible coordinate.
     slope : (k, nf) array
-        N2'.
+        Slope rows N2'.
     weights : (k, g) array
-        f of each point is weights @ (slope of the Gauss points @ u)^2.
+        Quadrature weights: f at the points is weights @ (slope[:g] @ u)^2.
     """
 
     x: Array
@@ -44,22 +44,22 @@ class MassPoints:
     weights: Array
 
     def in_basis(self, basis: Array) -> MassPoints:
-        """The same points in other flexible coordinates, u_old = basis @ u_new."""
+        """Transform the points to other flexible coordinates, u_old = basis @ u_new."""
         return replace(self, N=self.N @ basis, slope=self.slope @ basis)
 
     def bending(self, weights: Array) -> Array:
-        """The matrix (nf, nf) of the quadratic form f at a point of these weights (g,)."""
+        """Return the matrix (nf, nf) of the quadratic form f at a point with the given weights (g,)."""
         slopes = self.slope[: weights.size]
         return slopes.T @ (weights[:, None] * slopes)
 
 
 def mass_points(mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence[Lump], basis: Array) -> MassPoints:
-    """Mass points of a beam, the same quadrature as its shape integrals.
+    """Return the mass points of a beam, by the same quadrature as its shape integrals.
 
     Parameters
     ----------
     mesh, spans, lumps
-        As for `beam_integrals`.
+        Mesh, span properties and lumps of the beam: see `beam_integrals`.
     basis : (n_nodal, nf) array
         Nodal coordinates per flexible coordinate.
     """
@@ -96,12 +96,12 @@ def mass_points(mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence
 
 
 def slope_squares(mesh: BeamMesh, basis: Array, x: Array, u: Array) -> Array:
-    """f(x) = int_0^x (N2' u)^2 dx at places along a beam [m]: (k, places), exactly.
+    """Compute f(x) = int_0^x (N2' u)^2 dx at positions along a beam, exactly: (k, places) [m].
 
     Parameters
     ----------
     mesh, basis, x
-        See `slope_square_integrals`.
+        Mesh, basis and positions: see `slope_square_integrals`.
     u : (k, nf) array
         Flexible coordinates.
     """
@@ -109,18 +109,19 @@ def slope_squares(mesh: BeamMesh, basis: Array, x: Array, u: Array) -> Array:
 
 
 def slope_square_integrals(mesh: BeamMesh, basis: Array, x: Array) -> Callable[[Array], Array]:
-    """`slope_squares` as a function of the flexible coordinates alone, for repeated calls.
+    """Return `slope_squares` as a function of the flexible coordinates alone, for repeated calls.
 
     Parameters
     ----------
     mesh : BeamMesh
+        Mesh of the beam.
     basis : (n_nodal, nf) array
         Nodal coordinates per flexible coordinate.
     x : (places,) array
-        From 0 to the length [m].
+        Positions along the beam, from 0 to its length [m].
     """
     z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    # Within a piece of an element slopes are polynomials.
+    # Slopes are polynomials within an element, so the intervals end at nodes.
     knots = np.union1d(mesh.nodes, x)
     halves = 0.5 * np.diff(knots)
     places = knots[:-1, None] + halves[:, None] * (z + 1.0)
@@ -135,7 +136,7 @@ def slope_square_integrals(mesh: BeamMesh, basis: Array, x: Array) -> Callable[[
 
 
 def node_weights(mesh: BeamMesh, node: int) -> Array:
-    """Weights (g,) of the Gauss points in f at a node: all of the elements before it, exactly."""
+    """Return the weights (g,) of the Gauss points in f at a node: those of all elements before it, exact."""
     _, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     weights = np.zeros((mesh.n_elements, GAUSS_POINTS), dtype=mesh.nodes.dtype)
     weights[:node] = 0.5 * np.diff(mesh.nodes)[:node, None] * w
@@ -143,7 +144,7 @@ def node_weights(mesh: BeamMesh, node: int) -> Array:
 
 
 def _cumulative(z: Array) -> Array:
-    """Integrals from -1 to z_i of the Lagrange polynomials on the nodes z: (g, g)."""
+    """Return the integrals (g, g) from -1 to z_i of the Lagrange polynomials on the nodes z."""
     # Columns of the inverse Vandermonde matrix are the polynomials' coefficients in Legendre form.
     legendre = np.polynomial.legendre
     coefficients = np.linalg.inv(legendre.legvander(z, z.size - 1))

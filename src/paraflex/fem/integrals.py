@@ -1,4 +1,4 @@
-"""Inertia shape integrals and stiffness of a body, the constants of its equations of motion (Eqs. 13-28)."""
+"""Inertia shape integrals and stiffness of a body: the constants of its equations of motion (Eqs. 13-28)."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _GAUSS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 @dataclass(frozen=True)
 class SpanProperties:
-    """Section and material of a span of a beam.
+    """Mass and stiffness of a span of a beam.
 
     Attributes
     ----------
     mass_per_length : float
-        rho A [kg/m].
+        Mass per length rho A [kg/m].
     axial_stiffness : float
-        E A [N].
+        Axial stiffness E A [N].
     bending_stiffness : float
-        E I [N m^2].
+        Bending stiffness E I [N m^2].
     """
 
     mass_per_length: float
@@ -39,7 +39,7 @@ class SpanProperties:
 
 @dataclass(frozen=True)
 class Lump:
-    """A lumped mass [kg] and moment of inertia [kg m^2] at a node of a beam."""
+    """Lumped mass [kg] and moment of inertia [kg m^2] at a node of a beam."""
 
     node: int
     mass: float
@@ -48,36 +48,36 @@ class Lump:
 
 @dataclass(frozen=True)
 class ShapeIntegrals:
-    """Constants of a body in its body frame; nf flexible coordinates u, none for a rigid body.
+    """Inertia shape integrals and stiffness of a body in its body frame, with nf flexible coordinates u (rigid: 0).
 
     Attributes
     ----------
     m : float
         Mass [kg].
     S1 : (2,) array
-        int s0 dm, first moment of the undeformed body [kg m].
+        First moment of the undeformed body, int s0 dm [kg m].
     S2 : (2, nf) array
-        int N dm.
+        First moment per flexible coordinate, int N dm.
     I0 : float
-        int s0.s0 dm about the body frame's origin [kg m^2].
+        Moment of inertia about the origin of the body frame, int s0.s0 dm [kg m^2].
     I1 : (nf,) array
-        int s0^T N dm.
+        Inertia integral int s0^T N dm.
     I2 : (nf, nf) array
-        int N^T N dm.
+        Inertia integral int N^T N dm.
     G1 : (nf,) array
-        int s0^T E^T N dm.
+        Inertia integral int s0^T E^T N dm.
     G2 : (nf, nf) array
-        int N^T E^T N dm, skew.
+        Inertia integral int N^T E^T N dm, skew-symmetric.
     J : float
         Sum of the lumped moments of inertia [kg m^2].
     Jf : (nf,) array
-        sum J N2'.
+        Sum over lumps, sum J N2'.
     Jff : (nf, nf) array
-        sum J N2'^T N2'.
+        Sum over lumps, sum J N2'^T N2'.
     K : (nf, nf) array
         Elastic stiffness.
     D : (own, nf) array
-        The body's own coordinates, a beam's nodal ones (Eq. 7), per flexible coordinate; no rows for a rigid body.
+        Body's own coordinates (of a beam the nodal ones, Eq. 7) per flexible coordinate; no rows for a rigid body.
     """
 
     m: float
@@ -101,11 +101,11 @@ class ShapeIntegrals:
 
     @property
     def Mff(self) -> Array:
-        """Mass matrix of the flexible coordinates, I2 + Jff, constant."""
+        """Constant mass matrix of the flexible coordinates, I2 + Jff."""
         return self.I2 + self.Jff
 
     def in_basis(self, basis: Array) -> ShapeIntegrals:
-        """The same body in other flexible coordinates, u_old = basis @ u_new."""
+        """Transform the body to other flexible coordinates, u_old = basis @ u_new."""
         return replace(
             self,
             S2=self.S2 @ basis,
@@ -120,21 +120,21 @@ class ShapeIntegrals:
         )
 
     def without_flexibility(self) -> ShapeIntegrals:
-        """The same body, rigid: all flexible coordinates held at zero (Remark 3)."""
+        """Return the same body as a rigid one, all flexible coordinates held at zero (Remark 3)."""
         return self.in_basis(np.zeros((self.nf, 0)))
 
 
 def rigid_integrals(mass: float, centre: Sequence[float], inertia: float) -> ShapeIntegrals:
-    """Integrals of a rigid body.
+    """Return the shape integrals of a rigid body.
 
     Parameters
     ----------
     mass : float
-        [kg]
+        Mass [kg].
     centre : (x, y)
         Centre of mass in the body frame [m].
     inertia : float
-        About the centre of mass [kg m^2].
+        Moment of inertia about the centre of mass [kg m^2].
     """
     c = np.array(centre) * 1.0
     none, nothing = np.zeros(0), np.zeros((0, 0))
@@ -161,24 +161,25 @@ def beam_integrals(
     lumps: Sequence[Lump] = (),
     condition: ReferenceCondition = ReferenceCondition.CANTILEVER,
 ) -> ShapeIntegrals:
-    """Integrals of a straight beam with lumps, by quadrature that is exact for the element.
+    """Compute the shape integrals of a straight beam with lumps, by quadrature that is exact for the element.
 
     Parameters
     ----------
     mesh : BeamMesh
+        Mesh of the beam.
     spans : sequence of SpanProperties
-        One a span of the mesh.
+        Mass and stiffness of each span of the mesh.
     lumps : sequence of Lump
-        A lumped mass enters exactly as a point of the continuum does.
+        Lumped masses and moments of inertia, by default none. A lumped mass enters like a point of the continuum.
     condition : ReferenceCondition
-        How the floating frame is fixed to the beam.
+        Reference condition, which attaches the floating frame to the beam; by default the cantilever condition.
 
     Returns
     -------
     ShapeIntegrals
-        In the independent coordinates of the reference condition.
+        Constants in the independent coordinates of the reference condition.
     """
-    # Mechanisms have many links alike, and the rigid mechanism of a plan has those of the flexible one.
+    # Mechanisms have many equal links, and the rigid mechanism of a plan has those of the flexible one: cached.
     return _beam_integrals(
         tuple(mesh.nodes.tolist()), tuple(mesh.spans.tolist()), mesh.separate, tuple(spans), tuple(lumps), condition
     )
@@ -207,17 +208,18 @@ def bar_integrals(
     stiffness: Array,
     basis: Array,
 ) -> ShapeIntegrals:
-    """Integrals of a straight bar as sums over its mass points.
+    """Compute the shape integrals of a straight bar as sums over its mass points.
 
     Parameters
     ----------
     points : iterable of (x, N, dm)
-        Place along the bar [m], displacement (2, n) per coordinate, mass [kg].
+        Position along the bar [m], displacement per coordinate (2, n) and mass [kg] of each mass point.
     turning : iterable of (slope, J)
-        Slope row (n,) at each lumped moment of inertia [kg m^2].
+        Slope row (n,) and lumped moment of inertia [kg m^2] of each lump.
     stiffness : (n, n) array
+        Elastic stiffness K.
     basis : (own, n) array
-        The body's own coordinates per coordinate: D.
+        Body's own coordinates per coordinate, D.
     """
     n, points, turning = stiffness.shape[0], list(points), list(turning)
     masses, inertias = np.array([(x, dm) for x, _, dm in points]), np.array([J for _, J in turning])
@@ -248,7 +250,7 @@ def bar_integrals(
 
 
 def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
-    """Mass points (x, N, dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
+    """Return the mass points (x, N, dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
     z, w = _GAUSS
     points = []
     kind = np.result_type(mesh.nodes, *(np.array([span.axial_stiffness, span.bending_stiffness]) for span in spans))

@@ -1,4 +1,4 @@
-"""The mesh of a straight beam: its named points are nodes, each span between them is divided into elements."""
+"""Mesh of a straight beam: every named point is a node, and each span between nodes is divided into elements."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from paraflex.fem.element import (
 )
 from paraflex.limits import ELEMENTS, at_most
 
-# Two points closer than this fraction of the beam are one node: an element that short is a typing slip.
+# Two points closer than this fraction of the beam are one node: a shorter element is an input error.
 COINCIDENT_POINTS = 1e-9
 
 
 @dataclass(frozen=True)
 class BeamMesh:
-    """Nodes of a beam along the x axis of its body frame, the first at the origin.
+    """Mesh of a beam along the x axis of its body frame, with the first node at the origin.
 
     Attributes
     ----------
     nodes : (n + 1,) array
-        Positions [m], strictly increasing from 0 to the length.
+        Positions of the nodes [m], strictly increasing from 0 to the length.
     spans : (n,) array of int
-        The span each element belongs to; spans lie between neighbouring named points and the ends.
+        Index of the span of each element; spans lie between neighbouring named points and the ends.
     points : mapping
         Node index of each named point.
     separate : tuple of int
-        Nodes where curvature may jump, because of a lumped moment of inertia: between elements it has a coordinate of
-        its own on either side, and at the last node it is free.
+        Nodes at which the curvature may jump, as at a lumped moment of inertia. Such a node between two elements has
+        one curvature coordinate on either side; the curvature of such a last node is free.
     """
 
     nodes: Array
@@ -59,20 +59,20 @@ class BeamMesh:
 
     @property
     def knots(self) -> Array:
-        """Ends of the spans (n_spans + 1,) [m]."""
+        """Positions of the ends of the spans (n_spans + 1,) [m]."""
         return self.nodes[np.searchsorted(self.spans, np.arange(self.n_spans + 1))]
 
     @property
     def n_nodal(self) -> int:
         """Number of nodal coordinates before any reference condition.
 
-        4 a node, then one for each node between elements that has a second curvature.
+        Each node has four, and each node between elements with separate curvatures one more.
         """
         return COORDINATES_PER_NODE * self.nodes.size + len(self._split)
 
     @property
     def n_flexible(self) -> int:
-        """Number of flexible coordinates under a reference condition: 4 per element, and one per separate curvature."""
+        """Number of flexible coordinates under a reference condition: 4 per element and one per separate curvature."""
         return self.n_nodal - (3 if self.n_elements in self.separate else 4)
 
     @property
@@ -85,35 +85,35 @@ class BeamMesh:
         return float(self.nodes[-1])
 
     def column(self, node: int, coordinate: int) -> int:
-        """Index of a nodal coordinate; negative nodes count from the end."""
+        """Return the index of a nodal coordinate; negative nodes count from the end."""
         return COORDINATES_PER_NODE * (node % self.nodes.size) + coordinate
 
     def scatter(self, element: int, rows: Array) -> Array:
-        """Rows per element coordinate (n, 8) as rows per nodal coordinate (n, n_nodal): the Boolean B of Eq. 8."""
+        """Expand rows per element coordinate (n, 8) to nodal coordinates (n, n_nodal): Boolean matrix B of Eq. 8."""
         wide = np.zeros((rows.shape[0], self.n_nodal), dtype=rows.dtype)
         start = COORDINATES_PER_NODE * element
         columns = np.arange(start, start + 2 * COORDINATES_PER_NODE)
         if element in self._split:
-            # The curvature of its first node belongs to the element before; that of this side is at the end.
+            # The node's regular curvature belongs to the preceding element, the additional one to this element.
             columns[CURVATURE] = COORDINATES_PER_NODE * self.nodes.size + self._split.index(element)
         wide[:, columns] = rows
         return wide
 
     def rows_of(self, coordinate: int) -> NDArray[np.int64]:
-        """Index of one of the four coordinates at every node."""
+        """Return the indices of one of the four coordinates at every node."""
         return np.arange(coordinate, COORDINATES_PER_NODE * self.nodes.size, COORDINATES_PER_NODE)
 
     def with_separate_curvature(self, nodes: Iterable[int]) -> BeamMesh:
-        """The same mesh with curvature separate on either side of these nodes, and free at the last node among them."""
+        """Return the mesh with separate curvatures at the given nodes; that of the last node, if given, is free."""
         return replace(self, separate=tuple(sorted(set(nodes))))
 
     def shape_at(self, x: float) -> tuple[Array, Array]:
-        """Shape matrix N (2, n_nodal) and slope row N2' (n_nodal,) of the point at x [m]."""
+        """Return the shape matrix N (2, n_nodal) and the slope row N2' (n_nodal,) of the point at x [m]."""
         N, slope = self.shapes_at(np.array([x]))
         return N[0], slope[0]
 
     def shapes_at(self, x: Array) -> tuple[Array, Array]:
-        """`shape_at` of many points: (k, 2, n_nodal) and (k, n_nodal)."""
+        """Return shape matrices (k, 2, n_nodal) and slope rows (k, n_nodal) of the points at x (k,) [m]."""
         elements = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.n_elements - 1)
         kind = np.result_type(x, self.nodes)
         N, slope = np.zeros((x.size, 2, self.n_nodal), kind), np.zeros((x.size, self.n_nodal), kind)
@@ -129,13 +129,13 @@ class BeamMesh:
         return N, slope
 
     def shape_at_node(self, node: int) -> tuple[Array, Array]:
-        """`shape_at` of a node, whose coordinates are displacement and slope themselves."""
+        """Return `shape_at` of a node: unit rows, because displacements and slope are nodal coordinates."""
         rows = np.zeros((3, self.n_nodal))
         rows[[0, 1, 2], [self.column(node, AXIAL), self.column(node, TRANSVERSE), self.slope_column(node)]] = 1.0
         return rows[:2], rows[2]
 
     def slope_column(self, node: int) -> int:
-        """Index of a node's slope."""
+        """Return the index of a node's slope."""
         return self.column(node, SLOPE)
 
 
@@ -145,20 +145,22 @@ def mesh_beam(length: float, points: Mapping[str, float], elements: int | Sequen
     Parameters
     ----------
     length : float
-        [m]
+        Length of the beam [m].
     points : mapping
-        Position of each named point along the beam [m]; the two ends are nodes whether named or not.
+        Position of each named point along the beam [m]; the two ends are always nodes.
     elements : int or sequence of int
-        Elements per span, one number for all or one a span, from the first end on.
+        Number of elements per span: one for all spans, by default 1, or one per span from the first end on.
 
     Returns
     -------
     BeamMesh
+        Mesh of the beam, without separate curvatures.
 
     Raises
     ------
     InputError
-        A length that is not positive, a point off the beam, a wrong number of element counts.
+        The length is not positive, a point lies off the beam, the number of element counts is wrong, a span has
+        less than one element, or the beam has too many.
     """
     if not (np.isfinite(length) and length > 0.0):
         raise InputError("a beam needs a positive length", field="length", value=length, remedy="give it in metres")

@@ -1,4 +1,4 @@
-"""Eigenmodes of a body in its reference frame: the flexible coordinates of the kernels."""
+"""Eigenmodes of a body in its reference frame, which are the flexible coordinates of the kernels."""
 
 from __future__ import annotations
 
@@ -19,25 +19,26 @@ class ModalBasis:
     Attributes
     ----------
     omega : (nf,) array
-        Angular frequencies, ascending [rad/s].
+        Angular eigenfrequencies, ascending [rad/s].
     vectors : (nodal, nf) array
-        Columns V with V^T Mff V = 1 and V^T K V = diag(omega^2); square where all modes are kept.
+        Mode shapes V in columns, V^T Mff V = 1 and V^T K V = diag(omega^2); square if all modes are kept.
     """
 
     omega: Array
     vectors: Array
 
     def like(self, other: ModalBasis, Mff: Array) -> ModalBasis:
-        """Those of these modes that are nearest to the modes of a slightly different body, in their order and signs.
+        """Match the modes to those of a slightly different body, and return them in its order and with its signs.
 
-        Frequencies may cross as a body changes, and eigenvectors have no sign; matched by overlap they change smoothly.
+        Frequencies may cross as a body changes, and the sign of an eigenvector is arbitrary. Modes that are matched by
+        their overlap change smoothly.
 
         Parameters
         ----------
         other : ModalBasis
-            Of as many coordinates; it may have fewer modes.
+            Modes of the other body, in as many coordinates; there may be fewer of them.
         Mff : (nodal, nodal) array
-            Of this body, in the metric of which modes overlap.
+            Mass matrix of this body, in which the overlap of modes is measured.
         """
         overlap = (other.vectors.T @ Mff @ self.vectors).real
         rows, columns = scipy.optimize.linear_sum_assignment(-np.abs(overlap))
@@ -45,15 +46,15 @@ class ModalBasis:
 
 
 def modal_basis(body: ShapeIntegrals) -> ModalBasis:
-    """Diagonalise a body's flexible coordinates; with all modes kept the model is the same."""
+    """Compute the mass-normalised eigenmodes of a body; in terms of all of them the model is the same."""
     if body.nf == 0:
         return ModalBasis(omega=np.zeros(0), vectors=np.zeros((0, 0)))
     squares, vectors = eigenpairs(body.K, body.Mff)
-    # A mode's sign is arbitrary; the largest entry made positive keeps results the same on every machine.
+    # A mode's sign is arbitrary; with the largest entry positive, results are the same on every machine.
     largest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(vectors.shape[1])]
     return ModalBasis(omega=np.sqrt(np.maximum(squares, 0.0)), vectors=vectors * np.sign(np.real(largest)))
 
 
 def natural_frequencies(body: ShapeIntegrals) -> Array:
-    """Angular frequencies of a body with its frame held [rad/s], ascending."""
+    """Compute the angular eigenfrequencies of a body whose frame is held [rad/s], ascending."""
     return modal_basis(body).omega

@@ -1,8 +1,8 @@
-"""Reference conditions: how the floating frame is attached to the deforming beam.
+"""Reference conditions, which attach the floating frame to the deforming beam.
 
-Each is a basis of the same space, the nodal coordinates without the three rigid-body motions and without the
-curvature of the last node (zero in the paper's Eq. 9, and in truth unless a moment of inertia sits there). A beam of
-n elements has 4n flexible coordinates under any of them, and one more for each separate curvature.
+Each is a basis of the same space: the nodal coordinates without the three rigid-body motions and without the
+curvature of the last node, unless it is separate (it is zero in the paper's Eq. 9, which is exact unless a moment acts
+there). A beam of n elements has 4n flexible coordinates under each condition, and one more for each separate curvature.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ N_RIGID = 3
 
 
 class ReferenceCondition(Enum):
-    """Place of the body frame on the deformed beam.
+    """Position and orientation of the body frame on the deformed beam.
 
     CANTILEVER (the paper's Eq. 9)
-        at the first node, x along the tangent there.
+        Origin at the first node, x axis along the tangent there.
     PINNED
-        at the first node, x along the chord to the last node.
+        Origin at the first node, x axis along the chord to the last node.
     FREE
-        such that the elastic motion carries no momentum: coordinates are the elastic modes of the free beam
-        with its lumps (linearised Tisserand frame).
+        Frame in which the elastic motion has no momentum (linearised Tisserand frame): the coordinates are the
+        elastic modes of the free beam with its lumps.
     """
 
     CANTILEVER = "cantilever"
@@ -38,19 +38,21 @@ class ReferenceCondition(Enum):
 
 
 def reference_basis(mesh: BeamMesh, condition: ReferenceCondition | str, mass: Array, stiffness: Array) -> Array:
-    """Transformation D from independent flexible coordinates to nodal coordinates (Eq. 7).
+    """Return the transformation D from independent flexible coordinates to nodal coordinates (Eq. 7).
 
     Parameters
     ----------
     mesh : BeamMesh
+        Mesh of the beam.
     condition : ReferenceCondition or str
+        Reference condition.
     mass, stiffness : (n_nodal, n_nodal) arrays
-        Of the beam with its lumps before any condition; only FREE needs them.
+        Nodal mass and stiffness matrix of the beam with its lumps, before any condition; used by FREE only.
 
     Returns
     -------
     (n_nodal, nf) array
-        nf is 4 a element, and one more for each separate curvature.
+        Transformation D; nf is 4 per element and one more for each separate curvature.
     """
     condition = as_enum(ReferenceCondition, condition, "reference")
     kept = np.ones(mesh.n_nodal, dtype=bool)

@@ -20,24 +20,26 @@ from paraflex.mechanism import AtEnd
 
 @dataclass(frozen=True)
 class Leaving:
-    """A point that reaches the end of its beam, and the time [s]."""
+    """Point that reaches the end of its beam, with the time [s]."""
 
     function: EventFunction
     time: float
 
 
 class BeamEnds:
-    """Events of a run at the ends of beams, and the points that have left theirs.
+    """Events of a run at the ends of beams, and the points that have left their beams.
 
     Parameters
     ----------
     system : System
+        System of the run.
     start : State
+        Initial state.
 
     Raises
     ------
     InputError
-        A point is off its beam at the start, and its joint does not say that the run is to go on.
+        A point is off its beam at the start, and its joint does not let the run go on.
     """
 
     def __init__(self, system: System, start: State) -> None:
@@ -55,7 +57,7 @@ class BeamEnds:
     def pass_over(
         self, crossing: Crossing, functions: Sequence[EventFunction]
     ) -> tuple[tuple[EventFunction, ...], Crossing | None]:
-        """The events left after a crossing, and the crossing in the same step that ends the run, or None."""
+        """Return the events that remain after a crossing, and the crossing that ends the run in this step or None."""
         left, found = tuple(functions), crossing
         while found is not None and not found.function.ends_run:
             self._left += (Leaving(found.function, found.t),)
@@ -64,21 +66,21 @@ class BeamEnds:
         return left, found
 
     def findings(self, q: Array) -> tuple[Finding, ...]:
-        """A finding for each point that left its beam; samples q (k, n) give its distance."""
+        """Return a finding for each point that left its beam; the samples q (k, n) give its distance."""
         return tuple(_finding(one, one.function.value(q)) for one in self._left)
 
 
-# Remedy for a point at the end of its beam if the joint has at_end "error".
+# Remedy for a point at the end of its beam if the joint has at_end = "error".
 STAY_ON_BEAM = 'lengthen the beam, or let the run go on with at_end = "warn"'
 
 
 def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
-    """Findings of points that leave their beams in a motion at samples t, q, v, by cubics between samples.
+    """Return findings on points that leave their beams in a motion at samples t, q, v, with cubics between samples.
 
     Raises
     ------
     UnreachablePathError
-        A point leaves a beam whose joint asks for an error.
+        A point leaves a beam whose joint has at_end = "error".
     """
     leavings = list(_leavings(system, t, q, v))
     for one, k in leavings:
@@ -91,17 +93,17 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
 
 
 def beyond_ends(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
-    """Findings of points that continue beyond the ends of their beams, in a motion at samples t, q, v."""
+    """Return findings on points that continue beyond the ends of their beams, in a motion at samples t, q, v."""
     return _going_on(_leavings(system, t, q, v), q)
 
 
 def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Leaving | None:
-    """The first point to reach the end of its beam in a motion at samples t, q, v, if that ends it; else None.
+    """Return the first point to reach the end of its beam in a motion at samples t, q, v, if that ends it, else None.
 
     Raises
     ------
     InputError
-        It is off its beam at the start.
+        The point is off its beam at the start.
     """
     ending = [(one, k) for one, k in _leavings(system, t, q, v) if one.function.ends_run]
     for one, k in ending:
@@ -115,7 +117,7 @@ def _going_on(leavings: Iterable[tuple[Leaving, int]], q: Array) -> tuple[Findin
 
 
 def _leavings(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Leaving, int]]:
-    """Points that leave their beams in a motion, each with the first sample outside."""
+    """Yield points that leave their beams in a motion, each with the first sample outside."""
     for function in beam_end_functions(system):
         outside = np.nonzero(function.inside(q) <= 0.0)[0]
         if outside.size:
@@ -124,7 +126,7 @@ def _leavings(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Le
 
 
 def _first_outside(function: EventFunction, t: Array, q: Array, v: Array, k: int) -> float:
-    """Time at which a motion reaches a bound between its samples k - 1 and k."""
+    """Return the time at which a motion reaches a bound between its samples k - 1 and k."""
     path = scipy.interpolate.CubicHermiteSpline(t[k - 1 : k + 1], q[k - 1 : k + 1], v[k - 1 : k + 1])
 
     def inside(time: float) -> float:

@@ -1,7 +1,7 @@
-"""What a run does between the samples that it keeps: whether its largest loads are those of the samples.
+"""Check whether the largest loads of a run lie between the samples that it keeps.
 
-A run keeps few samples of many steps. Its time loop takes more at hardly any cost, from which the largest loads are
-found once more; those that were asked for are kept.
+A run keeps few samples of many steps. Its time loop takes additional samples at little cost, from which the largest
+loads are computed again; the requested samples are kept.
 """
 
 from __future__ import annotations
@@ -22,40 +22,40 @@ from paraflex.findings import Finding
 from paraflex.integrators.limits import StepLimits
 from paraflex.integrators.solution import Solution
 
-# Code of the finding, and its place: the number of samples.
+# Code of the finding, and the field it refers to: the number of samples.
 COARSE = "samples-coarse"
 SAMPLES = "study.samples"
-# How many times as many samples are looked at, and how many at least.
+# Least ratio of the samples examined to those kept, and least number of samples examined.
 _FINER, _LEAST = 2, 1401
-# Spacing of those where something given changes fast, as a part of the longest step there.
+# Spacing of additional samples where inputs change fast, as a part of the longest step there.
 _PART_OF_STEP = 0.25
-# Coordinates at all of them together that are at most worth the memory.
+# Largest number of coordinates of all samples together, for memory.
 _MOST_NUMBERS = 4_000_000
-# Numbers of one kind of load that are worked on at a time: in a processor's cache.
+# Numbers of one kind of load that are processed at a time, to fit into the processor's cache.
 _AT_A_TIME = 20_000
-# Loads below these do not matter: stress [MPa], and forces as a part of all weight.
+# Negligible loads: stress [MPa], and forces as a part of the total weight.
 _NO_STRESS, _NO_FORCE = 1e-3, 1e-3
 _GRAVITY = 9.81
-# By how much larger a load is between samples for a finding, and how nearly those of the remedy have it.
+# Excess of a load between samples that gives a finding, and accuracy of the load with the samples of the remedy.
 LARGER, _NEARLY = 0.05, 0.01
 
 
 class Between(NamedTuple):
-    """Times of samples with others between them.
+    """Times of samples with additional samples between them.
 
     Attributes
     ----------
     times : (k,) array
-        [s]
+        Sample times [s].
     asked : (k,) array of bool
-        Which are to be kept.
+        Whether a sample is kept.
     """
 
     times: Array
     asked: NDArray[np.bool_]
 
     def kept(self, solution: Solution) -> Solution:
-        """The samples that were asked for, and the state at an event."""
+        """Return the solution with the requested samples and the state at an event only."""
         keep = np.ones(solution.t.size, dtype=bool)
         count = solution.t.size - bool(solution.event)
         keep[:count] = self.asked[:count]
@@ -64,18 +64,19 @@ class Between(NamedTuple):
 
 
 def with_between(times: Array, coordinates: int, limits: StepLimits | None = None) -> Between | None:
-    """Times with others evenly between them; None where there are none between, or these would take too much memory.
+    """Return sample times with additional ones evenly between them.
 
-    More of them stand where something given changes fast, as in a pulse.
+    There are more where inputs change fast, as in a pulse. The result is None if there are no intervals, or if the
+    additional samples would take too much memory.
 
     Parameters
     ----------
     times : (k,) array
-        Of samples, ascending [s].
+        Sample times, ascending [s].
     coordinates : int
-        Of the system.
+        Number of coordinates of the system.
     limits : StepLimits, optional
-        By what is given in time.
+        Longest steps that resolve the inputs; None for no limits.
     """
     pieces = times.size - 1
     if pieces < 1:
@@ -94,7 +95,7 @@ def with_between(times: Array, coordinates: int, limits: StepLimits | None = Non
 
 
 def _brief(limits: StepLimits, spacing: float, times: Array) -> Iterator[Array]:
-    """Times in pieces where what is given changes faster than samples at a spacing follow."""
+    """Yield times in pieces in which inputs change faster than samples at a spacing resolve."""
     ends = np.append(limits.times[1:], times[-1])
     for first, last, step in zip(limits.times, np.minimum(ends, times[-1]), _PART_OF_STEP * limits.steps, strict=True):
         first = max(first, times[0])
@@ -103,22 +104,23 @@ def _brief(limits: StepLimits, spacing: float, times: Array) -> Iterator[Array]:
 
 
 def samples_too_few(system: System, whole: Solution, kept: Solution, samples: int) -> Finding | None:
-    """A finding on loads that are larger between the samples that a run keeps; None where they are not.
+    """Return a finding on loads that are larger between the samples that a run keeps, or None if there are none.
 
     Parameters
     ----------
     system : System
+        System of the run.
     whole, kept : Solution
-        Of the run, with the samples in between and without.
+        Solution with the additional samples and without them.
     samples : int
-        That the run was asked for.
+        Number of samples requested for the run.
     """
     if whole.t.size == kept.t.size:
         return None
     weight = _GRAVITY * system.total_mass
     least = {"MPa": _NO_STRESS, "N": _NO_FORCE * weight, "N m": _NO_FORCE * weight * system.size}
     found, times_as_many = [], 1.0
-    # Of a run that failed, numbers may be beyond all bounds.
+    # Values of a failed run may overflow.
     with np.errstate(all="ignore"):
         for name, unit, loads in _largest_loads(system, whole):
             most, most_kept = float(np.max(loads)), float(np.max(loads[np.isin(whole.t, kept.t)]))
@@ -137,7 +139,7 @@ def samples_too_few(system: System, whole: Solution, kept: Solution, samples: in
 
 
 def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, str, Array]]:
-    """The largest of each kind of load at all samples (k,), with its name and unit."""
+    """Yield the largest of each kind of load at all samples (k,), with its name and unit."""
     multipliers = np.nan_to_num(solution.multipliers)
     motion = solution.q, solution.v, solution.a, multipliers
     sections = sections_of(system)
@@ -147,7 +149,7 @@ def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, st
             return np.nan_to_num(sections.loads(system, q, v, a, multipliers).stress)
 
         yield "the stress", "MPa", 1e-6 * _largest(stress, motion, len(sections.owners))
-    # At singular positions forces have poles.
+    # Forces have poles at singular positions.
     if solution.singular_positions:
         return
     names = [joint.name for joint in system.mechanism.joints]
@@ -164,7 +166,7 @@ def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, st
 
 
 def _largest(loads: Callable[..., Array], motion: Sequence[Array], width: int) -> Array:
-    """The largest of loads (j, width) of each of k samples (k,), of some samples at a time."""
+    """Return the largest of the loads (j, width) at each of k samples (k,), computed for some samples at a time."""
     count = max(_AT_A_TIME // width, 1)
     parts = [
         np.max(loads(*(each[first : first + count] for each in motion)), axis=1)
@@ -174,10 +176,13 @@ def _largest(loads: Callable[..., Array], motion: Sequence[Array], width: int) -
 
 
 def _pieces(t: Array, loads: Array, enough: float) -> float:
-    """Least number of even pieces of a run, such that all shorter ones still have enough as their largest load."""
+    """Return the least number of equal pieces of a run whose ends show a load of at least `enough`.
+
+    All larger numbers up to that of the samples show it as well.
+    """
     span = t[-1] - t[0]
     if t.size * np.min(np.diff(t)) < 0.9 * span:
-        # More samples where a pulse is: pieces are no longer than it.
+        # There are more samples in a pulse: pieces are no longer than the pulse.
         low = np.flatnonzero(loads < enough)
         at = np.searchsorted(low, int(np.argmax(loads)))
         first, last = t[low[at - 1]] if at > 0 else t[0], t[low[at]] if at < low.size else t[-1]
@@ -189,6 +194,6 @@ def _pieces(t: Array, loads: Array, enough: float) -> float:
 
 
 def _round_number(number: float) -> int:
-    """The next larger number of two digits and zeros."""
+    """Return the next larger number with two significant digits."""
     unit = 10 ** max(int(math.log10(max(number, 1.0))) - 1, 0)
     return unit * math.ceil(number / unit)

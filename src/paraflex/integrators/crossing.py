@@ -1,4 +1,4 @@
-"""March to the first event: detected within each step and located there, with the state at the event."""
+"""Marching to the first event: detected within each step and located there, with the state at the event."""
 
 from __future__ import annotations
 
@@ -19,26 +19,27 @@ from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import PAUSED, Samples
 
-# Places within a step at which events are checked, its end last: an excursion between two of them is missed.
+# Fractions of a step at which events are checked, its end last; an excursion between two of them is missed.
 _PLACES = np.array([0.25, 0.5, 0.75, 1.0])
-# They are looked at where a value is no further inside its bounds than so many times what it changed by in this step
-# and the one before: a parabola that turns within the step changes in one of them by more than it dips.
+# Events are checked within a step if the distance from the bounds is at most this many times its changes in this step
+# and the previous one: a parabola that turns within the step changes in one of them by more than its excursion.
 _NEAR_BOUND = 4.0
-# How exactly an event is found, as a fraction of the step.
+# Accuracy of the location of an event, as a fraction of the step.
 _EVENT_ACCURACY = 1e-13
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """An event between two instants.
+    """Event within a step.
 
     Attributes
     ----------
     function : EventFunction
+        Event function that crosses a bound.
     before, after : Instant
         Ends of the step.
     fraction : float
-        Of the step until the event.
+        Fraction of the step at which the event occurs.
     """
 
     function: EventFunction
@@ -53,17 +54,20 @@ class Crossing:
 
     @property
     def reached(self) -> str:
-        """The limit that was reached, in words."""
+        """Description of the limit that was reached."""
         return self.function.reached(_poses(self.before, self.after, self.fraction)[0])
 
     @property
     def message(self) -> str:
-        """The limit that was reached, and the time."""
+        """Description of the limit that was reached, with the time."""
         return f"{self.reached} at t = {self.t:.6g} s"
 
 
 def advance(run: Run, functions: Sequence[EventFunction], attempts: int) -> tuple[int, Crossing | None]:
-    """March by a number of attempted steps, or to the first event among them; the code of the last one."""
+    """March by a number of attempted steps, or to the first event in them.
+
+    Returns the code of the last step, and the event or None.
+    """
     if not functions:
         return run.march(attempts), None
     code, before = PAUSED, run.now()
@@ -87,12 +91,12 @@ def advance(run: Run, functions: Sequence[EventFunction], attempts: int) -> tupl
 
 
 def _inside(functions: Sequence[EventFunction], instant: Instant) -> Array:
-    """Distance of each function from its bounds, positive inside."""
+    """Return the distance of each function from its bounds, positive inside."""
     return np.array([function.inside(instant.q[None])[0] for function in functions])
 
 
 def first_crossing(functions: Sequence[EventFunction], before: Instant, after: Instant) -> Crossing | None:
-    """The first event of a step that starts inside all bounds; None for none."""
+    """Return the first event of a step that starts inside all bounds, or None."""
     found = []
     for function in functions:
         outside = np.nonzero(function.inside(_poses(before, after, _PLACES)) <= 0.0)[0]
@@ -104,20 +108,20 @@ def first_crossing(functions: Sequence[EventFunction], before: Instant, after: I
 
 
 def samples_until(run: Run, crossing: Crossing) -> Samples:
-    """Samples taken before an event, and the state at it as the last.
+    """Return the samples before an event, and the state at the event as the last one.
 
-    Positions and velocities are those of cubics through both ends of the step; accelerations and multipliers follow
-    from them by the equations of motion.
+    Positions and velocities are interpolated by cubics through both ends of the step; accelerations and multipliers
+    follow from the equations of motion.
     """
     problem, x = run.problem, crossing.fraction
     taken = run.samples.times[: run.reached]
     kept = slice(0, int(np.searchsorted(taken, crossing.t)))
     before = crossing.before
     first = _begun_at(problem, before.t, before.q, before.v)
-    # Accelerations jump with the inputs: the step began with those after the jump.
+    # Accelerations jump with the inputs; the step began with the accelerations after the jump.
     before = replace(before, a=first.samples.a[0])
     middle, last = (_begun_at(problem, *_state(before, crossing.after, part)) for part in (0.5 * x, x))
-    # Simpson's rule: powers that jump do so at the ends of steps.
+    # Simpson's rule is accurate, as powers jump only at the ends of steps.
     powers = [one.state.power[0] for one in (first, middle, last)]
     width = crossing.t - before.t
     work = before.work + width / 6.0 * (powers[0] + 4.0 * powers[1] + powers[2])
@@ -130,7 +134,7 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
 
 
 def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
-    """A run that starts from a state, from which alone its first sample and the power there follow."""
+    """Return a run started from a state, used only for its first sample and the power there."""
     moment = {"times": np.array([t]), "stops": np.array([t + problem.span]), "asked": np.ones(1, dtype=bool)}
     here = replace(problem, initial=State(t, q, v), **moment)
     begun = native.prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))
@@ -139,26 +143,26 @@ def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRu
 
 
 def _state(before: Instant, after: Instant, x: float) -> tuple[float, Array, Array]:
-    """Time, positions and velocities at a fraction of a step: cubics."""
+    """Return time, positions and velocities at a fraction of a step, by cubics."""
     h = after.t - before.t
     v = _cubic(before.v, before.a, after.v, after.a, h, x)
     return before.t + x * h, _cubic(before.q, before.v, after.q, after.v, h, x), v
 
 
 def _poses(before: Instant, after: Instant, fractions: Array | float) -> Array:
-    """Positions (k, n) at fractions of a step."""
+    """Return positions (k, n) at fractions of a step."""
     x = np.atleast_1d(fractions)[:, None]
     return _cubic(before.q, before.v, after.q, after.v, after.t - before.t, x)
 
 
 def _cubic(y0: Array, dy0: Array, y1: Array, dy1: Array, h: float, x: Array | float) -> Array:
-    """The cubic with values y and derivatives dy at both ends of an interval h, at fractions x of it."""
+    """Return the cubic with values y and derivatives dy at both ends of an interval h, at fractions x of it."""
     y = 1.0 - x
     return y * y * ((1.0 + 2.0 * x) * y0 + h * x * dy0) + x * x * ((1.0 + 2.0 * y) * y1 - h * y * dy1)
 
 
 def _root(function: EventFunction, before: Instant, after: Instant, first: float, last: float) -> float:
-    """The fraction of a step between two others, inside and outside, at which the bound is reached."""
+    """Return the fraction of a step at which the bound is reached, between a fraction inside and one outside."""
 
     def inside(x: float) -> float:
         return float(function.inside(_poses(before, after, x))[0])

@@ -1,4 +1,4 @@
-"""Event functions: a number for each event, and its bounds."""
+"""Event functions: a function of the pose for each event, and its bounds."""
 
 from __future__ import annotations
 
@@ -24,25 +24,28 @@ from paraflex.fem import slope_square_integrals
 from paraflex.integrators.events import BeamEnd, DeflectionLimit, Event, JointLimit, beam_ends, check_events
 from paraflex.mechanism import AtEnd
 
-# Places within an element at which the deflection is evaluated, its last end included.
+# Number of points within an element at which the deflection is evaluated, its last end included.
 _PLACES = 4
 # Tolerance for a point at the end of its beam, as a fraction of the length: rounding and errors of closure.
 _AT_END = 1e-9
-# Two places are always on their chord.
+# Least number of points for a deflection: two points are always on their chord.
 _LEAST_ON_LINE = 3
 
 
 @dataclass(frozen=True)
 class EventFunction:
-    """A function of the pose that defines an event, and its bounds.
+    """Function of the pose that defines an event, and its bounds.
 
     Attributes
     ----------
     event : Event or BeamEnd
+        Event that the function defines.
     value : callable
-        Of poses (k, n), a value (k,).
+        Function that maps poses (k, n) to values (k,).
     low, high : float
+        Lower and upper bound, may be infinite.
     unit : str
+        Unit of the values, empty for a dimensionless one.
     """
 
     event: Event | BeamEnd
@@ -53,16 +56,16 @@ class EventFunction:
 
     @property
     def ends_run(self) -> bool:
-        """Whether the run ends there."""
+        """Whether the event ends the run."""
         return not (isinstance(self.event, BeamEnd) and self.event.at_end is AtEnd.WARN)
 
     def inside(self, q: Array) -> Array:
-        """Distance of poses (k, n) from the bounds (k,): positive inside, zero at the event."""
+        """Return the distance of poses (k, n) from the bounds (k,), positive inside, zero at the event."""
         value = self.value(q)
         return np.minimum(value - self.low, self.high - value)
 
     def reached(self, q: Array) -> str:
-        """The limit that is reached at a pose (n,), in words."""
+        """Describe the limit that is reached at a pose (n,)."""
         event, value = self.event, float(self.value(q[None])[0])
         if isinstance(event, JointLimit):
             lower = value - self.low < self.high - value
@@ -80,12 +83,12 @@ class EventFunction:
 
 
 def event_functions(system: System, q: Array, events: Sequence[Event]) -> tuple[EventFunction, ...]:
-    """One function for each event, for runs that start at q (n,).
+    """Return one function for each event, for runs that start at q (n,).
 
     Raises
     ------
     InputError
-        See `check_events`; or the start is not inside.
+        The events are not valid (see `check_events`), or the start is not inside the bounds.
     """
     check_events(system.mechanism, events)
     functions = tuple(_event_function(system, q, event) for event in events)
@@ -102,7 +105,7 @@ def event_functions(system: System, q: Array, events: Sequence[Event]) -> tuple[
 
 
 def beam_end_functions(system: System) -> tuple[EventFunction, ...]:
-    """Functions for the places of points that slide along beams, from 0 to the length of the beam."""
+    """Return functions for the places of points that slide along beams, with bounds 0 and the length of the beam."""
     functions = []
     for end in beam_ends(system.mechanism):
         margin = _AT_END * end.length
@@ -121,7 +124,7 @@ def _event_function(system: System, q: Array, event: Event) -> EventFunction:
 
 
 def _joint_value(system: System, joint: str) -> Callable[[Array], Array]:
-    """Angle or travel of a joint; an angle is linear in the coordinates."""
+    """Return a function for the angle or travel of a joint; an angle is linear in the coordinates."""
     if system.mechanism.slides(joint):
         return lambda q: joint_coordinate(system, joint, q).value
     row = joint_coordinate(system, joint, np.zeros((1, system.n))).rows[0]
@@ -129,7 +132,7 @@ def _joint_value(system: System, joint: str) -> Callable[[Array], Array]:
 
 
 def _deflection(system: System, name: str) -> Callable[[Array], Array]:
-    """Largest deflection along a body from its chord."""
+    """Return a function for the largest deflection along a body from its chord."""
     body = system.body(name)
     rest, rows, shortening = deflection_rows(body)
     if len(rest) < _LEAST_ON_LINE or np.all(rest[0] == rest[-1]):
@@ -149,11 +152,12 @@ def _deflection(system: System, name: str) -> Callable[[Array], Array]:
 
 
 def deflection_rows(body: BodyCoordinates) -> tuple[Array, Array, Callable[[Array], Array] | None]:
-    """Places at which a flexible body's deflection is evaluated, and their displacement rows in the body frame.
+    """Return the points for a flexible body's deflection, and their displacement rows in the body frame.
 
-    Of a beam its ends and quarters of its elements, of a bar of given shapes places along it, of a modal body its
-    points: places undeformed (places, 2) [m], displacements per modal coordinate (places, 2, nf), and of second-order
-    geometry int_0^x (N2' u)^2 dx of modal coordinates (k, nf), (k, places) [m].
+    The points are ends and quarters of the elements of a beam, points along a bar of given shapes, or the points of a
+    modal body. The result has their undeformed positions (places, 2) [m], their displacements per modal coordinate
+    (places, 2, nf), and in second-order geometry a function that maps modal coordinates (k, nf) to int_0^x (N2' u)^2 dx
+    (k, places) [m], else None.
     """
     D, mesh = body.integrals.D, body.mesh
     if mesh is not None:

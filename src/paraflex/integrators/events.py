@@ -1,4 +1,4 @@
-"""Events that end a run: a joint at its limit, the deflection of a link at its limit, a singular position near."""
+"""Events that end a run: a joint at its limit, the deflection of a link at its limit, a nearby singular position."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ class JointLimit(CheckedFields):
     Attributes
     ----------
     joint : str
+        Name of the joint.
     low, high : float
-        Of a revolute joint's angle [rad]: that of body b less that of body a, slopes of beams included, counted on
-        through whole turns from the start's angles; of the travel of a joint that slides [m]. Either may be infinite.
+        Lower and upper limit, either may be infinite. Limits of a revolute joint are angles [rad]: that of body b less
+        that of body a, slopes of beams included, counted through whole turns from the angles at the start. Limits of a
+        joint that slides are travels [m].
     """
 
     joint: str
@@ -42,15 +44,16 @@ class JointLimit(CheckedFields):
 
 @dataclass(frozen=True)
 class DeflectionLimit(CheckedFields):
-    """A limit of the deflection of a link.
+    """Limit of the deflection of a link.
 
     Attributes
     ----------
     body : str
+        Name of the flexible body.
     limit : float
-        Of its largest deflection [m]: across its chord, the line from its first end to its last, whatever its reference
-        condition is. Taken at ends and quarters of every element. Of a modal body, that of its points from where they
-        are beside the line from the first to the last.
+        Largest deflection [m], measured from the chord, the line from the first end to the last, for any reference
+        condition. It is evaluated at ends and quarters of every element; for a modal body at its points, from their
+        undeformed positions relative to the line from the first to the last.
     """
 
     body: str
@@ -70,14 +73,14 @@ class DeflectionLimit(CheckedFields):
 
 @dataclass(frozen=True)
 class SingularDistance(CheckedFields):
-    """A limit of the distance from a singular position.
+    """Limit of the distance from a singular position.
 
     Attributes
     ----------
     distance : float
-        Without dimension, between 0 and 1: see `dynamics.SingularityMeasure`.
+        Dimensionless distance between 0 and 1: see `dynamics.SingularityMeasure`.
     motors : tuple of str
-        Held: then it is a Type II singularity of these motors. None for one of the constraints.
+        Names of motors held, for a Type II singularity of these motors; empty for a singularity of the constraints.
     """
 
     distance: float
@@ -98,16 +101,18 @@ class SingularDistance(CheckedFields):
 
 @dataclass(frozen=True)
 class BeamEnd:
-    """The ends of the beam along which a joint slides, an event of every run unless the joint ignores it.
+    """Ends of the beam along which a joint slides, an event of every run unless the joint ignores it.
 
     Attributes
     ----------
     joint : str
+        Name of the joint.
     beam : str
+        Name of the beam.
     length : float
-        Of the beam [m].
+        Length of the beam [m].
     at_end : AtEnd
-        What the run does there.
+        Action of the run at the end.
     """
 
     joint: str
@@ -124,7 +129,7 @@ given_as("an event")(Event)
 
 
 def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:
-    """Ends of the beams along which joints slide, without those that ignore them."""
+    """Return the ends of the beams along which joints slide, without joints that ignore them."""
     found = []
     for joint in mechanism.joints:
         if joint.at_end is not AtEnd.IGNORE:
@@ -140,7 +145,7 @@ def check_events(mechanism: Mechanism, events: Sequence[Event]) -> None:
     Raises
     ------
     InputError
-        A name that is none of the mechanism's, a joint that cannot move or a body that cannot bend.
+        A name is not one of the mechanism's, a joint cannot move, or a body cannot bend.
     """
     for event in events:
         if isinstance(event, JointLimit):

@@ -1,7 +1,7 @@
-"""The equations of motion for external solvers: functions of time and one vector, with Jacobian and tolerances.
+"""Equations of motion for external solvers: functions of time and one vector, with Jacobian and tolerances.
 
-An `OdeForm` has y = (q, v, work), multipliers eliminated; the two forms for DAE solvers add them as unknowns. The work
-done is integrated beside the motion, without a say in the steps.
+An `OdeForm` has y = (q, v, work), with multipliers eliminated; the two forms for DAE solvers add them as unknowns. The
+work done is integrated with the motion, but does not affect the step size.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from paraflex.kernel.ode import (
 from paraflex.kernel.packed import OMEGA2, Signals
 from paraflex.kernel.tangent import make_tangent
 
-# An error that does not count [any unit].
+# Tolerance of a component whose error does not count [any unit].
 _IGNORED = 1e20
 
 
 class Solved(NamedTuple):
-    """Accelerations (n,) and multipliers (m,) at an instant, and the number of dependent rows there."""
+    """Accelerations (n,) and multipliers (m,) at one time, and the number of dependent rows there."""
 
     a: Array
     multipliers: Array
@@ -41,12 +41,12 @@ class Solved(NamedTuple):
 
 
 class OdeForm:
-    """q' = v, v' = a(t, q, v), work' = power (Eqs. 59-60).
+    """ODE q' = v, v' = a(t, q, v), work' = power (Eqs. 59-60).
 
     Attributes
     ----------
     signals : Signals
-        What acts, as steps may see it: exchanged at jumps.
+        Inputs visible to the current steps; replaced at jumps.
     """
 
     def __init__(self, problem: Problem, options: IntegrationOptions) -> None:
@@ -63,7 +63,7 @@ class OdeForm:
         return 2 * self.system.n + 1
 
     def solve(self, t: float, q: Array, v: Array) -> Solved:
-        """Accelerations and multipliers."""
+        """Return accelerations and multipliers."""
         a, lam = np.zeros(self.system.n), np.zeros(self.system.m)
         dependent = accelerations(
             self.system.packed, self.signals, t, self._weights, np.ascontiguousarray(q), np.ascontiguousarray(v),
@@ -72,7 +72,7 @@ class OdeForm:
         return Solved(a, lam, dependent)
 
     def rates(self, t: float, y: Array) -> Array:
-        """Y' at (t, y), in a new array."""
+        """Return y' at (t, y), in a new array."""
         dy = np.empty(y.size)
         rates(
             self.system.packed, self.signals, t, self._weights, np.array(y), self._a, self._lam, self._torques,
@@ -81,7 +81,7 @@ class OdeForm:
         return dy
 
     def jacobian(self, t: float, y: Array) -> Array:
-        """Derivative of `rates` by y, in a new array."""
+        """Return the derivative of `rates` by y, in a new array."""
         out = np.empty((y.size, y.size))
         self.rates(t, y)
         arguments = (self._a, self._lam, self._torques, self._ws, self._tangent, out)
@@ -89,20 +89,20 @@ class OdeForm:
         return out
 
     def pack(self, t: float, q: Array, v: Array, work: float) -> Array:
-        """The vector y of a motion."""
+        """Return the vector y of a motion."""
         return np.concatenate([q, v, [work]])
 
     def unpack(self, y: Array) -> tuple[Array, Array, float]:
-        """The motion of a vector y: q, v, work."""
+        """Return the motion of a vector y: q, v, work."""
         n = self.system.n
         return y[:n].copy(), y[n : 2 * n].copy(), float(y[-1])
 
     def tolerances(self, error: float, span: float) -> Array:
-        """Absolute tolerances (size,) of a norm that is the root mean square of errors over tolerances.
+        """Return absolute tolerances (size,) for a norm that is the root mean square of errors over tolerances.
 
-        With these it is at most one where, in the mass norm, the position error is at most `error` [m] and so is what
-        the velocity error makes of it until it turns round: after 1 / omega in a flexible coordinate, else after a
-        quarter of the run. Off-diagonal terms of the mass matrix are left out.
+        With these the norm is at most one if, in the mass norm, the position error is at most `error` [m], and so is
+        the effect of the velocity error until it reverses: after 1 / omega in a flexible coordinate, else after a
+        quarter of the run. Off-diagonal terms of the mass matrix are neglected.
         """
         system = self.system
         q = error * np.sqrt(system.total_mass / (self.size * diagonal_mass(system)))
@@ -116,9 +116,9 @@ class OdeForm:
 
 
 class DescriptorForm(OdeForm):
-    """The DAE of index 1 in y = (q, v, lambda, work), with Baumgarte's terms (Eqs. 56-57).
+    """DAE of index 1 in y = (q, v, lambda, work), with Baumgarte's terms (Eqs. 56-57).
 
-    Constraint rows that follow from others at the start are left out, their multipliers zero.
+    Constraint rows that depend on others at the start are left out, their multipliers are zero.
     """
 
     multipliers = 1
@@ -130,21 +130,21 @@ class DescriptorForm(OdeForm):
 
     @property
     def size(self) -> int:
-        """See `OdeForm`."""
+        """Number of unknowns."""
         return 2 * self.system.n + self.multipliers * self.system.m + 1
 
     @property
     def algebraic(self) -> NDArray[np.int64]:
-        """The unknowns without a derivative."""
+        """Indices of the unknowns without a derivative."""
         return np.arange(2 * self.system.n, self.size - 1)
 
     def residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
-        """Residual into out (size,)."""
+        """Compute the residual into out (size,)."""
         arguments = (np.array(y), np.array(dy), self._dropped, self._torques, self._ws, out)
         descriptor_residual(self.system.packed, self.signals, t, self._weights, *arguments)
 
     def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
-        """Derivative of the residual by y, plus c times that by dy, in a new array."""
+        """Return the derivative of the residual by y, plus c times that by dy, in a new array."""
         out = np.empty((self.size, self.size))
         self.residual(t, y, dy, np.empty(self.size))
         arguments = (c, self._dropped, self._torques, self._ws, self._tangent, out)
@@ -152,12 +152,12 @@ class DescriptorForm(OdeForm):
         return out
 
     def pack(self, t: float, q: Array, v: Array, work: float) -> Array:
-        """See `OdeForm`; multipliers are those at the instant."""
+        """Return the vector y of a motion, with the multipliers at this time."""
         lam = self.solve(t, q, v).multipliers
         return np.concatenate([q, v, lam, np.zeros((self.multipliers - 1) * self.system.m), [work]])
 
     def slopes(self, t: float, y: Array) -> Array:
-        """Derivative of a packed y, those of algebraic unknowns zero."""
+        """Return the derivative of a packed y, zero for algebraic unknowns."""
         n, dy = self.system.n, np.zeros(self.size)
         found = self.rates(t, np.concatenate([y[: 2 * n], y[-1:]]))
         dy[: 2 * n], dy[-1] = found[:-1], found[-1]
@@ -165,7 +165,7 @@ class DescriptorForm(OdeForm):
 
 
 class StabilisedForm(DescriptorForm):
-    """The stabilised form of index 2 in y = (q, v, lambda, mu, work): Gear, Gupta and Leimkuhler (1985)."""
+    """Stabilised form of index 2 in y = (q, v, lambda, mu, work): Gear, Gupta and Leimkuhler (1985)."""
 
     multipliers = 2
 
@@ -176,13 +176,13 @@ class StabilisedForm(DescriptorForm):
         self._phi, self._dphi = np.zeros(system.m), np.zeros(system.m)
 
     def residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
-        """See `DescriptorForm`."""
+        """Compute the residual into out (size,)."""
         arguments = (self._weight, self._torques, self._idle, self._ws, self._tangent, self._phi, self._dphi, out)
         packed, signals = self.system.packed, self.signals
         stabilised_residual(packed, signals, t, np.array(y), np.array(dy), self._dropped, *arguments)
 
     def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
-        """See `DescriptorForm`."""
+        """Return the derivative of the residual by y, plus c times that by dy, in a new array."""
         out = np.empty((self.size, self.size))
         self.residual(t, y, dy, np.empty(self.size))
         arguments = (self._weight, self._torques, self._idle, self._ws, self._tangent, out)
@@ -191,7 +191,7 @@ class StabilisedForm(DescriptorForm):
 
 
 def diagonal_mass(system: System) -> Array:
-    """Mass (n,) of each coordinate: the body's mass, its moment of inertia, one for modes of unit mass."""
+    """Return the mass (n,) of each coordinate: the body's mass, its moment of inertia, one for modes of unit mass."""
     mass = np.ones(system.n)
     for body, packed in zip(system.bodies, system.packed.bodies, strict=True):
         mass[body.offset : body.offset + 3] = packed["m"], packed["m"], packed["I0"]

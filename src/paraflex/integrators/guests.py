@@ -1,4 +1,4 @@
-"""Methods of SciPy and SUNDIALS: their properties and parameters, and the steppers that run them."""
+"""Methods of SciPy and SUNDIALS: their properties and parameters."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from paraflex.integrators.method import EQUATIONS_INDEX_1, EQUATIONS_ODE, Family
 
 
 class Guest(Method):
-    """A method that an external solver runs.
+    """Method run by an external solver.
 
     Attributes
     ----------
     error_factor : float
-        What the estimated error of a step may be, of the tolerance: estimates say how far a solver errs in a step, not
-        how errors add up. Measured on RAParM-I, a soft arm and a falling platform, whose ends err by 0.01 to 2
+        Error allowed in a step, as a fraction of the tolerance. Solvers estimate the error of a step, not the
+        accumulated error. Measured on RAParM-I, a soft arm and a falling platform, whose final errors are 0.01 to 2
         tolerances.
     solver : str
-        What its package calls it.
+        Name of the solver in its package.
     """
 
     form = EQUATIONS_ODE
@@ -28,12 +28,12 @@ class Guest(Method):
 
 
 class SciPyMethod(Guest):
-    """A method of `scipy.integrate`.
+    """Method of `scipy.integrate`.
 
     Attributes
     ----------
     places, evaluations : int
-        At how many times of a step it evaluates, and how often in an iteration (none: explicit).
+        Number of times within a step at which it evaluates, and evaluations per iteration (zero for explicit methods).
     """
 
     family = Family.SCIPY
@@ -43,7 +43,7 @@ class SciPyMethod(Guest):
 
 
 class RK45(SciPyMethod):
-    """The explicit pair of Dormand and Prince."""
+    """Explicit pair of Dormand and Prince."""
 
     name = "rk45"
     title = "Runge-Kutta 4(5)"
@@ -51,7 +51,7 @@ class RK45(SciPyMethod):
     solver = "RK45"
     places = 5
     evaluations = 0
-    # The root of |R(iy)| = 1 of its polynomial.
+    # Root y of |R(iy)| = 1 for its stability polynomial.
     stability_limit: ClassVar[float | None] = 0.997
 
 
@@ -80,7 +80,7 @@ class NDF(SciPyMethod):
 
 
 class SundialsMethod(Guest):
-    """A method of SUNDIALS, of variable order."""
+    """Method of SUNDIALS, with variable order."""
 
     family = Family.SUNDIALS
     multistep = True
@@ -96,14 +96,14 @@ class Adams(SundialsMethod):
     source = "CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"
     error_factor: ClassVar[float] = 0.5
     solver = "Adams"
-    # Measured with steps of orders up to 12 on RAParM-I; the order follows the frequencies.
+    # Measured with steps of orders up to 12 on RAParM-I; the order depends on the frequencies.
     stability_limit: ClassVar[float | None] = 0.75
 
     max_order: int = parameter(12, 1, 12, "highest order; up to 2 stiffness limits no step")
 
     @property
     def explicit(self) -> bool:
-        """Formulas up to order 2 are solved by Newton's iteration and stable for any step."""
+        """Whether orders above 2 are allowed; up to 2 Newton's iteration is used and any step is stable."""
         return self.max_order > 2
 
 
@@ -117,7 +117,7 @@ class BDF(SundialsMethod):
     source = "CVODE, Hindmarsh et al. (2005), ACM TOMS 31, 363-396"
     solver = "BDF"
 
-    # Of these formulas only those of orders 1 and 2 are stable for undamped vibrations of any frequency.
+    # Only the formulas of orders 1 and 2 are stable for undamped vibrations of any frequency.
     max_order: int = parameter(2, 1, 5, "highest order; above 2 vibrations that hardly decay dictate the step")
 
 

@@ -1,4 +1,4 @@
-"""Integrate a system by any method, in slices of steps; between them events, interrupts and limits are checked."""
+"""Integration of a system by any method in slices of steps, with checks of events, interrupts and limits in between."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ from paraflex.kernel.run_state import ERROR_TEST, FINISHED, LAW_FAILED, NO_CONVE
 from paraflex.kernel.sampled import SampledLaw, no_law
 from paraflex.mechanism import AtEnd
 
-# Attempted steps between two looks: some milliseconds for a dozen bodies.
+# Attempted steps between two checks: some milliseconds for a dozen bodies.
 _SLICE = 200
-# Window of attempts for the pace: of own methods, and of external solvers, whose steps take ten times as long.
+# Window of attempts for the pace: for own methods, and for external solvers, whose steps take ten times as long.
 _WINDOW, _WINDOW_OUTSIDE = 50_000, 20_000
-# Rows this close to depending on each other when a run breaks down are the cause.
+# Rows that are this close to dependence when a run breaks down are reported as the cause.
 _NEARLY_DEPENDENT = 1e-4
-# And this close at a drive's limit of reach.
+# The same at a drive's limit of reach.
 _NEAR = 2e-3
 _PASSING_METHODS = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
 _AROUND = "start or drive the mechanism so that it does not get there"
@@ -54,7 +54,7 @@ _WITHIN_REACH = "prescribe motions that end, or turn back, before it"
 _SHORTER = "take a shorter step, or leave it out and choose a tolerance"
 _NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
 _UNITS_REMEDY = "look for masses, stiffnesses, loads and laws in a wrong unit"
-# By the code with which the kernel ends a run.
+# Causes and remedies by the code with which the kernel ends a run.
 CAUSES = {
     NO_CONVERGENCE: Breakdown(
         "Newton's iteration does not converge, however small the step,",
@@ -89,42 +89,47 @@ def integrate(
     Parameters
     ----------
     system : System
+        System to integrate.
     signals : Signals
-        Motor torques and prescribed angles.
+        Motor torques, loads and prescribed motions as functions of time.
     initial : State
-        Consistent: see `dynamics.consistent_state`.
+        Initial state, consistent with the constraints: see `dynamics.consistent_state`.
     times : (k,) array
-        Where results are wanted [s], ascending, the first not before the start; the last ends the run.
+        Sample times [s], ascending, the first not before the start; the last ends the run.
     knots : array, optional
-        Times at which the signals are not smooth; steps end there.
+        Times at which the signals are not smooth [s]; steps end there. None for none.
     options : IntegrationOptions, optional
+        Method, tolerance and further options; the default options by default.
     begun : Solution, optional
-        The part of the run that this one goes on from: its steps count towards those of the options, and in errors.
+        Part of the run that this one continues: its steps count towards the limit of the options, and in error
+        messages.
     samples : int, optional
-        Those of the whole run, where a finding is to say that its largest loads lie between them (own methods).
+        Number of samples of the whole run, if a finding is to report that the largest loads lie between them (own
+        methods). By default this is not checked.
     on_progress : callable, optional
-        Told the time reached [s] every few milliseconds. A KeyboardInterrupt, in it or elsewhere, ends the run with
-        what is there, marked "interrupted".
+        Function called with the current time [s] every few milliseconds. A KeyboardInterrupt, in it or elsewhere, ends
+        the run with the solution so far, marked "interrupted".
 
     Returns
     -------
     Solution
-        Where an event ends the run its last sample is the state there, besides those at the times asked for.
+        Solution at the sample times. If an event ends the run, its last sample is the state at the event.
 
     Raises
     ------
     IntegrationError
-        The run cannot go on; it carries the partial solution.
+        The run cannot go on; the error carries the partial solution.
     SliderOffBeamError
-        A point that slides along a beam came to its end: see `SlidingJoint.at_end`. The partial solution ends there.
+        A point that slides along a beam reached its end: see `SlidingJoint.at_end`. The partial solution ends there.
     ConstraintDriftError
-        Constraints are left further than errors of integration explain; it carries the partial solution as well.
+        Constraints are violated by more than errors of integration explain; the error carries the partial solution as
+        well.
     SingularPositionError
-        It cannot pass a singular position: the mechanism is driven beyond its reach there, or its method is one of
+        The run cannot pass a singular position: the mechanism is driven beyond its reach there, or its method is one of
         the Newmark family.
     InputError
-        A tolerance beyond the size of the mechanism; times that do not ascend from the start; events that the mechanism
-        cannot have, or a start beyond one, or off the end of a beam.
+        A tolerance exceeds the size of the mechanism; times do not ascend from the start; the mechanism cannot have the
+        events; or the start is beyond an event's limit, or off the end of a beam.
     """
     integration = Integration(
         system, signals, initial, times, knots=knots, options=options, begun=begun, samples=samples
@@ -138,24 +143,25 @@ def integrate(
 
 
 class Kept(NamedTuple):
-    """State of an integration: the arrays of its run, and what is noted beside them."""
+    """State of an integration: the arrays of its run, and further attributes."""
 
     arrays: tuple[np.ndarray, ...]
     more: dict[str, Any]
 
 
-# What an integration notes beside the arrays of its run.
+# Attributes of an integration that are saved beside the arrays of its run.
 _KEPT = ("status", "message", "_code", "_drifts", "_broken", "_crossing", "_functions", "_looked")
 
 
 class Integration:
-    """An integration in progress, marched to one time after another: see `integrate` for what it is made of.
+    """Integration in progress, advanced to one time after another: see `integrate` for its arguments.
 
     Attributes
     ----------
     run : Run
+        Run of the stepper.
     status, message : str
-        See `Solution`.
+        Status and message so far, see `Solution`.
     """
 
     def __init__(
@@ -195,26 +201,26 @@ class Integration:
 
     @property
     def time(self) -> float:
-        """The time reached [s]."""
+        """Current time [s]."""
         return self.run.time
 
     def start(self) -> None:
-        """Find accelerations and multipliers, and take the first sample."""
+        """Compute the initial accelerations and multipliers, and take the first sample."""
         self.run.start()
 
     def resume(self) -> None:
-        """Let the next step find accelerations and multipliers anew, as something given changes at this time."""
+        """Let the next step compute accelerations and multipliers again, as an input changes at the current time."""
         native.own(self.run).resume()
 
     def under(self, law: SampledLaw | None) -> None:
-        """Let a sampled law act from now on, in the time loop of own methods; None for none."""
+        """Set a sampled controller, which acts from now on in the time loop of own methods; None for no controller."""
         run = native.own(self.run)
         self.run = replace(run, law=no_law() if law is None else law)
 
     def march(self, until: float | None = None, *, on_progress: Callable[[float], None] | None = None) -> None:
-        """Go on to a time [s], at which a step ends, or to the end; less far to an event, or where it cannot go on.
+        """Advance to a time [s], at which a step ends, or to the end of the run.
 
-        Only own methods go on to a time before the end.
+        It stops earlier at an event, or if the run cannot go on. Only own methods advance to a time before the end.
         """
         run = self.run if until is None else native.own(self.run).until(until)
         self._code = PAUSED
@@ -223,7 +229,7 @@ class Integration:
         while self._code == PAUSED and run.attempts < self._most:
             self._code, crossing = advance(run, self._functions, min(_SLICE, self._most - run.attempts))
             if self._code == LAW_FAILED:
-                # Who gave the law says so; the run itself could go on.
+                # The owner of the controller reports its failure; the run itself could go on.
                 self._code = FINISHED
                 return
             if crossing is not None:
@@ -238,18 +244,18 @@ class Integration:
                 on_progress(now.t)
 
     def interrupt(self) -> None:
-        """Keep what is there, as the user has it."""
+        """Mark the run as interrupted by the user; the solution so far is kept."""
         self.status, self.message = "interrupted", f"interrupted at t = {self.time:.6g} s"
 
     def saved(self) -> Kept:
-        """All that it goes on from, to the bit; of own methods only."""
+        """Return the complete state of the integration, exact to the last bit; for own methods only."""
         more = {name: getattr(self, name) for name in _KEPT}
         arrays = tuple(one.copy() for one in native.own(self.run).arrays())
         return Kept(arrays, more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
 
     def restore(self, kept: Kept) -> None:
-        """Go back to what `saved` gave, of this integration or of one made of the same."""
-        # Into the arrays that are there: how they lie in memory must not change, as rounding may depend on it.
+        """Restore a state from `saved`, of this integration or of one made with the same arguments."""
+        # Copy into the existing arrays: their position in memory must not change, as rounding may depend on it.
         for mine, array in zip(native.own(self.run).arrays(), kept.arrays, strict=True):
             mine[...] = array
         for name, value in kept.more.items():
@@ -258,16 +264,16 @@ class Integration:
 
     @property
     def goes_on(self) -> bool:
-        """Whether it has come as far as it was to, and nothing speaks against going on."""
+        """Whether the run has reached the time that it was advanced to, and can go on."""
         return self.status == "complete" and self._code == FINISHED and self._broken is None
 
     def solution(self) -> Solution:
-        """What there is so far.
+        """Return the solution so far.
 
         Raises
         ------
         IntegrationError
-            It cannot go on: see `integrate`.
+            The run cannot go on: see `integrate`.
         """
         run, system, options = self.run, self._system, self._options
         elapsed = time.perf_counter() - self._began
@@ -286,9 +292,9 @@ class Integration:
         raise _failed(self._error(solution))
 
     def _breaks(self, now: Instant) -> bool:
-        """Whether something has come apart, or is too slow."""
+        """Return whether the run has broken down, or is too slow."""
         run, options, problem = self.run, self._options, self.run.problem
-        # Marched to one time soon after another it is looked at as seldom as in one go.
+        # A run advanced in short intervals is checked no more often than one advanced at once.
         if self._code == FINISHED and run.attempts < self._looked + _SLICE and now.t < problem.times[-1]:
             return False
         self._looked = run.attempts
@@ -303,11 +309,11 @@ class Integration:
         return self._broken is not None
 
     def _error(self, solution: Solution) -> IntegrationError:
-        """Why it cannot go on."""
+        """Return the error for a run that cannot go on."""
         run, system, options, code = self.run, self._system, self._options, self._code
         cause, remedy = self._broken or _breakdown(code, options, self._pace.most)
         now = run.now()
-        # Near a singular position it may be Newton or the error test that gives up first.
+        # Near a singular position either Newton's iteration or the error test may fail first.
         stopped = code != PAUSED and self._broken is None
         lost, near = (dependence(system, now.q, part) for part in (_NEARLY_DEPENDENT, _NEAR))
         drives = "" if self._drifts or near.dropped.size <= run.dependent_rows else barred_drives(system, now.q, near)
@@ -330,19 +336,19 @@ class Integration:
 
 
 def _failed(error: IntegrationError) -> IntegrationError:
-    """An error with its partial solution, in which the message is that of the error."""
+    """Return the error with its partial solution, whose message is set to that of the error."""
     error.partial = replace(error.partial, status="failed", message=str(error))
     return error
 
 
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
-    """A run of a problem by the method of the options, not yet started."""
+    """Prepare a run of a problem by the method of the options, without starting it."""
     kind = native if isinstance(options.method, NativeMethod) else outside
     return kind.prepare(problem, options)
 
 
 def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:
-    """Reason and remedy for a run that ended with an error code of the kernel, or has taken the most steps."""
+    """Return cause and remedy for a run that ended with an error code of the kernel, or with too many steps."""
     if code == PAUSED:
         remedy = "allow more steps (max_steps), or choose a coarser tolerance or a shorter duration"
         return Breakdown(f"the run has not ended after {most} steps,", remedy)
@@ -350,7 +356,7 @@ def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:
 
 
 def _singular_start(run: Run, times: Array, q: Array) -> Array:
-    """The start as a passage (2, 1) if more rows are dependent there than at the next sample, else none (2, 0)."""
+    """Return the start as a passage (2, 1) if more rows are dependent there than at the next sample, else (2, 0)."""
     initial, system = run.problem.initial.time, run.problem.system
     if run.dependent_at_start and times.size > 1 and times[0] == initial and system.m <= DENSE_ROWS:
         lasting = dependence(system, q[1]).dropped.size

@@ -1,4 +1,4 @@
-"""Longest steps that resolve what is given in time: loads, torques and prescribed motions."""
+"""Longest steps that resolve the inputs: loads, torques and prescribed motions."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from paraflex.findings import Finding
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import FlexibleBeam
 
-# Below this part of the largest value, or of its derivative by the shortest piece, changes are rounding. Of motions so
-# is what is left of terms that cancel, which derivatives of quintic pieces enlarge by such a number.
+# Changes below these parts of the largest value, or of its derivative by the shortest piece, are rounding. So are the
+# remainders of terms that cancel in motions, which derivatives of quintic pieces amplify by the last factor.
 _SMALL, _ROUNDING, _ENLARGED = 1e-6, 1e-11, 20.0
-# StepLimits are rounded down to powers of this, and one is kept where many pieces have the same.
+# Step limits are rounded down to powers of this; one is kept for adjacent pieces with the same limit.
 _GRADES = 2.0**0.5
 
 
 class StepLimits(NamedTuple):
-    """Longest steps [s] from some times on; empty where nothing is given that limits them.
+    """Longest steps [s] from given times on; empty if no input limits the step size.
 
     Attributes
     ----------
     times : (k,) array
-        Ascending [s].
+        Times, ascending [s].
     steps : (k,) array
-        The longest step from each time to the next [s]; infinite for none.
+        Longest step from each time to the next [s]; infinite for no limit.
     """
 
     times: Array
@@ -36,9 +36,9 @@ class StepLimits(NamedTuple):
 
 
 def step_limits(signals: Signals, inputs: Inputs) -> StepLimits:
-    """StepLimits of steps by all signals: a radian of them as if they were sines, h^2 |g''| <= max |g| in each piece.
+    """Return the step limits of all signals: one radian, as if they were sines, h^2 |g''| <= max |g| in each piece.
 
-    g is the signal itself, or of a prescribed motion its acceleration, without what is constant in it.
+    g is the signal itself, or the acceleration of a prescribed motion, without its constant part.
     """
     looked_at = [(k, 0) for k in (*inputs.motors, *inputs.loads)] + [(k, 2) for k in inputs.prescribed]
     own = [limits for k, order in looked_at if (limits := _limits_of(signals, k, order)).times.size]
@@ -52,9 +52,10 @@ def step_limits(signals: Signals, inputs: Inputs) -> StepLimits:
 
 
 def elements_too_few(system: System, limits: StepLimits) -> list[Finding]:
-    """Findings on beams whose elements resolve only slower vibrations than loads or laws change.
+    """Return findings on beams whose elements resolve only vibrations slower than the changes of loads or motions.
 
-    The upper half of the modes of a mesh is inaccurate: with one element from the third bending mode on.
+    The upper half of the modes of a mesh is inaccurate; with one element the modes are inaccurate from the third
+    bending mode on.
     """
     fastest, found = 1.0 / float(np.min(limits.steps, initial=np.inf)), {}
     for body in system.bodies:
@@ -75,7 +76,7 @@ def _limits_of(signals: Signals, k: int, order: int) -> StepLimits:
     first, last = int(signals.start[k]), int(signals.start[k + 1]) - 1
     starts, coefficients = signals.breaks[first:last], signals.coefficients[first:last]
     lengths = np.diff(signals.breaks[first : last + 1])
-    # At both ends and in the middle of each piece.
+    # Evaluate at both ends and in the middle of each piece.
     places = lengths[:, None] * np.array([0.0, 0.5, 1.0])
     value, curvature = (_derivative(coefficients, n, places) for n in (order, order + 2))
     shortest = float(np.min(lengths))
@@ -93,6 +94,6 @@ def _limits_of(signals: Signals, k: int, order: int) -> StepLimits:
 
 
 def _derivative(coefficients: Array, order: int, x: Array) -> Array:
-    """Derivative of each piece's polynomial (k, 6), of ascending powers, at its places (k, j)."""
+    """Return the derivative of each piece's polynomial (k, 6), of ascending powers, at its points (k, j)."""
     derived = np.polynomial.polynomial.polyder(coefficients.T, order)
     return np.stack([np.polynomial.polynomial.polyval(column, derived, tensor=False) for column in x.T], axis=1)

@@ -1,8 +1,8 @@
-"""The Newmark family for linear structures with constraints that change in time, such as a mechanism pose by pose.
+"""Newmark family for linear structures with time-dependent constraints, such as a mechanism pose by pose.
 
     M x'' + K x + C(t)^T mu = f(t),    C(t) x = 0
 
-M and K are constant and made of small blocks on the diagonal, one a body; rows of C may depend on one another.
+M and K are constant and block diagonal, with one small block per body; rows of C may depend on one another.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from paraflex.arrays import Array
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators.newmark import NewmarkNumbers
 
-# Instants whose linear algebra is done at once: some megabytes for a dozen bodies.
+# Samples whose linear algebra is done at once: some megabytes for a dozen bodies.
 _INSTANTS_AT_ONCE = 128
-# Eigenvalues of the scaled Schur complement below this fraction of the largest are those of dependent rows.
+# Eigenvalues of the scaled Schur complement below this fraction of the largest belong to dependent rows.
 _DEPENDENT = 1e-12
 
 
 class Block(NamedTuple):
-    """A body of the structure: its coordinates, mass and stiffness matrix."""
+    """Body of the structure: its coordinates, mass and stiffness matrix."""
 
     columns: slice
     mass: Array
@@ -33,7 +33,7 @@ class Block(NamedTuple):
 
 
 class Response(NamedTuple):
-    """The structure at an instant: displacements x and their derivatives (n,), forces mu (rows,) of the constraints."""
+    """Response of the structure at one time: displacements x, their derivatives (n,), constraint forces mu (rows,)."""
 
     x: Array
     dx: Array
@@ -52,17 +52,18 @@ def march(
     Parameters
     ----------
     numbers : NewmarkNumbers
-        Of the method.
+        Coefficients of the method.
     blocks : sequence of Block
+        Bodies of the structure.
     outside : callable
-        For some of the times the constraints C (k, rows, n) and forces f (k, n).
+        Function that returns the constraints C (k, rows, n) and forces f (k, n) for a slice of the times.
     times : (steps + 1,) array
-        Evenly spaced by the step.
+        Times, evenly spaced by the step [s].
 
     Yields
     ------
     Response
-        At every time, the first among them.
+        Response at every time, including the first.
 
     Raises
     ------
@@ -103,12 +104,12 @@ def march(
 
 
 class _Condensed(NamedTuple):
-    """The structure at several instants, with the matrices of a step from the prediction x*, in x = x* + b x''.
+    """Structure at several times, with the matrices of a step from the prediction x*, in x = x* + b x''.
 
-    x'' = free - react mu,    mu = close (free + x*/b),    free = load - A^-1 K x*,    A = M + b K
+        x'' = free - react mu,    mu = close (free + x*/b),    free = load - A^-1 K x*,    A = M + b K
 
-    load (k, n) is A^-1 f; react (k, n, rows) is A^-1 C^T; close (k, rows, n) is (C A^-1 C^T)^+ C, the pseudo-inverse
-    leaving dependent rows out; rank (k,) is that of C.
+    load (k, n) is A^-1 f; react (k, n, rows) is A^-1 C^T; close (k, rows, n) is (C A^-1 C^T)^+ C, with a pseudo-inverse
+    that leaves out dependent rows; rank (k,) is the rank of C.
     """
 
     load: Array
@@ -118,7 +119,7 @@ class _Condensed(NamedTuple):
 
 
 def _inverses(blocks: Sequence[Block], weight: float) -> list[NDArray[np.floating]]:
-    """A^-1 = (M + b K)^-1 of every block."""
+    """Return A^-1 = (M + b K)^-1 of every block."""
     return [np.linalg.inv(block.mass + weight * block.stiffness) for block in blocks]
 
 
@@ -126,7 +127,7 @@ def _condense(blocks: Sequence[Block], inverses: Sequence[NDArray[np.floating]],
     """Factor the Schur complements C A^-1 C^T."""
     k, m, n = C.shape
     load, react, schur, close = np.zeros((k, n)), np.zeros((k, n, m)), np.zeros((k, m, m)), np.zeros((k, m, n))
-    # Body by body: small products, which no BLAS gives to several threads.
+    # Compute body by body: no BLAS distributes such small products to several threads.
     touching = [np.flatnonzero(C[:, :, block.columns].any(axis=(0, 2))) for block in blocks]
     for block, inverse, rows in zip(blocks, inverses, touching, strict=True):
         own = C[:, rows, block.columns]
@@ -141,8 +142,8 @@ def _condense(blocks: Sequence[Block], inverses: Sequence[NDArray[np.floating]],
 
 
 def _pseudo_inverses(schur: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Inverses of symmetric matrices (k, m, m) without dependent rows, and the number of independent rows."""
-    # Rows in metres and in radians are brought to one size before their rank is judged.
+    """Return inverses of symmetric matrices (k, m, m) without dependent rows, and the number of independent rows."""
+    # Rows in metres and in radians are scaled to the same size before their rank is determined.
     size = 1.0 / np.sqrt(np.diagonal(schur, axis1=1, axis2=2))
     scaled = size[:, :, None] * schur * size[:, None, :]
     inverse, rank = _regular(scaled), np.full(len(schur), schur.shape[1])
@@ -155,7 +156,7 @@ def _pseudo_inverses(schur: Array) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _regular(matrices: Array) -> NDArray[np.floating] | None:
-    """Inverses of matrices none of which is nearly singular: several times cheaper than eigenvectors."""
+    """Return the inverses of matrices, or None if one is nearly singular; several times cheaper than eigenvectors."""
     try:
         inverse = np.linalg.inv(matrices)
     except np.linalg.LinAlgError:

@@ -1,4 +1,4 @@
-"""Methods of integration: frozen objects that check their parameters and have all properties that runs need."""
+"""Integration methods: frozen objects that check their parameters and have all properties that runs need."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ EQUATIONS_INDEX_1, EQUATIONS_ODE, EQUATIONS_INDEX_3 = (
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a method: its default, the range in which the method is stable, its meaning."""
+    """Parameter of a method: its default, the range in which the method is stable, its meaning."""
 
     default: float
     low: float
@@ -49,7 +49,7 @@ class Parameter:
 
 
 def parameter(default: float, low: float, high: float, meaning: str, *, follows: bool = False) -> Any:
-    """A field for a parameter; None means that it follows from other parameters.
+    """Return a dataclass field for a parameter; its value None means that it follows from other parameters.
 
     A parameter whose default is an `int` is a whole number.
     """
@@ -58,28 +58,30 @@ def parameter(default: float, low: float, high: float, meaning: str, *, follows:
 
 @dataclass(frozen=True)
 class Method(CheckedFields, ABC):
-    """A method of integration; the fields of its dataclass are its parameters.
+    """Integration method; the fields of its dataclass are its parameters.
 
     Attributes
     ----------
     name : str
-        What users write.
+        Name by which users select the method.
     title : str
-        For figures and tables.
+        Title in figures and tables.
     family : Family
+        Family of the method.
     form : str
-        The equations it integrates.
+        Form of the equations that it integrates.
     order : int
-        Of positions, velocities and multipliers; with the default parameters.
+        Order of positions, velocities and multipliers with the default parameters.
     treatments : tuple of Treatment
-        Of the constraints, the default first.
+        Treatments of the constraints, the default first.
     source : str
+        Reference to the literature.
     fixed_step, error_control : bool
-        Whether it takes a step from the user; whether it chooses steps by its errors.
+        Whether the user can fix the step size; whether the step size is controlled by the error.
     multistep : bool
-        Whether it changes its order on the way.
+        Whether the order changes during a run.
     stability_limit : float or None
-        Of an explicit method, how far on the imaginary axis it is stable, |omega h|.
+        Largest |omega h| on the imaginary axis for which an explicit method is stable; None for implicit methods.
     """
 
     name: ClassVar[str]
@@ -127,7 +129,7 @@ class Method(CheckedFields, ABC):
 
     @property
     def highest_order(self) -> int:
-        """The highest order of a multistep method."""
+        """Highest order of a multistep method."""
         return int(self.values.get("max_order", self.order))
 
 
@@ -135,13 +137,13 @@ given_as("a method of integration", 'its name, such as "tr-bdf2", or an object o
 
 
 class NativeMethod(Method):
-    """A method of the compiled kernels.
+    """Method of the compiled kernels.
 
     Attributes
     ----------
     newton_fraction : float
-        The part of the error allowed in a step that Newton's iteration may leave by default. An estimate of high order
-        takes for error what Newton leaves in its stages: there a smaller part means far fewer steps.
+        Default part of the error allowed in a step that Newton's iteration may leave. An error estimate of high order
+        contains the residual of Newton's iteration in the stages: a smaller part then gives far fewer steps.
     """
 
     fixed_step = True
@@ -150,4 +152,4 @@ class NativeMethod(Method):
     @property
     @abstractmethod
     def scheme(self) -> Tableau:
-        """The scheme as the kernel's tableau."""
+        """Scheme as the kernel's tableau."""

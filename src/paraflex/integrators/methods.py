@@ -1,7 +1,7 @@
-"""All methods of integration: `METHODS` lists them, and `find_method` finds them by name.
+"""All integration methods: `METHODS` lists them, and `find_method` finds them by name.
 
-A method is an object with its own parameters: `GeneralisedAlpha(spectral_radius=0.8)`. Wherever one is asked for its
-name is taken as well, and stands for the method with its default parameters.
+A method is an object with its own parameters: `GeneralisedAlpha(spectral_radius=0.8)`. Functions that take a method
+also take its name, which stands for the method with its default parameters.
 """
 
 from __future__ import annotations
@@ -41,18 +41,20 @@ _ALL: tuple[type[Method], ...] = (
     BDF,
     IDA,
 )
-# With their default parameters.
+# All methods with their default parameters.
 METHODS: Mapping[str, Method] = MappingProxyType({kind.name: kind() for kind in _ALL})
 DEFAULT_METHOD = ESDIRK5.name
 
 
 def find_method(given: str | Method, parameters: Mapping[str, float] | None = None) -> Method:
-    """A method by its name, or itself; with parameters, as files and commands give them, a new method of that kind.
+    """Return a method by its name, or the given method itself.
+
+    With parameters, as files and commands give them, the result is a new method of that kind.
 
     Raises
     ------
     InputError
-        There is none of that name, and the known ones are listed; or it does not take these parameters.
+        There is no method of that name (the known ones are listed), or it does not take these parameters.
     """
     if isinstance(given, Method):
         found = given
@@ -75,17 +77,17 @@ def find_method(given: str | Method, parameters: Mapping[str, float] | None = No
 
 
 def title_of(name: str) -> str:
-    """Title of a method in figures and tables; its name if it is not listed here."""
+    """Return the title of a method in figures and tables; its name if it is not listed here."""
     return METHODS[name].title if name in METHODS else name
 
 
 def _whole(value: float) -> float:
-    """A whole number, which a command or a file may have as 2.0."""
+    """Convert a whole number, which a command or a file may write as 2.0, to int."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 class MethodField:
-    """A field of a dataclass that takes a method or its name, and holds the method."""
+    """Descriptor of a dataclass field that takes a method or its name, and holds the method."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._place = f"_{name}"
@@ -94,5 +96,5 @@ class MethodField:
         return METHODS[DEFAULT_METHOD] if instance is None else instance.__dict__[self._place]
 
     def __set__(self, instance: object, value: str | Method) -> None:
-        # As in a frozen dataclass, whose fields are set once.
+        # Dataclasses with this field are frozen: it is set only once.
         instance.__dict__[self._place] = find_method(value)

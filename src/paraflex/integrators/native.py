@@ -53,33 +53,33 @@ from paraflex.kernel.run_state import (
 )
 from paraflex.kernel.sampled import SampledLaw, no_law
 
-# A row not redundant at the start with less than this of its square left depends on others but for rounding.
+# A row not redundant at the start is dependent, except for rounding, below this relative pivot.
 ROUNDING_PART = 1e-13
-# A run takes a handful of steps near each singular position, where shorter ones are not more exact: together they may
-# have an error of about this fraction of the tolerance.
+# A run takes a few steps near each singular position, where shorter ones are not more accurate: together they may have
+# an error of about this fraction of the tolerance.
 NEAR_ERROR = 0.01
-# It is not below what rounding makes of multipliers that have a pole, as a part of the mechanism's size.
+# Least error allowed there, as a part of the mechanism's size: the effect of rounding on multipliers with a pole.
 LEAST_NEAR_ERROR = 8e-11
-# A singular position is near that could be reached in this fraction of the time since the start.
+# A singular position is near if it could be reached in this fraction of the time since the start.
 _NEAR_AHEAD = 0.2
-# Steps are long beside vibrations from so many radians of the slowest one of the mechanism on, all where no body is
-# flexible. Accelerations of deflections that follow loads are inaccurate at their stages, and velocities with them.
-# What they follow is slower the more mass a beam carries.
+# Steps are long compared with vibrations from this many radians of the slowest one of the mechanism on; all are long
+# without flexible bodies. In such steps deflections follow the loads, and their accelerations and velocities at the
+# stages are inaccurate. The slowest vibration depends on the mass that the beams carry.
 _FOLLOWS = 20.0
-# The smallest step, as a fraction of the run, and in units of the clock's last digit: by so little a step may differ
-# from what the clock moves by.
+# Smallest step, as a fraction of the run, and in units in the last place of the time: the latter bounds the difference
+# between a step and the change of the time.
 _LEAST, _DIGITS = 1e-12, 64.0
-# Errors of forces stated, over the sum of those of the steps of some cycles: where vibrations are not resolved the
-# library's are 0.3 to 1.5 times the sum.
+# Reported error of forces over the sum of the errors of the steps within some cycles. With unresolved vibrations the
+# true errors of the library's mechanisms are 0.3 to 1.5 times the sum.
 _FORCE_SAFETY = 2.0
-# So much of a turn, or of a vibration given in time, is in a step at most [rad]: forces and work follow it to less
-# than a thousandth. By the order of a method, four for higher ones.
+# Largest part of a revolution, or of a vibration of the inputs, within a step [rad], by the order of the method (four
+# for higher ones): errors of forces and work are then below a thousandth.
 _PHASES = {1: 0.15, 2: 0.15, 3: 0.4, 4: 0.7}
-# Points this close are one, as a part of the mechanism's size.
+# Points closer than this part of the mechanism's size coincide.
 _SAME_PLACE = 1e-9
-# Automatic Baumgarte coefficients over the step: violations fall to a tenth in about this many steps over two.
+# Automatic Baumgarte coefficients, times the step size: violations decay within some tens of steps.
 _BAUMGARTE_GAIN = 0.1
-# Driven and damped motions have forgotten what errors made of forces so many cycles ago.
+# Number of cycles after which errors of forces have decayed in driven and damped motions.
 _FORCE_CYCLES = 3.0
 _TREATMENTS = {
     Treatment.BAUMGARTE: BAUMGARTE,
@@ -90,7 +90,7 @@ _TREATMENTS = {
 
 @dataclass(frozen=True)
 class NativeRun:
-    """All arrays of the kernel's time loop: a `Run`."""
+    """Run of the kernel's time loop with all its arrays: a `Run`."""
 
     problem: Problem
     scheme: Tableau
@@ -99,7 +99,7 @@ class NativeRun:
     workspace: Workspace
     slow: Workspace
     samples: Samples
-    # For first stages after a jump, so that the factor in the workspace stays.
+    # Workspace for first stages after a jump, so that the factor in the other workspace stays.
     aside: Workspace
     law: SampledLaw
     dependent_at_start: int
@@ -107,12 +107,12 @@ class NativeRun:
 
     @property
     def dependent_rows(self) -> int:
-        """See `Run`."""
+        """Number of redundant constraint rows, see `Run`."""
         return self.controls.dependent_rows
 
     @property
     def singular_ahead(self) -> float | None:
-        """See `Run`."""
+        """Time at which an index-3 method is about to reach a singular position [s], see `Run`; None for none."""
         root, slope = self.state.clock[ROOT], self.state.clock[ROOT_RATE]
         elapsed = self.state.clock[TIME] - self.problem.initial.time
         if self.controls.treatment != POSITION or not slope < 0.0 or root > _NEAR_AHEAD * elapsed * -slope:
@@ -121,16 +121,16 @@ class NativeRun:
 
     @property
     def attempts(self) -> int:
-        """See `Run`."""
+        """Number of attempted steps, see `Run`."""
         return int(self.state.counts[STEPS] + self.state.counts[REJECTED])
 
     @property
     def reached(self) -> int:
-        """See `Run`."""
+        """Number of samples taken, see `Run`."""
         return int(self.state.counts[SAMPLE])
 
     def start(self) -> None:
-        """See `Run`."""
+        """Compute the initial accelerations and multipliers and take the first sample, see `Run`."""
         arguments = (self.problem.system.packed, self.problem.signals, self.controls)
         start(*arguments, self.state, self.workspace, self.samples)
         if self.beside is not None:
@@ -138,12 +138,13 @@ class NativeRun:
             self.samples.a[: self.reached] = self.state.stage_a[1, 0]
 
     def march(self, attempts: int) -> int:
-        """See `Run`."""
+        """Attempt a number of steps and return a code, see `Run`."""
         jumps, now = self.problem.jumps, self.state.clock[TIME]
-        # The last call may have ended there; until now the run had the values before the jump.
+        # The last call may have ended at a jump, with the values before it.
         if np.any(jumps == now):
             self.resume()
-            # Steps grow from there as from the start: the error estimate leaves out what a long one makes of a jump.
+            # Steps grow again as from the start: the error estimate of a long step does not contain the effect of a
+            # jump.
             self.state.clock[STEP] = min(self.state.clock[STEP], FIRST_STEP * self.problem.span)
         stops = self.problem.stops
         ahead = jumps[(jumps > now) & (jumps < stops[-1])]
@@ -156,11 +157,11 @@ class NativeRun:
 
     @property
     def time(self) -> float:
-        """See `Run`."""
+        """Current time [s], see `Run`."""
         return float(self.state.clock[TIME])
 
     def now(self) -> Instant:
-        """See `Run`."""
+        """Return the current state, see `Run`."""
         state = self.state
         return Instant(
             t=float(state.clock[TIME]),
@@ -172,7 +173,7 @@ class NativeRun:
         )
 
     def figures(self) -> Figures:
-        """See `Run`."""
+        """Return counts, residuals and errors so far, see `Run`."""
         state, estimated = self.state, self.scheme.error.size and not self.controls.fixed_step
         return Figures(
             steps=int(state.counts[STEPS]),
@@ -188,27 +189,27 @@ class NativeRun:
         )
 
     def until(self, time: float) -> NativeRun:
-        """The same run, whose steps end at a time before its end, where it pauses."""
+        """Return the same run with a step that ends at a time before its end, where it pauses."""
         before = self.problem.stops[self.problem.stops < time]
         self.state.counts[STOP] = 0
         return replace(self, problem=replace(self.problem, stops=np.append(before, time)))
 
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """All arrays that it goes on from, its samples among them."""
+        """Return all arrays of the state of the run, including its samples."""
         return tuple(_arrays((self.state, self.workspace, self.slow, self.samples)))
 
     def resume(self) -> None:
-        """Let the next step begin with a first stage, after a jump; energies and work continue."""
+        """Let the next step begin with a new first stage, after a jump; energies and work continue."""
         self.state.counts[JUMPED] = 1
 
 
 def own(run: Run) -> NativeRun:
-    """The run, where it is by an own method, which goes on from time to time.
+    """Return the run if it is by an own method, which can be advanced from time to time.
 
     Raises
     ------
     InputError
-        It is by another program's solver, which steps on over any time that it was not told at the start.
+        The run is by an external solver, which steps over any time not given at the start.
     """
     if isinstance(run, NativeRun):
         return run
@@ -227,7 +228,7 @@ def _arrays(given: object) -> Iterator[np.ndarray]:
 
 
 def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
-    """Mark the redundant rows at a pose; their number."""
+    """Mark the redundant rows at a pose and return their number."""
     packed = system.packed
     count = int(factor_system(packed, 0.0, q, workspace))
     dependent = workspace.schur[packed.rows["start"] + np.arange(system.m) - packed.rows["first"]] == 0.0
@@ -236,9 +237,9 @@ def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
 
 
 def _turning(system: System) -> NDArray[np.int64]:
-    """The angles, as numbers of coordinates, of bodies on which forces depend on how they stand.
+    """Return the indices of the angles of bodies on which forces depend on the orientation.
 
-    A rigid body with all its points and its centre of mass at its origin is none.
+    A rigid body with all its points and its centre of mass at its origin is not among them.
     """
     least = _SAME_PLACE * system.size
     matters = [
@@ -251,7 +252,7 @@ def _turning(system: System) -> NDArray[np.int64]:
 
 
 def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
-    """Set up a run."""
+    """Prepare a run."""
     system, initial, span = problem.system, problem.initial, problem.span
     method = options.method
     assert isinstance(method, NativeMethod)
@@ -264,7 +265,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     beside = beside_singular(problem) if at_start else None
     if beside is not None:
         lasting = _mark_redundant(system, beside.q, workspace)
-    # In shorter ones than the second rows near dependence are next to nothing.
+    # In steps shorter than the second value, rows near dependence are negligible.
     first = FIRST_STEP * span if beside is None else 0.1 * beside.later
     state.clock[TIME], state.clock[STEP] = initial.time, min(first, options.max_step)
     state.clock[CYCLE] = span

@@ -1,4 +1,4 @@
-"""The Newmark family: coefficients of its members, from the parameters of each method."""
+"""Newmark family: coefficients of its members, from the parameters of each method."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ class NewmarkNumbers:
     alpha_m, alpha_f : float
         Weights of the old algorithmic acceleration and of the old acceleration.
     beta, gamma : float
-        Newmark's, of position and of velocity.
+        Newmark's coefficients of position and of velocity.
     theta : float
-        Above one of Wilson's method: balance is asked for at theta h, acceleration being linear up to there.
+        Above one for Wilson's method: equilibrium holds at theta h, and acceleration is linear up to there. One by
+        default.
     """
 
     alpha_m: float
@@ -38,22 +39,22 @@ class NewmarkNumbers:
 
     @classmethod
     def damped(cls, alpha_m: float, alpha_f: float) -> NewmarkNumbers:
-        """Coefficients of second order with the beta of the largest damping at high frequencies."""
+        """Return coefficients of second order with the beta of the largest damping at high frequencies."""
         gamma = 0.5 + alpha_f - alpha_m
         return cls(alpha_m, alpha_f, 0.25 * (0.5 + gamma) ** 2, gamma)
 
     def weight(self, step: float) -> float:
-        """Coefficient b of the new acceleration in q_1 = q* + b v_1' [s^2]."""
+        """Return the coefficient b of the new acceleration in q_1 = q* + b v_1' [s^2]."""
         return self.beta * step**2 * (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
 
     @property
     def order(self) -> int:
-        """Order: two, or one for a method with numerical damping of first order."""
+        """Order of the method: two, or one with numerical damping of first order."""
         return 2 if abs(self.gamma - 0.5 - self.alpha_f + self.alpha_m) < 1e-12 else 1
 
 
 class NewmarkMethod(NativeMethod):
-    """A member of the family, given by its coefficients."""
+    """Member of the family, given by its coefficients."""
 
     family = Family.NEWMARK
     form = EQUATIONS_INDEX_3
@@ -67,7 +68,7 @@ class NewmarkMethod(NativeMethod):
 
     @property
     def scheme(self) -> Tableau:
-        """The scheme as the kernel's tableau."""
+        """Scheme as the kernel's tableau."""
         numbers = self.numbers
         return Tableau(
             A=np.array([[0.0, 0.0], [0.5, 0.5]]),
@@ -128,7 +129,7 @@ class Wilson(NewmarkMethod):
 
 @dataclass(frozen=True)
 class HHT(NewmarkMethod):
-    """The method of Hilber, Hughes and Taylor: forces of both ends of the step are averaged with alpha."""
+    """Method of Hilber, Hughes and Taylor: forces at both ends of the step are averaged with alpha."""
 
     name = "hht-alpha"
     title = "HHT alpha"
@@ -144,7 +145,7 @@ class HHT(NewmarkMethod):
 
 @dataclass(frozen=True)
 class GeneralisedAlpha(NewmarkMethod):
-    """The generalised-alpha method: least damping of low frequencies for a given spectral radius."""
+    """Generalised-alpha method: least damping of low frequencies for a given spectral radius."""
 
     name = "generalised-alpha"
     title = "Generalised alpha"

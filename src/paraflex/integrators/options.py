@@ -1,4 +1,4 @@
-"""Options of an integration, checked."""
+"""Options of an integration, with checks."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ from paraflex.integrators.method import Family, NativeMethod
 from paraflex.integrators.methods import Method, MethodField, Treatment
 from paraflex.limits import SAMPLES, SHORTEST, at_most
 
-# A tolerance beyond this part of the mechanism's size is doubted: at a fifth the five-bar's tracking error is half as
-# large again.
+# A tolerance above this part of the mechanism's size gives a finding: at a fifth of the size the tracking error of the
+# five-bar is larger by a half.
 LOOSE = 0.05
-# The default tolerance, as a part of the mechanism's size, which is rounded to a power of two: of flexible bodies, and
-# where all are rigid, as exactness costs little there.
+# Default tolerances, as a part of the mechanism's size (rounded to a power of two): with flexible bodies, and with
+# rigid bodies only, where accuracy costs little.
 RELATIVE_TOLERANCE, RELATIVE_TOLERANCE_RIGID = 4e-5, 4e-7
-# Under control of forces, what local errors within a cycle may change a force by, as a part of its largest value.
+# Change of a force by local errors within a cycle that is allowed under control of forces, as a part of its largest
+# value.
 FORCE_PART = 0.0025
 _REMEDIES = {
     "tolerance": "give a length in metres, say 1e-5",
@@ -37,7 +38,7 @@ _REMEDIES = {
 
 
 class Control(Enum):
-    """Quantities whose errors choose the steps: positions alone, or the forces of joints and drives as well."""
+    """Quantities whose errors control the step size: positions only, or the forces of joints and drives as well."""
 
     POSITIONS = "positions"
     FORCES = "forces"
@@ -58,44 +59,46 @@ class IntegrationOptions(CheckedFields):
     Attributes
     ----------
     tolerance : float, optional
-        What local errors within a cycle, or the whole run, may add up to [m] (root mean square over the mass); by
-        default 4e-5 of the mechanism's size, or 4e-7 where no body is flexible. With a fixed step it only says how
-        exactly Newton's iteration solves.
+        Sum of local errors allowed within a cycle, or the whole run [m] (root mean square over the mass). By default
+        4e-5 of the mechanism's size, or 4e-7 if no body is flexible. With a fixed step it only determines the accuracy
+        of Newton's iteration.
     tolerance_per : TolerancePer, optional
-        "cycle" (own methods): the time in which the fastest body so far turns once, or travels 2 pi times the size of
-        the mechanism, and no longer than the run. Errors of driven or damped motions then stay as they are, and those
-        of undamped ones grow with the number of cycles; the cost grows with the duration alone. "run": the whole run.
-        By default "cycle" with the default tolerance, and "run" with one that is given.
+        Time in which local errors may add up to the tolerance. "cycle" (own methods): the time in which the fastest
+        body so far turns once, or travels 2 pi times the size of the mechanism, at most the duration of the run. Errors
+        of driven or damped motions then do not grow, those of undamped motions grow with the number of cycles, and the
+        cost grows only with the duration. "run": the whole run. By default "cycle" with the default tolerance, and
+        "run" with a given tolerance.
     control : Control, optional
-        "positions": their errors choose the steps. "forces": local errors within a cycle change no force of a joint or
-        drive by more than 0.25 % of its largest value either (ESDIRK methods, steps not fixed). Vibrations of undamped
-        beams and stiff springs are then resolved, down to the fastest that bears on a force. By default "forces"
-        where all flexible bodies are damped (`System.vibrations_die_out`), else "positions".
+        Quantities whose errors control the step size. "positions": positions only. "forces": local errors within a
+        cycle also change no force of a joint or drive by more than 0.25 % of its largest value (ESDIRK methods, no
+        fixed step). Vibrations of undamped beams and stiff springs are then resolved, up to the fastest that affects a
+        force. By default "forces" if all flexible bodies are damped (`System.vibrations_die_out`), else "positions".
     method : Method or str
-        An object such as `paraflex.methods.GeneralisedAlpha(spectral_radius=0.8)`, or a name in `paraflex.METHODS`,
-        which stands for the method with its default parameters.
+        Integration method: an object such as `paraflex.methods.GeneralisedAlpha(spectral_radius=0.8)`, or a name in
+        `paraflex.METHODS`, which stands for the method with its default parameters.
     step : float, optional
-        A fixed step [s]; by default steps are chosen by their errors. Where something given is not smooth steps end,
-        and each interval between is divided evenly into steps no longer than this. One in which Newton's iteration does
-        not converge is done in parts; `Solution.rejected` counts these.
+        Fixed step size [s]; by default the step size is controlled by the errors. Steps end where an input is not
+        smooth, and each interval between these times is divided evenly into steps no longer than this. A step in which
+        Newton's iteration does not converge is done in parts; `Solution.rejected` counts these.
     constraints : Treatment or str, optional
-        What keeps them: "baumgarte", "projection" (of position and velocity after each step) or "ggl" (stabilised
-        index 2, Gear, Gupta and Leimkuhler); the method's own by default.
+        Treatment of the constraints: "baumgarte", "projection" (of position and velocity after each step) or "ggl"
+        (stabilised index 2, Gear, Gupta and Leimkuhler); the method's own by default.
     alpha, beta : float
-        Baumgarte coefficients [1/s] (Eq. 57); the paper's range is 0 to 50. Own methods take 0.3 over the step at most.
+        Baumgarte coefficients [1/s] (Eq. 57); the range in the paper is 0 to 50. Own methods use at most 0.3 over the
+        step.
     automatic_gains : bool
-        Whether coefficients follow the step size instead: violations then decay within some steps, whatever their size.
+        Whether coefficients depend on the step size instead: violations then decay within some steps of any size.
     max_step : float
-        Largest step [s].
+        Largest step size [s].
     max_steps : int, optional
-        Attempted steps before the run is given up; earlier where at its pace it would need five times as many. By
-        default ten million, and a run is given up as well that has become a hundred times slower than it was and would
-        need more than a million.
+        Largest number of attempted steps. A run ends earlier if at its pace it would need five times as many. By
+        default ten million; a run then also ends if it has become a hundred times slower than before and would need
+        more than a million steps.
     newton_fraction : float, optional
-        The part of the error allowed in a step that Newton's iteration may leave; the method's own by default.
+        Part of the error allowed in a step that Newton's iteration may leave; the method's own by default.
     events : tuple of JointLimit, DeflectionLimit or SingularDistance
-        The run stops at the first of them. An excursion across a limit and back within a quarter of a step is
-        overlooked: where limits are grazed bound the step.
+        Events, the first of which ends the run. An excursion across a limit and back within a quarter of a step is
+        missed: limit the step size if limits are grazed.
     """
 
     _own = ("method",)
@@ -106,7 +109,7 @@ class IntegrationOptions(CheckedFields):
     max_steps: int | None = None
     newton_fraction: float | None = None
     method: MethodField = MethodField()  # noqa: RUF009 - a descriptor
-    # They were options once.
+    # Former option, accepted only to report where parameters belong.
     parameters: InitVar[Any] = None
     step: float | None = None
     constraints: Treatment | str | None = None
@@ -124,7 +127,7 @@ class IntegrationOptions(CheckedFields):
             )  # fmt: skip
         for name in ("tolerance", "alpha", "beta", "max_step", "newton_fraction", "step"):
             value = getattr(self, name)
-            # Kernels are compiled anew for numbers of other types.
+            # Kernels would be compiled again for numbers of other types.
             object.__setattr__(self, name, None if value is None else float(value))
         for name, remedy in _REMEDIES.items():
             value = getattr(self, name)
@@ -140,43 +143,43 @@ class IntegrationOptions(CheckedFields):
         self._check_constraints()
 
     def tolerance_for(self, system: System) -> float:
-        """The tolerance [m], by default relative to the size of a system."""
+        """Return the tolerance [m], by default relative to the size of a system."""
         if self.tolerance is not None:
             return self.tolerance
         return _whole_size(system) * (RELATIVE_TOLERANCE if system.n_flexible else RELATIVE_TOLERANCE_RIGID)
 
     def for_system(self, system: System) -> IntegrationOptions:
-        """The same options with the tolerance that they have for a system."""
+        """Return the same options with the tolerance that they have for a system."""
         per = self.per if self.controls_errors else None
         return replace(self, tolerance=self.tolerance_for(system), tolerance_per=per)
 
     @property
     def per(self) -> TolerancePer:
-        """Time in which errors may add up to the tolerance: by default a cycle, or the run for one that is given."""
+        """Time in which errors may add up to the tolerance: by default a cycle, or the run for a given tolerance."""
         if self.tolerance_per is not None:
             return self.tolerance_per
         return TolerancePer.CYCLE if self.tolerance is None else TolerancePer.RUN
 
     def control_for(self, system: System) -> Control:
-        """Whose errors choose the steps of a system: see the class."""
+        """Return the quantities whose errors control the step size for a system: see the class."""
         if self.control is not None:
             return self.control
         damped = system.n_flexible > 0 and system.vibrations_die_out
         return Control.FORCES if damped and self.estimates_forces else Control.POSITIONS
 
     def force_part(self, system: System) -> float:
-        """Error allowed in forces, as a part of the largest; zero where they are not looked at as a step is solved."""
+        """Return the error allowed in forces, as a part of the largest; zero if they are not checked in a step."""
         looked_at = self.control_for(system) is Control.FORCES or not system.n_flexible
         return FORCE_PART if looked_at and self.estimates_forces else 0.0
 
     @property
     def controls_errors(self) -> bool:
-        """Whether paraflex chooses the steps by their errors: own methods, steps not fixed."""
+        """Whether paraflex controls the step size by the errors: own methods, no fixed step."""
         return isinstance(self.method, NativeMethod) and self.step is None
 
     @property
     def estimates_forces(self) -> bool:
-        """Whether runs estimate what errors of integration make of forces: with embedded formulas, steps not fixed."""
+        """Whether runs estimate the effect of integration errors on forces: with embedded formulas, no fixed step."""
         return self.method.family is Family.ESDIRK and self.step is None
 
     @property
@@ -185,7 +188,7 @@ class IntegrationOptions(CheckedFields):
         return self.method.treatments[0] if self.constraints is None else Treatment(self.constraints)
 
     def to_dict(self) -> dict[str, str]:
-        """Method, parameters, treatment of constraints, step and events in words, for provenance."""
+        """Return method, parameters, treatment of constraints, step and events as text, for provenance."""
         return {
             "integration_method": self.method.name,
             "method_parameters": json.dumps(self.method.values),
@@ -229,7 +232,7 @@ class IntegrationOptions(CheckedFields):
 
 
 def _whole_size(system: System) -> float:
-    """Size of a system [m], of beams in several frames with their whole lengths."""
+    """Return the size of a system [m], with the whole lengths of beams that are divided into several frames."""
     if system.described is system.mechanism:
         return system.size
     parts = [[system.body(part).mesh for part in system.parts(body.name)] for body in system.described.bodies]
@@ -239,7 +242,7 @@ def _whole_size(system: System) -> float:
 
 
 def loose_tolerance(tolerance: float, size: float) -> Finding | None:
-    """The doubt about a tolerance of integration, if there is one, in a mechanism of that size [m]."""
+    """Return a finding on a tolerance that is large for a mechanism of that size [m], or None."""
     if tolerance <= LOOSE * size:
         return None
     return Finding(
@@ -250,7 +253,7 @@ def loose_tolerance(tolerance: float, size: float) -> Finding | None:
 
 
 def refuse_tolerance(tolerance: float, size: float) -> None:
-    """Raise an `InputError` for a tolerance beyond the size of the mechanism [m]: its steps would follow nothing."""
+    """Raise an `InputError` for a tolerance larger than the mechanism [m]: its steps would resolve nothing."""
     if tolerance > size:
         raise InputError(
             f"more than the mechanism is large, about {size:.2g} m", field="tolerance", value=tolerance,
@@ -264,7 +267,7 @@ def check_times(duration: float | None, samples: int | None) -> None:
     Raises
     ------
     InputError
-        It cannot be.
+        The duration is not positive and finite or too short, or the number of samples is too small or too large.
     """
     if duration is not None and not (math.isfinite(duration) and duration > 0.0):
         raise InputError("must be positive", field="duration", value=duration, remedy="give it in seconds")
@@ -278,12 +281,12 @@ def check_times(duration: float | None, samples: int | None) -> None:
 
 @checked_arguments()
 def choose(method: Method | str | None, options: IntegrationOptions | None) -> IntegrationOptions:
-    """The options, by default the default ones, with another method if one is given.
+    """Return the options (default options for None), with another method if one is given.
 
     Raises
     ------
     InputError
-        The options are not those of that method.
+        The options are not valid for that method.
     """
     options = options or IntegrationOptions()
     return options if method is None else replace(options, method=method)

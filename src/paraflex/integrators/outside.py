@@ -22,15 +22,15 @@ from paraflex.kernel.linear import factor_system
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import FINISHED, PAUSED, Samples
 
-# With order p errors add up to h^p where a step's is h^(p + 1): multistep methods are held to the tolerance at this
-# one, and to a power (p + 1) / p of it elsewhere [m].
+# With order p errors add up to h^p, while that of a step is h^(p + 1). The tolerance of multistep methods is used as it
+# is at this value [m], and is raised to the power (p + 1) / p elsewhere.
 _REFERENCE = 1e-4
-# How long a slice of steps may take before someone looks [s].
+# Longest wall time of a slice of steps between two checks [s].
 _SLICE_TIME = 0.1
 
 
 class OutsideRun:
-    """A run by an external solver: a `Run`."""
+    """Run by an external solver: a `Run`."""
 
     def __init__(self, problem: Problem, options: IntegrationOptions, stepper: Stepper) -> None:
         self.problem = problem
@@ -51,16 +51,16 @@ class OutsideRun:
 
     @property
     def singular_ahead(self) -> float | None:
-        """See `Run`: none is of index 3."""
+        """Always None, as no external solver integrates index-3 equations; see `Run`."""
         return None
 
     @property
     def attempts(self) -> int:
-        """See `Run`."""
+        """Number of attempted steps, see `Run`."""
         return self._steps + self._stepper.counts().rejected if self._steps else 0
 
     def start(self) -> None:
-        """See `Run`."""
+        """Compute the initial accelerations and multipliers and take the first sample, see `Run`."""
         initial = self.problem.initial
         self._begin(initial.time, initial.q, initial.v, 0.0)
         self._energy = self._energies(self._instant)
@@ -70,7 +70,7 @@ class OutsideRun:
         warn_if_stiff(self._stepper.form, self.problem, self._options.method)
 
     def march(self, attempts: int) -> int:
-        """See `Run`; fewer steps if they take long."""
+        """Attempt a number of steps and return a code, see `Run`; fewer steps if they take long."""
         until, began = self.attempts + attempts, time.perf_counter()
         while self.attempts < until and time.perf_counter() - began < _SLICE_TIME:
             code = self._advance()
@@ -80,15 +80,15 @@ class OutsideRun:
 
     @property
     def time(self) -> float:
-        """See `Run`."""
+        """Current time [s], see `Run`."""
         return self._instant.t
 
     def now(self) -> Instant:
-        """See `Run`."""
+        """Return the current state, see `Run`."""
         return self._instant
 
     def figures(self) -> Figures:
-        """See `Run`."""
+        """Return counts and residuals so far, see `Run`."""
         counts = self._stepper.counts()
         return Figures(
             steps=self._steps,
@@ -103,7 +103,7 @@ class OutsideRun:
         )
 
     def _begin(self, t: float, q: Array, v: Array, work: float) -> None:
-        """Start again, with the signals from t up to the next jump."""
+        """Restart the solver, with the signals from t up to the next jump."""
         problem, form = self.problem, self._stepper.form
         form.signals = problem.signals_from(t)
         solved = form.solve(t, q, v)
@@ -111,7 +111,7 @@ class OutsideRun:
         self._stepper.begin(t, form.pack(t, q, v, work), float(problem.stops[problem.stops > t][0]))
 
     def _advance(self) -> int:
-        """One accepted step."""
+        """Take one accepted step."""
         problem, stepper, before = self.problem, self._stepper, self._instant.t
         ahead = problem.stops[problem.stops > before]
         if ahead.size == 0:
@@ -123,7 +123,7 @@ class OutsideRun:
         q, v, work = stepper.form.unpack(stepper.y)
         solved = stepper.form.solve(stepper.t, q, v)
         if solved.dependent > self.dependent_rows:
-            # Adjacent steps are of one interval of a singular position.
+            # Adjacent steps form one interval of a singular position.
             goes_on = self._passages and before <= self._passages[-1][1]
             self._passages.append((self._passages.pop()[0] if goes_on else before, stepper.t))
         self._instant = Instant(stepper.t, q, v, solved.a, solved.multipliers, work)
@@ -157,12 +157,12 @@ class OutsideRun:
 
 
 def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
-    """Set up a run.
+    """Prepare a run.
 
     Raises
     ------
     InputError
-        SUNDIALS is not installed; or gains that follow the step, which only our own schemes know.
+        SUNDIALS is not installed, or the options have automatic gains, which only own methods support.
     """
     if options.automatic_gains:
         raise InputError(

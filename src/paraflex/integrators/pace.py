@@ -1,4 +1,4 @@
-"""Pace of a run: a run whose steps become so small that it would hardly end is given up early."""
+"""Pace of a run: a run whose steps become so small that it would hardly end is stopped early."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from paraflex.integrators.run import Instant
 from paraflex.integrators.watch import Breakdown
 from paraflex.mechanism import RigidBody
 
-# Default limit of the steps of a run.
+# Default limit of the number of steps of a run.
 MOST_STEPS = 10_000_000
-# A run that would need this many times the steps it may take is given up early: it may be faster later on.
+# A run that would need this many times the allowed steps is stopped early; the margin is for runs that become faster.
 _STEPS_MARGIN = 5.0
-# Where nobody says how many, so is one that would need this many and has become so many times slower than it was. The
-# library's mechanisms take 45 thousand steps at most as their files have it, 260 thousand at 1e-7 m by TR-BDF2, and
-# none becomes more than 25 times slower.
+# Without a limit from the user, a run is also stopped if it would need this many steps and has become slower by this
+# factor. The library's mechanisms take at most 45 thousand steps with their own options, 260 thousand at 1e-7 m by
+# TR-BDF2, and none becomes more than 25 times slower.
 _SLOW_STEPS, _TIMES_SLOWER = 1_000_000, 100.0
-# The first steps are left out of the pace, as they are small.
+# Number of first steps that are left out of the pace, as they are small.
 _FIRST_STEPS = 200
-# A singular position nearer than this is named.
+# A singular position nearer than this is reported.
 _NEAR_SINGULAR = 1e-2
-# So many beams without damping are named.
+# Largest number of beams without damping that are listed by name.
 _NAMED = 3
 
 
@@ -36,11 +36,11 @@ class Pace:
     Parameters
     ----------
     start, end : float
-        Of the run [s].
+        Start and end of the run [s].
     most : int or None
-        Steps that the user allows.
+        Largest number of steps that the user allows; None for the default limits.
     window : int
-        Attempts that the pace is taken of: seconds of computing for a dozen bodies.
+        Number of attempts over which the pace is computed: seconds of computing for a dozen bodies.
     """
 
     def __init__(self, start: float, end: float, most: int | None, window: int) -> None:
@@ -49,30 +49,30 @@ class Pace:
         self._usual = math.inf
 
     def copy(self) -> Pace:
-        """The same pace, to go on from apart."""
+        """Return an independent copy of the pace."""
         other = copy(self)
         other._looks = self._looks.copy()
         return other
 
     @property
     def most(self) -> int:
-        """Steps after which the run is given up."""
+        """Number of steps after which the run is stopped."""
         return MOST_STEPS if self._most is None else self._most
 
     @property
     def step(self) -> float:
-        """The mean of the steps attempted in the window [s]."""
+        """Mean step size attempted in the window [s]."""
         (first, then), (last, now) = self._looks[0], self._looks[-1]
         return (now - then) / max(1, last - first)
 
     @property
     def expected(self) -> float:
-        """Steps of the whole run at the pace of the window; infinite if the time does not advance."""
+        """Expected number of steps of the whole run at the pace of the window; infinite if time does not advance."""
         attempts, now = self._looks[-1]
         return attempts + (self._end - now) / self.step if self.step > 0.0 else math.inf
 
     def look(self, attempts: int, now: float) -> bool:
-        """Record the progress of the run; whether it should be given up."""
+        """Record the progress of the run; return whether it should be stopped."""
         self._looks.append((attempts, now))
         while attempts - self._looks[1][0] >= self._window:
             self._looks.popleft()
@@ -86,7 +86,10 @@ class Pace:
 
 
 def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace, jumps: np.ndarray) -> Breakdown:
-    """Reason for giving a run up early: size of its steps, the fastest body, what jumped before, and the remedy."""
+    """Return the reason for stopping a run early and the remedy.
+
+    The reason has the size of its steps, the fastest body, and the inputs that jumped before.
+    """
     needed = f"about {pace.expected:.2g}" if math.isfinite(pace.expected) else "infinitely many"
     excited = _excited(system, now, jumps)
     remedy = (
@@ -103,7 +106,7 @@ def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace, jumps:
 
 
 def _excited(system: System, now: Instant, jumps: np.ndarray) -> str:
-    """Remark on the last jump of loads or torques before now, if it met beams without damping."""
+    """Return a remark on the last jump of loads or torques before now, if there are beams without damping."""
     before = jumps[jumps <= now.t]
     beams = [body for body in system.mechanism.bodies if not isinstance(body, RigidBody) and body.damping is None]
     if not before.size or not beams:
@@ -113,7 +116,7 @@ def _excited(system: System, now: Instant, jumps: np.ndarray) -> str:
 
 
 def _fastest(system: System, now: Instant) -> str:
-    """The body with the largest acceleration, of its angle or of its place over its size, and its speed."""
+    """Describe the body with the largest acceleration, of its angle or of its position over its size, and its speed."""
     parts = [(i, j) for i in range(len(system.bodies)) for j in range(3)]
     columns = [system.bodies[i].offset + j for i, j in parts]
     worst = int(np.argmax(np.abs(now.a[columns]) / system.units[columns]))
@@ -126,6 +129,6 @@ def _fastest(system: System, now: Instant) -> str:
 
 
 def _singular(system: System, now: Instant, start: np.ndarray) -> str:
-    """Remark on the distance from a singular position of the constraints, if one is near."""
+    """Return a remark on the distance from a singular position of the constraints, if one is near."""
     measure = float(SingularityMeasure(system, start)(now.q[None])[0])
     return f", {measure:.1g} from a singular position of the constraints" if measure < _NEAR_SINGULAR else ""

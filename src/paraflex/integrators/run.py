@@ -1,4 +1,4 @@
-"""The interface of every run, by any stepper: its problem, state and counts, which is all that `integrate` uses."""
+"""Interface of every run, by any stepper: problem, state and counts, which is all that `integrate` uses."""
 
 from __future__ import annotations
 
@@ -17,32 +17,35 @@ from paraflex.kernel.arrays import apart
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import Samples
 
-# Where the first step starts from, as a fraction of the run; error control takes over at once.
+# Size of the first step, as a fraction of the run; error control adjusts it at once.
 FIRST_STEP = 1e-6
-# Constraint rows with less than this of their squares left depend on the others: those that did at the start, whatever
-# errors leave of them; and for solvers of others any, small enough that this lasts a thousandth of a radian.
+# Relative pivot below which constraint rows are dependent: for own methods rows that were dependent at the start,
+# whatever errors add to them; for external solvers any rows, which is then so within a thousandth of a radian.
 DEPENDENT_PART = 1e-7
 
 
 @dataclass(frozen=True)
 class Problem:
-    """The problem to be integrated.
+    """Problem to be integrated.
 
     Attributes
     ----------
     system : System
+        System to integrate.
     signals : Signals
+        Motor torques, loads and prescribed motions as functions of time.
     initial : State
+        Initial state.
     times : (k,) array
-        Of the samples [s].
+        Sample times [s].
     stops : (s,) array
-        At which steps end; the last is the end of the run [s].
+        Times at which steps end [s]; the last is the end of the run.
     jumps : (j,) array
-        Those of them at which something given jumps: no step may see what follows.
+        Stops at which an input jumps [s]: no step may use the values after the jump.
     limits : StepLimits
-        Longest steps that resolve what is given in time.
+        Longest steps that resolve the inputs.
     asked : (k,) array of bool
-        Samples that are kept; others serve to find the largest loads.
+        Whether a sample is kept; others serve to find the largest loads.
     """
 
     system: System
@@ -60,7 +63,7 @@ class Problem:
         return float(self.stops[-1] - self.initial.time)
 
     def signals_from(self, time: float) -> Signals:
-        """Signals for steps from a time on: continued beyond the next jump without it."""
+        """Return the signals for steps from a time on, extrapolated smoothly beyond the next jump."""
         ahead = self.jumps[self.jumps > time]
         if not ahead.size:
             return self.signals
@@ -70,7 +73,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Instant:
-    """State of a run between two steps, in new arrays. Work [J] from the start, without that of weight."""
+    """State of a run between two steps, in new arrays; work [J] from the start, without the work of weight."""
 
     t: float
     q: Array
@@ -97,21 +100,21 @@ class Figures:
 
 
 class Run(Protocol):
-    """A run between calls."""
+    """Run between calls."""
 
     @property
     def problem(self) -> Problem:
-        """The problem."""
+        """Problem to be integrated."""
         ...
 
     @property
     def samples(self) -> Samples:
-        """Samples, filled as far as the run has come."""
+        """Samples, filled up to the current time."""
         ...
 
     @property
     def dependent_rows(self) -> int:
-        """Number of redundant constraint rows, beside the start where that is a singular position."""
+        """Number of redundant constraint rows; if the start is a singular position, that beside the start."""
         ...
 
     @property
@@ -120,25 +123,25 @@ class Run(Protocol):
         ...
 
     def start(self) -> None:
-        """Find accelerations and multipliers, and take the first sample."""
+        """Compute the initial accelerations and multipliers, and take the first sample."""
         ...
 
     def march(self, attempts: int) -> int:
-        """Attempt a number of steps; a code of `kernel.run_state`."""
+        """Attempt a number of steps; return a code of `kernel.run_state`."""
         ...
 
     @property
     def time(self) -> float:
-        """Time reached [s]."""
+        """Current time [s]."""
         ...
 
     def now(self) -> Instant:
-        """The state of the run."""
+        """Return the current state."""
         ...
 
     @property
     def singular_ahead(self) -> float | None:
-        """Time at which an index-3 method is about to reach a singular position [s]."""
+        """Time at which an index-3 method is about to reach a singular position [s], or None."""
         ...
 
     @property
@@ -152,7 +155,7 @@ class Run(Protocol):
         ...
 
     def figures(self) -> Figures:
-        """Counts and residuals so far."""
+        """Return counts and residuals so far."""
         ...
 
 
@@ -163,12 +166,12 @@ def make_problem(
     times: Array,
     knots: Array | None = None,
 ) -> Problem:
-    """A problem, its times checked and all kept: see `integrate` for the arguments.
+    """Return a problem with checked times: see `integrate` for the arguments.
 
     Raises
     ------
     InputError
-        Times that do not ascend from the start.
+        Times do not ascend from the start.
     """
     times = np.ascontiguousarray(times, dtype=float)
     if times.size == 0 or np.any(np.diff(times) <= 0.0) or times[0] < initial.time or times[-1] <= initial.time:
@@ -182,7 +185,7 @@ def make_problem(
 
 
 def empty_samples(times: Array, system: System, asked: NDArray[np.bool_] | None = None) -> Samples:
-    """Samples to be filled."""
+    """Return samples to be filled."""
     widths = {"q": system.n, "v": system.n, "a": system.n, "lam": system.m, "energy": 3}
     arrays = {name: apart((times.size, width)) for name, width in widths.items()}
     for array in arrays.values():

@@ -14,15 +14,15 @@ from paraflex.integrators.guests import SciPyMethod
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
 
-# The least relative tolerance that SciPy takes without a warning.
+# Smallest relative tolerance that SciPy accepts without a warning.
 _RELATIVE = 1e-13
 
 
 class ScipyStepper:
-    """Steps by one of SciPy's solvers with given absolute tolerances: see `Stepper`."""
+    """Steps of one of SciPy's solvers with given absolute tolerances: see `Stepper`."""
 
     def __init__(self, method: SciPyMethod, form: OdeForm, tolerances: Array, steps: Steps) -> None:
-        # Loaded when one runs.
+        # The solver's module is loaded only when one runs.
         self._class = getattr(scipy.integrate, method.solver)
         self._places, self._stages = method.places, method.evaluations
         self.form = form
@@ -31,7 +31,7 @@ class ScipyStepper:
         self._past, self._rejected, self._dense = SolverCounts(0, 0, 0, 0), 0, None
 
     def begin(self, t: float, y: Array, stop: float) -> None:
-        """See `Stepper`."""
+        """Restart from y at t towards a stop, see `Stepper`."""
         self._past = self.counts() if hasattr(self, "_solver") else self._past
         self._rejected, self._dense = 0, None
         options = {"jac": self.form.jacobian} if self._stages else {}
@@ -41,18 +41,18 @@ class ScipyStepper:
         )  # fmt: skip
 
     def step(self, stop: float) -> int:
-        """See `Stepper`."""
+        """Take one step and return a code, see `Stepper`."""
         solver, before = self._solver, self._solver.t
         solver.t_bound, solver.status = stop, "running"
         self._seen.clear()
         self._dense = None
         try:
-            # A solution that overflows is reported as that, not number by number.
+            # An overflow of the solution is reported by the return code, not by warnings for each number.
             with np.errstate(all="ignore"), warnings.catch_warnings():
                 warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
                 solver.step()
         except (ValueError, np.linalg.LinAlgError):
-            # The factorisation refuses numbers that are not finite.
+            # The factorisation raises an error for numbers that are not finite.
             return NOT_FINITE
         tried = attempts(self._seen, before, self._places)
         if solver.status == "failed":
@@ -63,22 +63,22 @@ class ScipyStepper:
 
     @property
     def t(self) -> float:
-        """See `Stepper`."""
+        """Current time [s]."""
         return float(self._solver.t)
 
     @property
     def y(self) -> Array:
-        """See `Stepper`."""
+        """Solution at the current time."""
         return self._solver.y
 
     def at(self, time: float) -> Array:
-        """See `Stepper`."""
+        """Return the solution within the last step, by the solver's own interpolation."""
         if self._dense is None:
             self._dense = self._solver.dense_output()
         return self._dense(time)
 
     def counts(self) -> SolverCounts:
-        """See `Stepper`. SciPy counts evaluations; iterations follow from them."""
+        """Return the counts since the run began. SciPy counts evaluations; iterations follow from them."""
         solver = self._solver
         iterations = int(solver.nfev) // self._stages if self._stages else 0
         return self._past + SolverCounts(int(solver.nfev), self._rejected, iterations, int(solver.nlu))

@@ -1,4 +1,4 @@
-"""Derivatives of a run by parameters: its steps are solved to rounding and differentiated stage by stage."""
+"""Forward sensitivities of a run: its steps are solved to rounding and differentiated stage by stage."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from paraflex.kernel.sensitivity import make_piece, sensitivity_steps
 from paraflex.kernel.sensitivity_samples import DIFFERENCE_STEP, PLACES, Sensitivity, make_sensitivity
 from paraflex.kernel.tangent import make_tangent
 
-# Steps in memory at a time.
+# Number of steps in memory at a time.
 _STEPS_AT_ONCE = 256
-# Largest relative correction of a stage at the end of the iteration; beyond it there is no derivative.
+# Largest relative correction of a stage at the end of the iteration; beyond it no derivative is returned.
 _LARGEST_RESIDUAL = 1e-6
 
 
@@ -37,13 +37,13 @@ class Direction(NamedTuple):
     Attributes
     ----------
     packed, signals : arrays
-        Of the numbers of the packed system and of the signals, as `dynamics.numbers_of` orders them.
+        Derivatives of the numbers of the packed system and of the signals, in the order of `dynamics.numbers_of`.
     q, v : (n,) arrays
-        Of the initial state.
+        Derivatives of the initial state.
     stops, times : arrays
-        Of the stops and of the sample times [s].
+        Derivatives of the stops and of the sample times [s].
     gains : (2,) array
-        Of Baumgarte's alpha and beta [1/s].
+        Derivatives of Baumgarte's alpha and beta [1/s].
     """
 
     packed: Array
@@ -61,8 +61,9 @@ class Motion(NamedTuple):
     Attributes
     ----------
     q, v, a, multipliers : arrays
+        Coordinates, velocities, accelerations and multipliers.
     work : array
-        Of motors and all else but weight, less what dampers take [J].
+        Work of motors and all other forces except weight, less the energy dissipated in dampers [J].
     """
 
     q: Array
@@ -74,18 +75,20 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class RunDerivatives:
-    """A run solved to rounding with its own steps, and its derivatives by parameters.
+    """Run solved to rounding with its own steps, and its derivatives by parameters.
 
     Attributes
     ----------
     t : (k,) array
-        [s]
+        Sample times [s].
     motion : Motion
+        Samples of the run.
     derivatives : Motion
+        Derivatives of the samples by the parameters.
     steps : int
-        Accepted ones.
+        Number of accepted steps.
     residual : float
-        Largest last correction of any stage's equations, as a part of what it corrected: what they are solved to.
+        Largest last correction of the equations of any stage, relative to the corrected values.
     """
 
     t: Array
@@ -101,7 +104,7 @@ def check_differentiable(options: IntegrationOptions) -> None:
     Raises
     ------
     InputError
-        Another family of methods, treatment of constraints, or events.
+        The method is not of the ESDIRK family, the treatment of constraints is not Baumgarte's, or there are events.
     """
     if options.method.family != Family.ESDIRK:
         able = [name for name, method in METHODS.items() if method.family == Family.ESDIRK]
@@ -123,26 +126,28 @@ def check_differentiable(options: IntegrationOptions) -> None:
 
 
 def run_derivatives(problem: Problem, options: IntegrationOptions, directions: Sequence[Direction]) -> RunDerivatives:
-    """Derivatives of a run by parameters at constant steps.
+    """Compute derivatives of a run by parameters, with its steps kept.
 
-    Steps keep their share of the interval between two stops: where a stop moves, they move with it.
+    Steps keep their share of the interval between two stops: if a stop moves, the steps move with it.
 
     Parameters
     ----------
     problem : Problem
-        As `make_problem` returns it.
+        Problem as returned by `make_problem`.
     options : IntegrationOptions
+        Options of the run.
     directions : sequence of Direction
-        One a parameter.
+        Derivatives of the inputs, one direction per parameter.
 
     Raises
     ------
     InputError
-        See `check_differentiable`.
+        The options do not allow derivatives, see `check_differentiable`.
     SliderOffBeamError
         A point that slides along a beam is off it at a sample: a run that ends early has no derivatives.
     IntegrationError
-        The run could not be finished, or equations of a stage could not be solved to rounding: it names the time.
+        The run could not be finished, or the equations of a stage could not be solved to rounding; the error has the
+        time.
     """
     check_differentiable(options)
     run = prepare(problem, options)
@@ -165,7 +170,7 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
 
 
 def _check_on_beams(problem: Problem, motion: Motion) -> None:
-    """Raise if a sliding point is off its beam at a sample of a run that would have ended there."""
+    """Raise an error if a sliding point is off its beam at a sample of a run that would have ended there."""
     for function in BeamEnds(problem.system, problem.initial).functions:
         outside = np.nonzero(function.inside(motion.q) <= 0.0)[0]
         if outside.size and function.ends_run:
@@ -175,9 +180,9 @@ def _check_on_beams(problem: Problem, motion: Motion) -> None:
 
 
 def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Array:
-    """Kinetic energy, strain energy with that of springs, and work of gravity at samples (k, 3) [J].
+    """Return kinetic energy, strain energy including springs, and work of gravity at samples (k, 3) [J].
 
-    The last counts from where all mass lies at the origin of the ground frame.
+    The work of gravity is relative to all mass at the origin of the ground frame.
     """
     out = np.zeros((q.shape[0], 3))
     arrays = (np.ascontiguousarray(part) for part in (q, v, multipliers))
@@ -187,7 +192,7 @@ def energies(packed: PackedSystem, q: Array, v: Array, multipliers: Array) -> Ar
 
 @dataclass(frozen=True)
 class _Chunk:
-    """Accepted steps in succession, under signals that do not jump."""
+    """Successive accepted steps, under signals that do not jump."""
 
     history: History
     count: int
@@ -195,7 +200,7 @@ class _Chunk:
 
 
 def _chunks(run: NativeRun) -> Iterator[_Chunk]:
-    """The accepted steps of a run as it is marched, in one history that is refilled."""
+    """Yield the accepted steps of a run as it advances, in one history that is refilled."""
     problem, state, jumps = run.problem, run.state, run.problem.jumps
     history = make_history(_STEPS_AT_ONCE, run.scheme.c.size, problem.system.n, problem.system.m)
     run.start()
@@ -210,7 +215,7 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
             cause, remedy = CAUSES[code]
             raise IntegrationError(cause, Moment(before, int(accepted)), remedy=remedy)
         if state.counts[STEPS] == accepted:
-            # The first stage is solved anew for the second shorter step.
+            # The first stage is solved again for the second shorter step.
             restart |= bool(state.counts[FAILURES] == 2)
             continue
         history.t[count], history.h[count], history.restart[count] = before, state.clock[LAST_STEP], restart
@@ -224,7 +229,7 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
 
 
 class _Varied:
-    """A run solved to rounding and its derivatives, up to the present step."""
+    """Run solved to rounding and its derivatives, up to the current step."""
 
     def __init__(self, problem: Problem, run: NativeRun, directions: Sequence[Direction]) -> None:
         self.problem, self.run, self.directions, self.residual = problem, run, directions, 0.0
@@ -232,7 +237,7 @@ class _Varied:
         self.march = make_march(system.n, system.m, stages, inputs_of(system.mechanism).acting)
         self.march.q[:], self.march.v[:] = initial.q, initial.v
         self.workspace = system.workspace()
-        # They are solved where those of the run are.
+        # The equations of motion are solved at the same samples as in the run.
         self.samples = empty_samples(problem.times, system)._replace(solved=run.samples.solved)
         self.workspace.redundant[:] = run.workspace.redundant
         self.tangent, self.space = make_tangent(system.packed), make_krylov(system.n, system.m)
@@ -254,13 +259,13 @@ class _Varied:
 
     @property
     def motion(self) -> Motion:
-        """Samples of the run itself."""
+        """Samples of the run."""
         samples = self.samples
         return Motion(samples.q, samples.v, samples.a, samples.lam, self.work)
 
     @property
     def work(self) -> Array:
-        """Work without that of weight, which samples count from the origin of the ground frame."""
+        """Work without that of weight, which is included in the samples relative to the origin of the ground frame."""
         samples = self.samples
         weight = energies(self.problem.system.packed, samples.q, samples.v, samples.lam)[:, 2]
         return samples.energy[:, 2] - weight
@@ -282,7 +287,7 @@ class _Varied:
             self._check(chunk, y.left)
 
     def _vary_times(self, chunk: _Chunk, y: Sensitivity, direction: Direction) -> None:
-        """Derivatives of the begins and lengths of steps, interpolated between those of the stops around them."""
+        """Compute derivatives of the starts and sizes of steps, interpolated between those of the stops around them."""
         stops = np.concatenate([[self.problem.initial.time], self.problem.stops])
         change = np.concatenate([[0.0], direction.stops])
         t, h = chunk.history.t[: chunk.count], chunk.history.h[: chunk.count]
@@ -304,6 +309,6 @@ class _Varied:
 
 
 def _moved(record, change: Array) -> tuple:
-    """A packed system or signals at the points of the kernel's differences."""
+    """Return a packed system or signals at the points of the kernel's differences."""
     numbers = numbers_of(record)
     return tuple(with_numbers(record, numbers + place * DIFFERENCE_STEP * change) for place in PLACES)

@@ -1,8 +1,9 @@
-"""Runs that begin at a singular position, from where branches meet, on the branch of their velocities.
+"""Runs that begin at a singular position where branches meet, on the branch of their velocities.
 
-There rows of constraints depend on others, though not beside it, and forces leave accelerations along the direction
-that opens undetermined: the branch determines them. With w Phi_q = 0 and Phi = 0 along q + v t + a t^2 / 2 +
-j t^3 / 6, the terms of third order, w (Phi''' + 3 Phi'' a) with Phi'' and Phi''' along v, are zero for any jerk j.
+At such a position constraint rows depend on others, though not beside it, and the forces do not determine the
+accelerations along the direction that opens: the branch determines them. With w Phi_q = 0 and Phi = 0 along q + v t + a
+t^2 / 2 + j t^3 / 6, the terms of third order, w (Phi''' + 3 Phi'' a) with Phi'' and Phi''' along v, are zero for any
+jerk j.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from paraflex.kernel.linear import factor_system
 from paraflex.kernel.packed import Workspace
 from paraflex.kernel.run_state import PREPARED, ROOT, ROOT_RATE, ROOT_STEP, WIDEST, March
 
-# The motion is looked at this far beside the start [rad, sizes of the mechanism].
+# Distance from the start at which the motion is examined [rad, sizes of the mechanism].
 _BESIDE = 1e-2
 
 
@@ -36,7 +37,7 @@ class Beside(NamedTuple):
 
 
 def beside_singular(problem: Problem) -> Beside | None:
-    """Find a pose on the branch with fewer dependent rows than the start; None if the start is no singular position."""
+    """Find a pose on the branch with fewer dependent rows than the start; None if the start is not singular."""
     system, start = problem.system, problem.initial
     pace = float(np.max(np.abs(start.v / system.units), initial=0.0))
     if not 0 < system.m <= DENSE_ROWS or pace == 0.0 or not (dropped := dependence(system, start.q).dropped.size):
@@ -50,7 +51,7 @@ def beside_singular(problem: Problem) -> Beside | None:
 
 
 def begin_on_branch(problem: Problem, beside: Beside, march: March, aside: Workspace) -> None:
-    """Set the accelerations of the branch after the first stage of a run, and that it is near a singular position."""
+    """Set the accelerations of the branch after the first stage of a run, and mark the singular position as near."""
     a = march.stage_a[1, 0]
     a += _missing(problem, beside.later, a)
     march.algorithmic[0] = a
@@ -61,7 +62,7 @@ def begin_on_branch(problem: Problem, beside: Beside, march: March, aside: Works
 
 
 def _missing(problem: Problem, later: float, a: Array) -> Array:
-    """Difference (n,) of the accelerations of the branch from those that forces give, by differences in time."""
+    """Return the accelerations (n,) of the branch less those that follow from forces, by differences in time."""
     system, t, q, v = problem.system, problem.initial.time, problem.initial.q, problem.initial.v
     J, moved = system.jacobian(q), later * v
     W = dependence(system, q).conflict(np.eye(system.m)).reshape(-1, system.m)
@@ -69,7 +70,7 @@ def _missing(problem: Problem, later: float, a: Array) -> Array:
     change, left = constraint_change(system, q), partial(np.matmul, J)
     pushed = scipy.sparse.linalg.splu(link_metric(system, q, 0.0).tocsc()).solve(opening.T)
     along = np.column_stack([project(change, each, left) for each in pushed.T])
-    # What is given may begin with the run: from its start on, and extrapolated to it.
+    # Inputs may begin with the run: evaluate them from its start on, and extrapolate to the start.
     once, twice = (
         system.constraints(moment_signals(system.mechanism, t + h), t + h, q + h * v + 0.5 * h * h * a)[0]
         / (h**3 / 6.0)

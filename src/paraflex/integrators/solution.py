@@ -1,4 +1,4 @@
-"""The solution of a run."""
+"""Solution of a run."""
 
 from __future__ import annotations
 
@@ -18,54 +18,56 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Solution:
-    """The solution of a run at the requested times that were reached.
+    """Solution of a run at the requested times that were reached.
 
     Attributes
     ----------
     t : (k,) array
-        [s]
+        Sample times [s].
     q, v, a : (k, n) arrays
-        Coordinates and their derivatives; flexible ones modal.
+        Coordinates and their derivatives; flexible ones are modal.
     multipliers : (k, m) array
-        Constraint forces [N, N m], one a constraint row of the system; where rows depend on one another, of all that
-        give the same motion those with the least sum of squares.
+        Constraint forces [N, N m], one per constraint row of the system; if rows depend on one another, those with the
+        least sum of squares among all that give the same motion.
     kinetic_energy, strain_energy, work : (k,) arrays
-        [J]; work is that of motors, prescribed motion, weight and loads, less what dampers take.
+        Energies and work [J]; work of motors, prescribed motion, weight and loads, less the energy dissipated in
+        dampers.
     status : str
         "complete", "stopped" (by an event), "interrupted" or "failed".
     message : str
-        Why it is not complete.
+        Reason why the run is not complete.
     steps, rejected, newton_iterations, factorisations : int
+        Numbers of accepted steps, rejected steps, Newton iterations and matrix factorisations.
     wall_time : float
-        [s]
+        Wall time [s].
     constraint_position_max, constraint_velocity_max : float
         Largest |Phi| [m, rad] and |Phi'| at accepted steps.
     energy_balance_max : float
         Largest |kinetic + strain energy - start - work| at accepted steps [J].
     singular_positions : tuple of float
-        Times at which constraints depended on one another for an instant that elsewhere do not [s]. Constraint forces
-        have a pole there: multipliers of samples so near are NaN.
+        Times of singular positions [s], at which constraints that are independent elsewhere depend on one another.
+        Constraint forces have a pole there: multipliers of samples that are too close are NaN.
     method : str
-        The name of the method; empty for another model's.
+        Name of the method; empty for another model.
     evaluations : int
-        Of the equations of motion.
+        Number of evaluations of the equations of motion.
     event : str
-        Which event stopped the run, whose time and state are then the last sample; empty for none. Also of a run that
-        failed where a point came to the end of its beam.
+        Event that stopped the run, whose time and state are then the last sample; empty for none. It is also set for a
+        run that failed as a point reached the end of its beam.
     multiplier_errors : (m,) array, optional
-        How far multipliers may be off by errors of integration [N, N m]: the sum of what the errors of single steps
-        make of them within three cycles, or the whole run where vibrations do not die out, times two. None where steps
-        are not chosen by such errors.
+        Estimated errors of multipliers by integration [N, N m]: the sum of the effects of the errors of single steps
+        within three cycles, or the whole run if vibrations are undamped, times two. None if the step size is not
+        controlled by such errors.
     brake_energy : float
-        Kinetic energy that brakes took as they engaged [J]: `work` is less by it from then on.
+        Kinetic energy absorbed by brakes as they engaged [J]: `work` is reduced by it from then on.
     findings : tuple of Finding
-        What makes it doubtful: points that slid off their beams.
+        Reasons for doubt about the solution, such as points that left their beams.
     resting : bool
         Whether the samples are equilibria, numbered in place of times.
     acting : (c,) array, optional
-        Numbers of the constraint rows that act; all by default.
+        Indices of the constraint rows that act; all by default.
     options : IntegrationOptions, optional
-        By which it was found; None of another model.
+        Options of the run; None for another model.
     """
 
     t: Array
@@ -98,7 +100,7 @@ class Solution:
     options: IntegrationOptions | None = None
 
     def instant(self, sample: int, digits: int = 3) -> str:
-        """In a text, which sample it is: "t = 0.125 s", or "step 3"."""
+        """Return a description of a sample for texts: "t = 0.125 s", or "step 3"."""
         return f"step {self.t[sample]:.0f}" if self.resting else f"t = {self.t[sample]:.{digits}g} s"
 
     @property
@@ -107,18 +109,18 @@ class Solution:
         return float(self.t[-1]) if self.event else math.nan
 
     def followed_by(self, other: Solution, samples: int, multipliers: Array, energy: float) -> Solution:
-        """One run of this one and its continuation from its last state, after brakes have absorbed energy.
+        """Join this run and its continuation from its last state, after brakes have absorbed energy.
 
         Parameters
         ----------
         other : Solution
-            Of the same coordinates.
+            Continuation, with the same coordinates.
         samples : int
-            How many of this run's samples are kept.
+            Number of samples of this run that are kept.
         multipliers : (k, m) array
-            Of the other run, one a row of this run's system [N, N m].
+            Multipliers of the continuation, one per row of this run's system [N, N m].
         energy : float
-            What the brakes took [J].
+            Energy absorbed by the brakes [J].
         """
         gained = self.kinetic_energy[-1] + self.strain_energy[-1] - self.kinetic_energy[0] - self.strain_energy[0]
         before, known = self.work[-1], {one.place for one in self.findings}
@@ -135,7 +137,7 @@ class Solution:
             work=np.concatenate([self.work[:samples], other.work + before - energy]),
             **{name: getattr(self, name) + getattr(other, name) for name in counts},
             **{name: max(getattr(self, name), getattr(other, name)) for name in maxima},
-            # The other's imbalance counts from where it begins.
+            # The imbalance of the continuation is relative to its start.
             energy_balance_max=max(self.energy_balance_max, abs(gained - before) + other.energy_balance_max),
             singular_positions=self.singular_positions + other.singular_positions,
             brake_energy=energy,

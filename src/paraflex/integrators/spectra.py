@@ -1,7 +1,7 @@
-"""Numerical damping and period error of each method for x'' = -omega^2 x with steps of h, over h omega.
+"""Numerical damping and period error of each method for x'' = -omega^2 x with step size h, over h omega.
 
-A step takes a vector of values to a matrix (or, of several steps, a companion matrix) times that vector; its
-eigenvalues are the method's characteristic roots. The principal root is the one that follows exp(i h omega).
+A step multiplies a vector of values by a matrix (for multistep methods a companion matrix); its eigenvalues are the
+method's characteristic roots. The principal root is the one that approximates exp(i h omega).
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from paraflex.integrators.tableaux.make import ESDIRK
 Array = NDArray[Any]
 Roots = NDArray[Any]
 
-# Of NDF, orders 0 to 5, as SciPy has them: Shampine and Reichelt (1997), Table 1.
+# Coefficients of NDF of orders 0 to 5, as in SciPy: Shampine and Reichelt (1997), Table 1.
 _KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0)
-# Ratio of frequencies between which the principal root changes little, and the first frequency.
+# Ratio of adjacent frequencies between which the principal root changes little, and the first frequency.
 _DENSE, _FIRST_FREQUENCY = 1.02, 1e-3
 
 
@@ -35,13 +35,13 @@ class Spectrum:
     Attributes
     ----------
     frequency : (k,) array
-        h omega, ascending [rad].
+        Frequencies h omega, ascending [rad].
     principal : (k,) array
-        The root that follows exp(i h omega).
+        Principal root, which approximates exp(i h omega).
     phase : (k,) array
-        Of the principal root, continued from zero [rad].
+        Phase of the principal root, continued from zero [rad].
     radius : (k,) array
-        Largest modulus of any root: above 1 the method is unstable.
+        Spectral radius, the largest modulus of all roots; above 1 the method is unstable.
     """
 
     frequency: Array
@@ -51,13 +51,13 @@ class Spectrum:
 
     @property
     def damping_ratio(self) -> Array:
-        """Damping ratio of the vibration that the steps describe (Hughes 1987, 9.1); the exact one is zero."""
+        """Damping ratio of the numerical vibration (Hughes 1987, 9.1); the exact one is zero."""
         with np.errstate(divide="ignore"):
             return -np.log(np.abs(self.principal)) / self.phase
 
     @property
     def amplitude_decay(self) -> Array:
-        """The fraction of the amplitude lost in a period."""
+        """Fraction of the amplitude lost in a period."""
         return 1.0 - np.exp(-2.0 * np.pi * self.damping_ratio)
 
     @property
@@ -67,21 +67,22 @@ class Spectrum:
 
 
 def spectrum(method: Method | str, frequency: ArrayLike, *, order: int | None = None) -> Spectrum:
-    """Characteristic roots of a method.
+    """Compute the characteristic roots of a method.
 
     Parameters
     ----------
     method : Method or str
-        With its parameters, or a name in `METHODS`.
+        Method with its parameters, or a name in `METHODS`.
     frequency : (k,) array
-        h omega, ascending from above zero [rad].
+        Frequencies h omega, ascending from above zero [rad].
     order : int, optional
-        Of a multistep method, which needs one: it changes order on its way, and its roots with it.
+        Order of a multistep method, which is required: its roots depend on the order, which changes during a run. None
+        for other methods.
 
     Raises
     ------
     InputError
-        No such method or order; frequencies that do not ascend from above zero.
+        There is no such method or order, or the frequencies do not ascend from above zero.
     """
     wanted = np.asarray(frequency, dtype=float).reshape(-1)
     if not (wanted.size and np.all(np.isfinite(wanted)) and wanted[0] > 0.0 and np.all(np.diff(wanted) > 0.0)):
@@ -104,7 +105,7 @@ def spectrum(method: Method | str, frequency: ArrayLike, *, order: int | None = 
 
 
 def _followed(roots: list[Roots], near: complex) -> Roots:
-    """From each set of roots the one nearest to that of the set before."""
+    """Return from each set of roots the one nearest to the root chosen from the previous set."""
     out = np.zeros(len(roots), dtype=complex)
     for k, candidates in enumerate(roots):
         near = out[k] = candidates[np.argmin(np.abs(candidates - near))]
@@ -112,7 +113,7 @@ def _followed(roots: list[Roots], near: complex) -> Roots:
 
 
 def _roots(method: Method, order: int | None) -> Callable[[float], Roots]:
-    """The characteristic roots as a function of h omega."""
+    """Return the characteristic roots as a function of h omega."""
     if method.multistep:
         left, right = multistep_formula(method, order)
         return lambda x: np.roots(left - 1j * x * right)
@@ -131,12 +132,12 @@ def _roots(method: Method, order: int | None) -> Callable[[float], Roots]:
 
 
 def tableau_of(method: Method) -> tuple[Array, Array]:
-    """The matrix A and weights b of a Runge-Kutta method.
+    """Return the matrix A and weights b of a Runge-Kutta method.
 
     Raises
     ------
     InputError
-        It is none, or its tableau is not known here.
+        The method is not a Runge-Kutta method, or its tableau is not available here.
     """
     if isinstance(method, RK45):
         return np.pad(scipy.integrate.RK45.A, ((0, 0), (0, 1))), scipy.integrate.RK45.B
@@ -150,12 +151,12 @@ def tableau_of(method: Method) -> tuple[Array, Array]:
 
 
 def stability(A: Array, b: Array, z: complex) -> complex:
-    """R(z) = 1 + z b (1 - z A)^-1 1 of a Runge-Kutta method, the factor of a step for x' = z/h x."""
+    """Return R(z) = 1 + z b (1 - z A)^-1 1 of a Runge-Kutta method, the factor of a step for x' = z/h x."""
     return complex(1.0 + z * (b @ np.linalg.solve(np.eye(b.size) - z * A, np.ones(b.size))))
 
 
 def _collocation(*nodes: float) -> tuple[Array, Array]:
-    """Tableau of collocation at nodes of which the last is 1: integrals of Lagrange polynomials."""
+    """Return the tableau of collocation at nodes of which the last is 1: integrals of Lagrange polynomials."""
     A = np.zeros((len(nodes), len(nodes)))
     for j, own in enumerate(nodes):
         others = [node for node in nodes if node != own]
@@ -165,7 +166,10 @@ def _collocation(*nodes: float) -> tuple[Array, Array]:
 
 
 def newmark_step(x: float, numbers: NewmarkNumbers) -> Array:
-    """A step's matrix for (x, h x', h^2 a), a the algorithmic acceleration; balance holds at both ends of the step."""
+    """Return the matrix of a step for (x, h x', h^2 a), where a is the algorithmic acceleration.
+
+    Balance holds at both ends of the step.
+    """
     beta, gamma, alpha_m, alpha_f = numbers.beta, numbers.gamma, numbers.alpha_m, numbers.alpha_f
     stiffness = x**2
     new = np.array(
@@ -176,7 +180,7 @@ def newmark_step(x: float, numbers: NewmarkNumbers) -> Array:
 
 
 def wilson_step(x: float, theta: float) -> Array:
-    """A step's matrix for (x, h x', h^2 x''): acceleration linear up to theta h, where equilibrium holds."""
+    """Return the matrix of a step for (x, h x', h^2 x''): acceleration linear up to theta h, equilibrium there."""
     stiffness = (x * theta) ** 2
     # theta^2 a_theta = -stiffness x_theta,  x_theta = x + theta x' + theta^2 (2 a + a_theta) / 6
     at_theta = -np.array([1.0, theta, theta**2 / 3.0]) * stiffness / (theta**2 * (1.0 + stiffness / 6.0))
@@ -191,12 +195,12 @@ def wilson_step(x: float, theta: float) -> Array:
 
 
 def highest_order(method: Method) -> int:
-    """The highest order of a multistep method's formulas; a run may limit it further."""
+    """Return the highest order of a multistep method's formulas; a run may limit it further."""
     return int(method.parameters["max_order"].high) if "max_order" in method.parameters else method.order
 
 
 def multistep_formula(method: Method, order: int | None) -> tuple[Array, Array]:
-    """Coefficients of the new and old values and of their derivatives, the newest first, padded to one length."""
+    """Return coefficients of new and old values and of their derivatives, the newest first, padded to one length."""
     highest = highest_order(method)
     if order is None or not (isinstance(order, int) and 1 <= order <= highest):
         raise InputError(
@@ -211,7 +215,10 @@ def multistep_formula(method: Method, order: int | None) -> tuple[Array, Array]:
 
 
 def _backward_differences(order: int, numerical: bool) -> tuple[Array, Array]:
-    """sum_m (1/m) D^m x_1 - kappa gamma D^(k+1) x_1 = h x_1', D x_1 = x_1 - x_0; kappa = 0 is Gear's formula."""
+    """Return the coefficients of sum_m (1/m) D^m x_1 - kappa gamma D^(k+1) x_1 = h x_1', D x_1 = x_1 - x_0.
+
+    kappa = 0 gives Gear's formula.
+    """
     difference = np.polynomial.Polynomial([1.0, -1.0])
     values = sum((difference**m / m for m in range(1, order + 1)), start=np.polynomial.Polynomial([0.0]))
     if numerical:
@@ -221,7 +228,10 @@ def _backward_differences(order: int, numerical: bool) -> tuple[Array, Array]:
 
 
 def _adams(order: int) -> tuple[Array, Array]:
-    """x_1 - x_0 = h times the integral of the polynomial through the newest `order` rates, the new one among them."""
+    """Return the coefficients of an Adams-Moulton formula.
+
+    x_1 - x_0 is h times the integral of the polynomial through the newest `order` rates, including the new one.
+    """
     nodes = 1.0 - np.arange(order)
     powers = np.arange(order)
     rates = np.linalg.solve(nodes[None, :] ** powers[:, None], 1.0 / (powers + 1.0))

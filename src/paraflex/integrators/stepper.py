@@ -1,4 +1,4 @@
-"""The interface of an external solver: take one step at a time, stop at a time, interpolate within the step."""
+"""Interface of an external solver: take one step at a time, stop at a time, interpolate within the step."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.integrators.forms import OdeForm
 
-# Times that differ by less than this fraction of the step are the same.
+# Times that differ by less than this fraction of the step count as equal.
 _SAME_TIME = 1e-9
 
 
 class SolverCounts(NamedTuple):
-    """Counts of the steps, as far as the solver reports them."""
+    """Counts of evaluations, rejected steps, iterations and factorisations, as far as the solver reports them."""
 
     evaluations: int
     rejected: int
@@ -23,12 +23,12 @@ class SolverCounts(NamedTuple):
     factorisations: int
 
     def __add__(self, other: SolverCounts) -> SolverCounts:  # type: ignore[override]
-        """Sum of both."""
+        """Return the sum of both counts."""
         return SolverCounts(*(a + b for a, b in zip(self, other, strict=True)))
 
 
 class Steps(NamedTuple):
-    """Limits of a solver's steps: the first and the longest [s], the highest order of a multistep method."""
+    """Limits of a solver's steps: the first and the largest step size [s], the highest order of a multistep method."""
 
     first: float
     longest: float
@@ -36,48 +36,48 @@ class Steps(NamedTuple):
 
 
 class Stepper(Protocol):
-    """A solver between steps."""
+    """Solver between steps."""
 
     form: OdeForm
 
     def begin(self, t: float, y: Array, stop: float) -> None:
-        """Start again from y at t towards a stop."""
+        """Restart from y at t towards a stop."""
         ...
 
     def step(self, stop: float) -> int:
-        """Take one step, to the stop or before it: PAUSED, or the reason of a failure."""
+        """Take one step, to the stop or before it; return PAUSED or the cause of a failure."""
         ...
 
     @property
     def t(self) -> float:
-        """The present time [s]."""
+        """Current time [s]."""
         ...
 
     @property
     def y(self) -> Array:
-        """The solution at the present time."""
+        """Solution at the current time."""
         ...
 
     def at(self, time: float) -> Array:
-        """The solution within the last step, by the solver's own interpolation."""
+        """Return the solution within the last step, by the solver's own interpolation."""
         ...
 
     def counts(self) -> SolverCounts:
-        """Counts since the run began."""
+        """Return the counts since the run began."""
         ...
 
 
 def attempts(times: Sequence[float], start: float, places: int) -> int:
-    """Number of steps attempted from the start, by the times at which equations were evaluated.
+    """Return the number of attempted steps from the times at which equations were evaluated.
 
     Parameters
     ----------
     times : sequence of float
-        Every attempt that is cut has others [s].
+        Times of the evaluations [s]; attempts with different step sizes have different times.
     start : float
-        Where they began [s]; evaluations there do not count.
+        Start of the attempts [s]; evaluations there do not count.
     places : int
-        Different times of one attempt.
+        Number of different times in one attempt.
     """
     later = np.array(times) - start
     later = later[later > 0.0]

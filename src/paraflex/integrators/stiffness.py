@@ -13,16 +13,16 @@ from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.method import Method
 from paraflex.integrators.run import Problem
 
-# Steps that are worth a warning.
+# Number of steps above which a warning is issued.
 MANY_STEPS = 20_000
-# Unknowns up to which all eigenvalues are found; beyond, the largest by Arnoldi's method.
+# Number of unknowns up to which all eigenvalues are computed; beyond, the largest one by Arnoldi's method.
 _MOST_DENSE = 600
 
 
 def largest_rate(form: OdeForm, problem: Problem) -> float:
-    """The largest eigenvalue of the ODE form's Jacobian at the start, in magnitude [1/s].
+    """Return the largest eigenvalue of the ODE form's Jacobian at the start, in magnitude [1/s].
 
-    Of the constrained mechanism, with springs, damping and Baumgarte's terms.
+    The Jacobian is that of the constrained mechanism, with springs, damping and Baumgarte's terms.
     """
     initial = problem.initial
     jacobian = form.jacobian(initial.time, form.pack(initial.time, initial.q, initial.v, 0.0))
@@ -37,7 +37,7 @@ def largest_rate(form: OdeForm, problem: Problem) -> float:
 
 
 def warn_if_stiff(form: OdeForm, problem: Problem, method: Method) -> None:
-    """Warn once of the number of steps that stability requires, if there are many."""
+    """Warn once of the number of steps that stability requires, if it is large."""
     if not method.explicit or method.stability_limit is None:
         return
     rate = largest_rate(form, problem)

@@ -18,21 +18,21 @@ from paraflex.integrators.guests import Guest
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PAUSED
 
-# The least relative tolerance that SUNDIALS recommends.
+# Smallest relative tolerance that SUNDIALS recommends.
 _RELATIVE = 1e-15
-# Return codes of both solvers: too much accuracy is asked for, error tests fail. Others are of Newton's iteration.
+# Return codes of both solvers: too much accuracy requested, error tests failed. Others concern Newton's iteration.
 _TOO_ACCURATE, _ERROR_TESTS = -2, -3
-# Unknowns from which on LAPACK's factorisation is faster than SUNDIALS' own.
+# Number of unknowns above which LAPACK's factorisation is faster than SUNDIALS' own.
 _LAPACK = 60
 
 
 def load_sundials() -> ModuleType:
-    """The package that runs SUNDIALS.
+    """Return the package that runs SUNDIALS.
 
     Raises
     ------
     InputError
-        It is not installed.
+        The package is not installed.
     """
     try:
         package = import_module("sksundae")
@@ -46,7 +46,7 @@ def load_sundials() -> ModuleType:
 
 
 class SundialsStepper:
-    """Common part of CVODE and IDA: see `Stepper`."""
+    """Common base of CVODE and IDA: see `Stepper`."""
 
     form: OdeForm
     t: float
@@ -60,13 +60,13 @@ class SundialsStepper:
         self.t, self.y = 0.0, np.zeros(0)
 
     def begin(self, t: float, y: Array, stop: float) -> None:
-        """See `Stepper`."""
+        """Restart from y at t towards a stop, see `Stepper`."""
         self.t, self.y, self._stop = t, y, stop
         options = {
             "rtol": _RELATIVE,
             "atol": self._tolerances,
             "first_step": min(self._steps.first, stop - t),
-            # Zero is no limit.
+            # Zero means no limit.
             "max_step": self._steps.longest if math.isfinite(self._steps.longest) else 0.0,
             "max_order": self._steps.order,
             "linsolver": "lapackdense" if y.size > _LAPACK else "dense",
@@ -75,11 +75,11 @@ class SundialsStepper:
         self._start(t, y)
 
     def step(self, stop: float) -> int:
-        """See `Stepper`."""
+        """Take one step and return a code, see `Stepper`."""
         self._stop, before = stop, self.t
         self._seen.clear()
         result = self._call(stop, "onestep")
-        # After a look back the first call only returns to where the last step ended.
+        # After an interpolation the first call only returns to the end of the last step.
         while result.status >= 0 and result.t <= before:
             result = self._call(stop, "onestep")
         tried = attempts(self._seen, before, 1)
@@ -93,15 +93,15 @@ class SundialsStepper:
         return PAUSED
 
     def at(self, time: float) -> Array:
-        """See `Stepper`."""
+        """Return the solution within the last step, by the solver's own interpolation."""
         return self._call(time, "normal").y
 
     def counts(self) -> SolverCounts:
-        """See `Stepper`. Every evaluation counts as an iteration; a factorisation is one with a new Jacobian."""
+        """Return the counts. Every evaluation counts as an iteration; a factorisation is one with a new Jacobian."""
         return self._counts
 
     def _call(self, time: float, method: str) -> Any:
-        # Failures are printed as well as returned.
+        # The solver prints failures as well as returning them.
         with contextlib.redirect_stdout(io.StringIO()):
             return self._solver.step(time, method=method, tstop=self._stop)
 
@@ -113,7 +113,7 @@ class SundialsStepper:
 
 
 class CvodeStepper(SundialsStepper):
-    """CVODE on the ODE form."""
+    """CVODE for the ODE form."""
 
     def __init__(self, method: Guest, form: OdeForm, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -136,7 +136,7 @@ class CvodeStepper(SundialsStepper):
 
 
 class IdaStepper(SundialsStepper):
-    """IDA on a form with multipliers."""
+    """IDA for a form with multipliers."""
 
     def __init__(self, form: DescriptorForm, *arguments: Any) -> None:
         super().__init__(*arguments)

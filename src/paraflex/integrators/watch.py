@@ -13,12 +13,12 @@ from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.integrators.methods import Treatment
 from paraflex.kernel.packed import Signals
 
-# With slopes this large no theory of small slopes is valid, and the run diverges [rad].
+# Largest slope [rad]: beyond it no theory of small slopes is valid, and the run diverges.
 _LARGEST_SLOPE = 2.0
-# Joints that are further apart than this part of the mechanism's size, or motions further off [rad], have come apart.
-# Where constraints depend on one another they contradict one another long before.
+# Gaps of joints above this part of the mechanism's size, or deviations of motions [rad], end a run. Dependent
+# constraints are contradictory at much smaller gaps.
 _GAPS, _CONTRADICTION = 7e-3, 7e-4
-# Multipliers that exert the same forces but for this fraction are the same.
+# Multipliers whose forces differ by less than this fraction are equivalent.
 _SAME_FORCES = 1e-9
 
 
@@ -30,7 +30,7 @@ class Breakdown(NamedTuple):
 
 
 def bent_too_far(system: System, q: Array) -> Breakdown | None:
-    """The beam whose slope exceeds the validity of the theory, and its slope; None if there is none."""
+    """Return a breakdown with the beam whose slope exceeds the validity of the theory, and its slope, or None."""
     if not np.max(np.abs(system.slope_rows @ q), initial=0.0) > _LARGEST_SLOPE:
         return None
     for body in system.bodies:
@@ -54,21 +54,24 @@ def come_apart(
     treatment: Treatment,
     largest: float,
 ) -> Breakdown | None:
-    """The constraints violated by more than errors of integration explain, and by how much; None if there are none.
+    """Return a breakdown if constraints are violated by more than errors of integration explain, or None.
 
     Parameters
     ----------
     system : System
+        System of the run.
     signals : Signals
+        Inputs of the run.
     t : float
-        [s]
+        Time [s].
     q : (n,) array
+        Coordinates at that time.
     dependent : int
-        Constraint rows that follow from others: nothing but their consistency holds them.
+        Number of constraint rows that depend on others: they hold only if they are consistent with these.
     tolerance : float
-        Of the run [m]; what it allows is no fault.
+        Tolerance of the run [m]; violations up to it are allowed.
     treatment : Treatment
-        What keeps the constraints in the run.
+        Treatment of the constraints in the run.
     largest : float
         Largest violation in the run so far [m, rad].
     """
@@ -90,10 +93,10 @@ def come_apart(
 
 
 def least_norm(system: System, q: Array, multipliers: Array, dependent: int) -> Array:
-    """Multipliers (k, m) at poses (k, n) with the least sum of squares, if a number of rows is dependent.
+    """Return multipliers (k, m) at poses (k, n) with the least sum of squares, if a number of rows is dependent.
 
-    They exert the same forces. Near a singular position other rows nearly depend on one another too, and none of them
-    can be told from the others: there multipliers stay as they are.
+    They exert the same forces. Near a singular position other rows are nearly dependent as well and cannot be
+    distinguished from the dependent ones: multipliers are not changed there.
     """
     if not dependent:
         return multipliers

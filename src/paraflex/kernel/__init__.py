@@ -1,18 +1,18 @@
-"""The compiled code: packed system, body terms, joint terms, linear algebra, stage solver, time loop.
+"""Compiled code: packed system, body terms, joint terms, linear algebra, stage solver, time loop.
 
-Small functions with one equation each, no allocation in the hot path. Every array a kernel writes belongs to a
-`Workspace` made once; every constant it reads to a `PackedSystem`. The NumPy twins of these formulas stand in the
-tests.
+Functions are small, one equation each, and allocate nothing in the hot path. Every array that a kernel writes belongs
+to a `Workspace`, which is made once; every constant that it reads belongs to a `PackedSystem`. NumPy versions of these
+formulas are in the tests.
 
-Arguments of one name are the same everywhere, n coordinates and m constraint rows:
+Arguments with the same name have the same meaning everywhere (n coordinates, m constraint rows):
 
     system, work            PackedSystem; its Workspace, of which `scratch` is a part
-    q, v, a, f, x           (n,) coordinates, their derivatives, generalised forces, a vector of that kind
-    lam, mu, rows           (m,) multipliers, changes of them, residuals of the constraint rows
-    phi, dphi               (m,) values of the constraints, their derivatives in time
-    torques                 (acting,) torques or forces of the motors at the instant, then of loads given in time
-    weights                 three floats, of Phi'', Phi' and Phi in the rows
+    q, v, a, f, x           (n,) coordinates, velocities, accelerations, generalised forces, a vector of that size
+    lam, mu, rows           (m,) multipliers, increments of the multipliers, residuals of the constraint rows
+    phi, dphi               (m,) values of the constraints, their time derivatives
+    torques                 (acting,) motor torques or forces at the current time, then those of time-dependent loads
+    weights                 three floats, the weights of Phi'', Phi' and Phi in the rows
     points                  sums over mass points, None for linear geometry
-    signals, tableau, controls, march   functions of time, the scheme, what the user chooses, the state of a run
-    i, k, r                 of a body, of a member or signal, of a row
+    signals, tableau, controls, march   time profiles, coefficients of the scheme, settings of the run, state of the run
+    i, k, r                 indices of a body, of a member or signal, of a row
 """

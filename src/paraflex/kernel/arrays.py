@@ -1,7 +1,8 @@
-"""Loops in place of slice expressions, which Numba compiles sooner; and padded arrays.
+"""Element-wise loops, which Numba compiles faster than slice expressions, and padded arrays.
 
-A compiled loop asks whether what it writes lies close to what it reads, and if so takes another way, which rounds
-differently. Small arrays lie close or not as it happens: runs would differ by rounding from one to the next.
+A compiled loop checks whether the memory it writes lies close to the memory it reads, and if so runs another version of
+the loop, which rounds differently. Whether small arrays lie close depends on the allocator, so without padding repeated
+runs would differ by rounding.
 """
 
 from __future__ import annotations
@@ -14,26 +15,26 @@ from numpy.typing import NDArray
 
 from paraflex.kernel.compiling import routine
 
-# Entries before and behind an array that nobody uses: more than a loop does at once.
+# Unused entries before and after an array: more than a vectorised loop processes at once.
 ROOM = 128
 
 
 def apart(shape: int | tuple[int, ...], dtype: type = float) -> NDArray[Any]:
-    """Zeros of a shape, padded on both sides."""
+    """Return an array of zeros of a given shape, padded on both sides in memory."""
     count = shape if isinstance(shape, int) else prod(shape)
     return np.zeros(count + 2 * ROOM, dtype)[ROOM : ROOM + count].reshape(shape)
 
 
 @routine
 def fill(x, value):
-    """Set every entry of a vector."""
+    """Set every entry of a vector to a value."""
     for i in range(x.size):
         x[i] = value
 
 
 @routine
 def copy(x, to):
-    """Copy a vector."""
+    """Copy a vector to another."""
     for i in range(x.size):
         to[i] = x[i]
 
@@ -47,7 +48,7 @@ def add(x, to):
 
 @routine
 def largest(x):
-    """Largest magnitude in a vector; zero for an empty one."""
+    """Return the largest magnitude in a vector, zero for an empty one."""
     size = 0.0
     for i in range(x.size):
         size = max(size, abs(x[i]))

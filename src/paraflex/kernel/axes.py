@@ -1,10 +1,11 @@
-"""Joints along a line: a point of one body measured along an axis that another carries.
+"""Joints along a line: a point of one body measured along an axis that another body carries.
 
-With d = p_b - p_a and the unit vector e at the angle theta of marker a (and a constant), the value is e . d, and with
-n = E e: rate e . d' + theta' n . d, second derivative e . d'' + 2 theta' n . d' + theta'' n . d - theta'^2 e . d. A
-slot holds the value of the normal at zero; motors, springs and prescribed motions of a prismatic joint take its travel.
-A sliding joint holds the normal's value at the deflection of the beam below the point: a *track*, W(x) u.
-A distance joint holds the value |d| of an axis *between* its points: e = d/|d|, theta' = e x d'/|d|, n . d = 0.
+Let d = p_b - p_a, e the unit vector at the angle theta (that of marker a plus a constant), and n = E e. The value of
+the axis is e . d, its rate e . d' + theta' n . d, and its second derivative e . d'' + 2 theta' n . d' + theta'' n . d -
+theta'^2 e . d. A slot keeps the value along the normal at zero; motors, springs and prescribed motions of a prismatic
+joint act on its travel. A sliding joint keeps the value along the normal equal to the deflection W(x) u of the beam
+below the point, a *track*. A distance joint prescribes the value |d| of an axis *between* its points: e = d/|d|, theta'
+= e x d'/|d|, n . d = 0.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from paraflex.kernel.packed import CONSTRAINT
 
 @inlined
 def line_turn(dx, dy, ux, uy):
-    """Rate at which a line d turns where it changes at the rate u; zero where it has no direction."""
+    """Return the angular velocity of a line d with the rate of change u; zero for a line of zero length."""
     square = dx * dx + dy * dy
     return (dx * uy - dy * ux) / square if square > 0.0 else 0.0
 
 
 @inlined
 def axis_frame(system, axis, q, v, a):
-    """Geometry of an axis: d and its two derivatives, the angle theta and its two, and R s of both ends."""
+    """Return the geometry of an axis: d and the angle theta with two derivatives each, and R s of both ends."""
     pax, pay, vax, vay, aax, aay, rax, ray = end_motion(system, axis.a, axis.ax, axis.ay, q, v, a)
     pbx, pby, vbx, vby, abx, aby, rbx, rby = end_motion(system, axis.b, axis.bx, axis.by, q, v, a)
     theta, w, dw = axis.angle, 0.0, 0.0
@@ -34,14 +35,14 @@ def axis_frame(system, axis, q, v, a):
         theta += angle
     d = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
     if axis.between:
-        # The second derivative of theta has no share in the value's, as n . d is zero.
+        # The second derivative of the value does not depend on that of theta, as n . d is zero.
         theta, w, dw = atan2(d[1], d[0]), line_turn(d[0], d[1], d[2], d[3]), 0.0
     return d, theta, w, dw, rax, ray, rbx, rby
 
 
 @inlined
 def component(ex, ey, d, w, dw):
-    """Value, rate and second derivative of e . d, and n . d, where e turns at the rate w."""
+    """Return value, rate and second derivative of e . d, and n . d, for a vector e with the angular velocity w."""
     dx, dy, ux, uy, bx, by = d
     value, lever = ex * dx + ey * dy, ex * dy - ey * dx
     rate = ex * ux + ey * uy + w * lever
@@ -51,10 +52,10 @@ def component(ex, ey, d, w, dw):
 
 @routine
 def axis_motion(system, k, q, v, a):
-    """Motion of axis k: value, rate and acceleration, e, n . d, R s of both ends, and the place on its track.
+    """Return value, rate and acceleration of axis k, e, n . d, R s of both ends, and the place on its track.
 
-    On a track the value is that of the normal less the deflection W(x) u where the point stands: to first order
-    e becomes e + (W' u) E e, and the flexible coordinates take -W.
+    On a track the value is that along the normal less the deflection W(x) u at the point's place: to first order e
+    becomes e + (W' u) E e, and the flexible coordinates have the coefficients -W.
     """
     axis = system.axes[k]
     d, theta, w, dw, rax, ray, rbx, rby = axis_frame(system, axis, q, v, a)
@@ -62,7 +63,7 @@ def axis_motion(system, k, q, v, a):
     value, rate, acceleration, lever = component(ex, ey, d, w, dw)
     x = 0.0
     if axis.track >= 0:
-        # e is the normal of the beam's axis, (ey, -ex) points along it.
+        # e is normal to the beam's axis, (ey, -ex) points along it.
         x, dx, ddx, across = component(ey, -ex, d, w, dw)
         W_u, slope, bend, _ = track_deflection(system, axis, x, q)
         W_v, slope_v, _, _ = track_deflection(system, axis, x, v)
@@ -77,9 +78,9 @@ def axis_motion(system, k, q, v, a):
 
 @inlined
 def track_piece(system, axis, x):
-    """Body of an axis's track, first coefficient of the piece at x, and distance from the piece's start.
+    """Return the body of an axis's track, the first coefficient of the piece at x, and the distance from its start.
 
-    The end pieces extend beyond the ends.
+    The end pieces are extrapolated beyond the ends.
     """
     track, owner, piece = system.tracks[axis.track], system.markers[axis.a].body, 0
     while piece < track.pieces - 1 and x > system.track_breaks[track.first + piece + 1]:
@@ -90,7 +91,7 @@ def track_piece(system, axis, x):
 
 @inlined
 def track_row(system, at, stride, z):
-    """One entry of W and its three derivatives: a polynomial of degree five in z, coefficients `stride` apart."""
+    """Return one entry of W and its three derivatives: a quintic polynomial in z, with coefficients `stride` apart."""
     value, slope, bend, third = 0.0, 0.0, 0.0, 0.0
     for power in range(5, -1, -1):
         third = third * z + 3.0 * bend
@@ -102,7 +103,7 @@ def track_row(system, at, stride, z):
 
 @routine
 def track_deflection(system, axis, x, vector):
-    """W(x) of a track, and its three derivatives, times the flexible part of a system vector."""
+    """Return W(x) of a track and its three derivatives, times the flexible part of a system vector."""
     owner, at, z = track_piece(system, axis, x)
     body = system.bodies[owner]
     total, slope, bend, third = 0.0, 0.0, 0.0, 0.0
@@ -141,7 +142,7 @@ def apply_axis(system, k, q, force, ex, ey, lever, rax, ray, rbx, rby, x, f):
 
 @kernel
 def apply_axes(system, q, v, a, lam, weights, torques, f, rows):
-    """Add the rows of all axes and their forces to rows and f, and subtract the forces of motors along them from f."""
+    """Add the rows of all axes to rows and their forces to f, and subtract the forces of motors along axes from f."""
     for k in range(system.axes.size):
         axis = system.axes[k]
         value, rate, acceleration, ex, ey, lever, rax, ray, rbx, rby, x = axis_motion(system, k, q, v, a)
@@ -167,7 +168,7 @@ def axis_values(system, q, v, phi, dphi):
 
 @routine
 def fill_axis_rows(system, q, jacobian):
-    """Rows of the axes that are constraints into a dense Jacobian."""
+    """Add the rows of the axes that are constraints to a dense Jacobian."""
     for k in range(system.axes.size):
         row, weight = system.axes[k].row, system.axes[k].weight
         if row >= 0:
@@ -178,7 +179,7 @@ def fill_axis_rows(system, q, jacobian):
 
 @routine
 def turn_axes(system, q, axes):
-    """Direction and lever of every axis at q, for the iteration matrix, and places of sliding points."""
+    """Compute direction and lever of every axis at q, for the iteration matrix, and the places of sliding points."""
     for k in range(system.axes.size):
         _, _, _, ex, ey, lever, _, _, _, _, x = axis_motion(system, k, q, q, q)
         axes[k, 0], axes[k, 1], axes[k, 2], axes[k, 3] = ex, ey, lever, x
@@ -186,7 +187,7 @@ def turn_axes(system, q, axes):
 
 @routine
 def axis_power(system, q, v, torques):
-    """Power of the motors along axes."""
+    """Return the power of the motors along axes."""
     power = 0.0
     for k in range(system.axes.size):
         if system.axes[k].row < 0:

@@ -1,8 +1,8 @@
-"""Bodies of second-order geometry: sums over mass points. Dense iteration matrices, also those of coupled damping.
+"""Bodies of second-order geometry, by sums over mass points; dense iteration matrices, also those of coupled damping.
 
-A mass point stands at s = x0 + N u - 1/2 e_x f, f = sum_j W_j (N2'_j u)^2 over the Gauss points j that it reaches, and
-its forces on (r, phi, u) are m p'', m (R E s).p'', m (ds/du)^T R^T p'' with the p'' of any point. The mass matrix is
-the sum of m J^T J: positive definite however large the deflection.
+A mass point has the position s = x0 + N u - 1/2 e_x f in the body frame, with f = sum_j W_j (N2'_j u)^2 over the Gauss
+points j between it and the first end. Its forces on (r, phi, u) are m p'', m (R E s).p'' and m (ds/du)^T R^T p'', with
+p'' as for any point. The mass matrix is the sum of m J^T J, which is positive definite however large the deflection.
 """
 
 from __future__ import annotations
@@ -17,14 +17,17 @@ from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, padded
 
 @inlined
 def place_sums(system, i, q, v, a, points):
-    """Nx u, Ny u and slopes of all mass points of body i, and the same of u' and u''."""
+    """Compute Nx u, Ny u and the slopes of all mass points of body i, and the same for u' and u''."""
     body = system.bodies[i]
     column_sums(system.places, body.places, 3 * body.pitch, body.nf, body.offset + 3, q, v, a, points)
 
 
 @inlined
 def second_order_equations(system, i, q, v, a, f, points):
-    """M q'' + h + K u of body i, less its weight, into f; axial inertia forces at Gauss points into points.axial."""
+    """Compute M q'' + h + K u of body i, less its weight, into f.
+
+    Axial inertia forces at Gauss points are left in points.axial.
+    """
     body = system.bodies[i]
     o, n, pitch = body.offset, body.nf, body.pitch
     e = o + 3
@@ -62,14 +65,14 @@ def second_order_equations(system, i, q, v, a, f, points):
 
 @inlined
 def masses(system, i, block):
-    """Masses and moments of inertia of eight mass points."""
+    """Return masses and moments of inertia of eight mass points."""
     at, pitch = system.bodies[i].inertias + block, system.bodies[i].pitch
     return load(system.inertias, at + pitch), load(system.inertias, at + 2 * pitch)
 
 
 @inlined
 def shortened(system, i, block, points):
-    """S_x of eight mass points with two derivatives in the body frame, less the shortening, by their sums."""
+    """Return s_x of eight mass points, shortened by bending, and two derivatives in the body frame, from their sums."""
     body = system.bodies[i]
     pitch = body.pitch
     sx = add_scaled(load(system.inertias, body.inertias + block), load(points.q, block), 1.0)
@@ -86,7 +89,7 @@ def shortened(system, i, block, points):
 
 @routine
 def second_order_shortening(system, i, q, points):
-    """Sum of m f/2 over the mass points of body i: shift of its first moment by bending."""
+    """Return the sum of m f/2 over the mass points of body i: the shift of its first moment by bending."""
     body = system.bodies[i]
     pitch, total = body.pitch, 0.0
     place_sums(system, i, q, q, q, points)
@@ -101,7 +104,7 @@ def second_order_shortening(system, i, q, points):
 
 @inlined
 def second_order_energy(system, i, q, v, points):
-    """Kinetic and strain energy of body i."""
+    """Return kinetic and strain energy of body i."""
     body = system.bodies[i]
     o, n, pitch = body.offset, body.nf, body.pitch
     e = o + 3
@@ -109,7 +112,7 @@ def second_order_energy(system, i, q, v, points):
     w = v[o + 2]
     rx, ry = c * v[o] + s * v[o + 1], c * v[o + 1] - s * v[o]
     place_sums(system, i, q, v, v, points)
-    # Twice the energy: of the origin's motion, of motion against it, and of the two together.
+    # Twice the energy: of the origin's motion, of motion relative to it, and of their product.
     total, together_x, together_y, square = zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
         y, slope = pitch + block, 2 * pitch + block
@@ -131,7 +134,7 @@ def second_order_energy(system, i, q, v, points):
 
 @routine
 def second_order_mass(system, i, q, work, points):
-    """Mass matrix of body i in its own frame into work.mass, all of it: the sum of m J^T J, J = [1, E s, ds/du].
+    """Compute the full mass matrix of body i in its frame into work.mass: the sum of m J^T J, J = [1, E s, ds/du].
 
     `points` is work.scratch.points.
     """
@@ -162,7 +165,10 @@ def second_order_mass(system, i, q, work, points):
 
 @inlined
 def second_order_mass_row(system, i, l, mass, points):
-    """The row of flexible coordinate l up to its diagonal; s_x of the points is in points.shares, s_y in points.q."""
+    """Compute the row of flexible coordinate l up to its diagonal.
+
+    On entry points.shares holds s_x of the points, and points.q holds s_y.
+    """
     body = system.bodies[i]
     pitch, width = body.pitch, 3 + body.nf
     row, place = body.dense + (3 + l) * width, body.places + 3 * pitch * l
@@ -198,13 +204,13 @@ def second_order_mass_row(system, i, l, mass, points):
 
 @routine
 def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
-    """Geometric stiffness of body i into work.geometric: from its inertia forces and its joints' axial forces.
+    """Compute the geometric stiffness of body i, from its inertia forces and its joints' axial forces.
 
-    `points` and `geometric` are those of work.
+    The result is written to work.geometric. `points` and `geometric` are those of work.
     """
     body = system.bodies[i]
     n, at, pitch = body.nf, body.square, body.pitch
-    # Only the axial forces at the Gauss points are wanted.
+    # Only the axial forces at the Gauss points are used.
     second_order_equations(system, i, q, v, a, work.f, points)
     for j in range(body.slopes, pitch):
         points.axial[j] = 0.0
@@ -233,7 +239,10 @@ def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
 
 @kernel
 def note_all_axial_forces(system, q, v, a, lam, work, geometric):
-    """Geometric stiffness of every body for the next factor into work.geometric; that is None for linear geometry."""
+    """Compute the geometric stiffness of every body for the next factor into work.geometric.
+
+    `geometric` is work.geometric, None for linear geometry.
+    """
     if geometric is None:
         return
     for i in range(system.bodies.size):
@@ -256,7 +265,7 @@ def subtract_geometric(system, i, geometric, scale, u, x):
 
 @routine
 def linear_mass(system, i, work):
-    """Mass matrix of body i of linear geometry into work.mass, from the data of `factor.factor_body`."""
+    """Compute the mass matrix of body i of linear geometry into work.mass, from the data of `factor.factor_body`."""
     body = system.bodies[i]
     n, k, width, at = body.nf, body.flex, 3 + body.nf, body.dense
     sx, sy, inertia = work.frame[i, 2], work.frame[i, 3], work.frame[i, 4]
@@ -275,10 +284,10 @@ def linear_mass(system, i, work):
 
 @routine
 def factor_dense_body(system, i, b, q, work, dense):
-    """Mass matrix of body i and Cholesky factor of M + g D + b (K + K_g), g^2 = b; without K_g if not definite.
+    """Compute the mass matrix of body i and the Cholesky factor of M + g D + b (K + K_g), g^2 = b.
 
-    Diagonals of the factor hold reciprocals. Returns whether the body's matrix is dense; `dense` is work.dense, None
-    where no body's is.
+    K_g is left out if the sum with it is not positive definite. Diagonals of the factor hold reciprocals. Returns
+    whether the body's matrix is dense; `dense` is work.dense, None if no body has a dense matrix.
     """
     if dense is None:
         return False
@@ -323,7 +332,7 @@ def factor_dense_body(system, i, b, q, work, dense):
 
 @routine
 def solve_dense(system, i, dense, source, target, at, pitch):
-    """(M + b (K + K_g))^-1 times eight columns of a matrix with rows `pitch` apart, from `at` on."""
+    """Multiply eight columns of a matrix, from `at` on and with rows `pitch` apart, by (M + b (K + K_g))^-1."""
     width, first = 3 + system.bodies[i].nf, system.bodies[i].dense
     for r in range(width):
         total = load(source, at + r * pitch)
@@ -339,9 +348,10 @@ def solve_dense(system, i, dense, source, target, at, pitch):
 
 @routine
 def respond_dense(system, i, work, dense, inverse):
-    """Response of body i to its constraint rows into work.response, and the inverse of its iteration matrix.
+    """Compute the response of body i to its constraint rows, and the inverse of its iteration matrix.
 
-    `dense` and `inverse` are those of `work`, None where no body's matrix is dense.
+    They are written to work.response and work.inverse. `dense` and `inverse` are those of `work`, None if no body has a
+    dense matrix.
     """
     if inverse is None:
         return
@@ -359,9 +369,9 @@ def respond_dense(system, i, work, dense, inverse):
 
 @inlined
 def inverse_times(system, i, inverse, y, x):
-    """(M + b (K + K_g))^-1 x of body i in place, in its body frame; y is scratch.
+    """Multiply x by (M + b (K + K_g))^-1 of body i in place, in its body frame; y is scratch.
 
-    `inverse` is work.inverse, None where no body's matrix is dense.
+    `inverse` is work.inverse, None if no body has a dense matrix.
     """
     if inverse is None:
         return
@@ -378,7 +388,7 @@ def inverse_times(system, i, inverse, y, x):
 
 @routine
 def second_order_mass_times(system, i, mass, product, x):
-    """M x of body i in place, in its body frame."""
+    """Multiply x by M of body i in place, in its body frame; `product` is scratch."""
     body = system.bodies[i]
     o, width = body.offset, 3 + body.nf
     for r in range(width):
@@ -392,7 +402,7 @@ def second_order_mass_times(system, i, mass, product, x):
 
 @routine
 def second_order_mass_square(system, i, mass, x, x0, x1):
-    """x^T M x of body i, with the translational part turned to its frame: x0, x1."""
+    """Return x^T M x of body i, where x0 and x1 are the translational part in its frame."""
     body = system.bodies[i]
     o, width, at = body.offset, 3 + body.nf, body.dense
     square = 0.0

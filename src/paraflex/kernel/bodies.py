@@ -1,7 +1,7 @@
 """Terms of one body: M q'' + h + D u' + K u, kinetic and strain energy (formulation of Eqs. 13-36 in closed form).
 
 Flexible coordinates are mass-normalised modes of the body in its frame, so M_ff = 1 and K = diag(omega^2). Damping is
-diagonal where the body's joints hold it as its frame does.
+diagonal if the body's joints hold it as its frame does.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 @inlined
 def linear_terms(system, i, q, v, a, f, scratch):
-    """M q'' + h + D u' + K u of body i by its sums, without the shares: see `begin_body`."""
+    """Compute M q'' + h + D u' + K u of body i from its sums, except for the shares: see `begin_body`."""
     body = system.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
     c, s = scratch.turn[0], scratch.turn[1]
     w, dw = v[o + 2], a[o + 2]
-    # Gravity acts as a frame that is accelerated upwards.
+    # Gravity is equivalent to an upward acceleration of the frame.
     gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
     # First moments s; S2 u' and S2 u''.
@@ -57,9 +57,10 @@ def linear_terms(system, i, q, v, a, f, scratch):
 
 @inlined
 def begin_body(system, i, q, v, a, f, scratch, points):
-    """M q'' + h + D u' + K u of body i, less its weight, into f, without the shares in scratch.
+    """Compute M q'' + h + D u' + K u of body i, less its weight, into f, except for the shares in scratch.
 
-    Joints and motors add theirs, and `sums.hand_on` ends it. `points` is scratch.points, None for linear geometry.
+    Joints and motors add their shares, and `sums.hand_on` distributes them. `points` is scratch.points, None for linear
+    geometry.
     """
     body_sums(system, i, q, v, a, scratch)
     clear_shares(system, i, scratch)
@@ -92,16 +93,16 @@ def add_coupled_damping(system, i, v, f, scratch):
 
 @kernel
 def body_terms(system, i, q, v, a, f, scratch):
-    """M q'' + h + D u' + K u of body i, less its weight, into f; the translational part in the ground frame."""
+    """Compute M q'' + h + D u' + K u of body i, less its weight, into f; the translational part in the ground frame."""
     begin_body(system, i, q, v, a, f, scratch, scratch.points)
     hand_on(system, i, scratch, f)
 
 
 @kernel
 def motion_forces(system, q, v, a, torques, f, scratch):
-    """M q'' + h + K u of the whole system at every instant of a motion, less weight and loads, into f.
+    """Compute M q'' + h + K u of the whole system at every sample of a motion, less weight and loads, into f.
 
-    q, v, a, f : (instants, n) arrays; torques : (instants, acting) array, of loads that are given in time.
+    q, v, a, f : (instants, n) arrays; torques : (instants, acting) array with the values of time-dependent loads.
     """
     for k in range(q.shape[0]):
         for i in range(system.bodies.size):
@@ -112,13 +113,13 @@ def motion_forces(system, q, v, a, torques, f, scratch):
 
 @kernel
 def weight_work(system, q, scratch):
-    """Work of gravity since all mass was at the origin of the ground frame: g . sum m p."""
+    """Return the work of gravity relative to all mass at the origin of the ground frame: g . sum m p."""
     return add_weights(system, q, scratch.points)
 
 
 @inlined
 def add_weights(system, q, points):
-    """Work of the weight of all bodies, as in `weight_work`; `points` as for `begin_body`."""
+    """Return the work of the weight of all bodies, as in `weight_work`; `points` as for `begin_body`."""
     total = 0.0
     if system.gravity[0] == 0.0 and system.gravity[1] == 0.0:
         return total
@@ -140,7 +141,7 @@ def add_weights(system, q, points):
 
 @kernel
 def body_energy(system, i, q, v, scratch):
-    """Kinetic and strain energy of body i."""
+    """Return kinetic and strain energy of body i."""
     body = system.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
@@ -165,13 +166,13 @@ def body_energy(system, i, q, v, scratch):
 
 @kernel
 def system_energy(system, q, v, scratch):
-    """Kinetic and strain energy of the system."""
+    """Return kinetic and strain energy of the system."""
     return add_energies(system, q, v, scratch, scratch.points)
 
 
 @inlined
 def add_energies(system, q, v, scratch, points):
-    """Energies of all bodies; `points` as for `begin_body`."""
+    """Return kinetic and strain energy of all bodies; `points` as for `begin_body`."""
     kinetic, strain = 0.0, 0.0
     for i in range(system.bodies.size):
         if points is None:
@@ -187,7 +188,7 @@ def add_energies(system, q, v, scratch, points):
 
 @kernel
 def stored_energy(system, q, v, lam, scratch):
-    """Kinetic energy, strain energy with that of springs, and work of gravity: see `weight_work`."""
+    """Return the kinetic energy, the strain energy including springs, and the work of gravity: see `weight_work`."""
     kinetic, strain = system_energy(system, q, v, scratch)
     strain += spring_energy(system, lam) + line_energy(system, q, v)[0]
     return kinetic, strain, weight_work(system, q, scratch)

@@ -1,4 +1,4 @@
-"""Closure of a mechanism with a given motion of the end-effector: positions, velocities and accelerations."""
+"""Closure of a mechanism for a given motion of the end-effector: positions, velocities and accelerations."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ from paraflex.kernel.joints import (
 from paraflex.kernel.packed import INDEX_1, PackedSystem, Scratch, make_scratch
 
 MAX_ITERATIONS = 20
-# So many of them with the factors of the instant before.
+# Number of iterations with the factors of the previous sample.
 CHORDS = 8
-# Newton has converged when no body turns by more than this [rad], nor shifts by this part of the mechanism's size.
+# Newton's iteration has converged if no body turns by more than this [rad], or shifts by more than this part of the
+# mechanism's size.
 SMALLEST_MOVE = 1e-13
-# A body that turns this much against its prediction [rad], or shifts by this many sizes of the mechanism, may have
-# jumped to another assembly.
+# A body that deviates from its prediction by a larger rotation [rad], or by a shift of this many sizes of the
+# mechanism, may have jumped to another assembly.
 LARGEST_TURN, LARGEST_SHIFT = 0.3, 1.2
-# A pivot below this fraction of the largest entry of the Jacobian without dimension is a singular position.
+# A pivot below this fraction of the largest entry of the dimensionless Jacobian marks a singular position.
 SINGULAR_PIVOT = 1e-11
 LOOPS_CLOSED, LOOPS_OPEN, TOO_COARSE, LOOPS_SINGULAR = range(4)
 
@@ -39,22 +40,22 @@ LOOPS_CLOSED, LOOPS_OPEN, TOO_COARSE, LOOPS_SINGULAR = range(4)
 class ClosureScratch(NamedTuple):
     """Work arrays of the closure."""
 
-    single: NDArray[np.float64]  # (n, 1) residual of positions, then what they move by; the same of accelerations
-    right: NDArray[np.float64]  # (n, 1 + tasks) of velocities and the basis
-    jacobian: NDArray[np.float64]  # (n, n) at this instant, without dimension
-    before: NDArray[np.float64]  # and at the instant before
-    factors: NDArray[np.float64]  # of `before`
+    single: NDArray[np.float64]  # (n, 1) residual of positions, then their correction; also for accelerations
+    right: NDArray[np.float64]  # (n, 1 + tasks) right-hand sides of velocities and the basis
+    jacobian: NDArray[np.float64]  # (n, n) dimensionless Jacobian at this sample
+    before: NDArray[np.float64]  # (n, n) dimensionless Jacobian at the previous sample
+    factors: NDArray[np.float64]  # (n, n) factors of `before`
     order: NDArray[np.int64]
-    fresh: NDArray[np.float64]  # factors at the pose reached
+    fresh: NDArray[np.float64]  # (n, n) factors at the current pose
     fresh_order: NDArray[np.int64]
     change: NDArray[np.float64]  # (n, n)
     here: NDArray[np.float64]  # (3, tasks) task coordinates, their rates and accelerations
     phi: NDArray[np.float64]  # (m,)
     dphi: NDArray[np.float64]
-    lam: NDArray[np.float64]  # zero, as all that follows
+    lam: NDArray[np.float64]  # (m,) zero, like `zero` and `idle`
     zero: NDArray[np.float64]  # (n,)
-    idle: NDArray[np.float64]  # (signals,) motors do not matter here, but those along an axis read their force
-    unused: NDArray[np.float64]  # (n,) not zero: forces nobody asks for
+    idle: NDArray[np.float64]  # (signals,) motors have no effect here, but axes read their forces
+    unused: NDArray[np.float64]  # (n,) forces that are not used
     body: Scratch
 
 
@@ -73,9 +74,9 @@ def make_closure_scratch(system: PackedSystem, tasks: int, signals: int) -> Clos
 
 @unoptimised
 def task_values(system, marker, coordinates, q, v, a, out):
-    """Value, rate and acceleration of each task coordinate (0 x, 1 y, 2 angle) of a marker, into out (3, tasks).
+    """Compute value, rate and acceleration of each task coordinate of a marker into out (3, tasks).
 
-    `coordinates` (tasks,) are 0, 1 or 2.
+    `coordinates` (tasks,) are 0 for x, 1 for y, 2 for the angle.
     """
     px, py, vx, vy, ax, ay, _, _ = marker_motion(system, marker, q, v, a)
     for i in range(coordinates.size):
@@ -89,7 +90,7 @@ def task_values(system, marker, coordinates, q, v, a, out):
 
 @routine
 def closure_jacobian(system, marker, coordinates, q, jacobian):
-    """[Phi_q; task_q] at q."""
+    """Compute [Phi_q; task_q] at q."""
     m = system.rows.size
     fill_jacobian(system, q, jacobian)
     for i in range(coordinates.size):
@@ -105,7 +106,7 @@ def closure_jacobian(system, marker, coordinates, q, jacobian):
 
 @routine
 def row_unit(system, coordinates, r):
-    """Unit of row r: the size of the mechanism for a length, 1 for an angle."""
+    """Return the unit of row r: the size of the mechanism for a length, 1 for an angle."""
     if r < system.rows.size:
         return system.rows[r].unit
     return 1.0 if coordinates[r - system.rows.size] == 2 else system.size
@@ -113,7 +114,10 @@ def row_unit(system, coordinates, r):
 
 @routine
 def scaled_jacobian(system, marker, coordinates, q, jacobian):
-    """[Phi_q; task_q] at q without dimension: rows in their units, places of bodies in sizes of the mechanism."""
+    """Compute the dimensionless [Phi_q; task_q] at q.
+
+    Rows are in their units, positions of bodies in sizes of the mechanism.
+    """
     closure_jacobian(system, marker, coordinates, q, jacobian)
     for r in range(jacobian.shape[0]):
         unit = row_unit(system, coordinates, r)
@@ -126,7 +130,7 @@ def scaled_jacobian(system, marker, coordinates, q, jacobian):
 
 @routine
 def solve_scaled(system, coordinates, factors, order, right):
-    """Solve for coordinates [m, rad] with the factors of a Jacobian without dimension, in place."""
+    """Solve for coordinates [m, rad] with the factors of a dimensionless Jacobian, in place."""
     for r in range(right.shape[0]):
         unit = row_unit(system, coordinates, r)
         for k in range(right.shape[1]):
@@ -140,7 +144,7 @@ def solve_scaled(system, coordinates, factors, order, right):
 
 @routine
 def largest_shift(system, x):
-    """The largest change of place among changes of coordinates, in sizes of the mechanism."""
+    """Return the largest change of position among changes of coordinates, in sizes of the mechanism."""
     shift = 0.0
     for i in range(system.bodies.size):
         first = system.bodies[i].offset
@@ -150,7 +154,7 @@ def largest_shift(system, x):
 
 @routine
 def largest_turn(system, x):
-    """The largest rotation of a body among changes of coordinates [rad]."""
+    """Return the largest rotation of a body among changes of coordinates [rad]."""
     turn = 0.0
     for i in range(system.bodies.size):
         turn = max(turn, abs(x[system.bodies[i].offset + 2]))
@@ -159,11 +163,11 @@ def largest_turn(system, x):
 
 @routine
 def relative_change(work):
-    """Norm of before^-1 (jacobian - before): below one, no matrix between the two is singular.
+    """Return the norm of before^-1 (jacobian - before): below one, no matrix between the two is singular.
 
-    Assemblies meet where the Jacobian is singular, and a step over that may end in another one; a step that is short
-    enough does not, and no step is short enough that passes a singularity. A determinant would not tell: two loops may
-    be singular at once, as are an arm and the parallelogram beside it.
+    Assemblies meet where the Jacobian is singular, and a step across such a position may end in another assembly. A
+    step that is short enough does not, and no step across a singularity is short enough. The sign of the determinant is
+    not sufficient: two loops may be singular at once, such as an arm and the parallelogram beside it.
     """
     n, columns = work.jacobian.shape[0], 0
     for j in range(n):
@@ -171,7 +175,7 @@ def relative_change(work):
         for i in range(n):
             work.change[i, columns] = work.jacobian[i, j] - work.before[i, j]
             moves = moves or work.change[i, columns] != 0.0
-        # Most columns are the same in every position.
+        # Most columns are the same in all positions.
         if moves:
             columns += 1
     change = work.change[:, :columns]
@@ -187,9 +191,10 @@ def relative_change(work):
 
 @routine
 def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
-    """Close the loops at one instant by Newton's method, from the pose in q; whether they close, and the gap left.
+    """Close the loops at one time by Newton's method, from the pose in q; return the status and the remaining gap.
 
-    `known` says that work.factors hold those of a pose nearby, which serve as long as they do it quickly.
+    `known` is True if work.factors are those of a pose nearby; they are used as long as the iteration converges
+    quickly.
     """
     gap = 0.0
     for iteration in range(MAX_ITERATIONS):
@@ -217,7 +222,7 @@ def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
 
 @routine
 def move_loops(system, signals, marker, coordinates, t, target, q, v, a, basis, work):
-    """Velocities, accelerations and basis of closed loops, with the factors at their pose."""
+    """Compute velocities, accelerations and basis of closed loops, with the factors at their pose."""
     m, tasks = work.phi.size, coordinates.size
     constraint_values(system, signals, t, q, work.zero, work.body, work.phi, work.dphi)
     for r in range(q.size):
@@ -232,7 +237,7 @@ def move_loops(system, signals, marker, coordinates, t, target, q, v, a, basis, 
         v[j] = work.right[j, 0]
         for i in range(tasks):
             basis[j, i] = work.right[j, 1 + i]
-    # The part of Phi'' and of the task's acceleration that does not depend on the accelerations.
+    # Part of Phi'' and of the task's acceleration that does not depend on the accelerations.
     start_rows(system, signals, t, INDEX_1, work.phi)
     for i in range(system.bodies.size):
         body_joints(system, i, q, v, work.zero, work.lam, INDEX_1, work.body, work.unused, work.phi)
@@ -249,23 +254,25 @@ def move_loops(system, signals, marker, coordinates, t, target, q, v, a, basis, 
 
 @releases_lock
 def close_path(system, signals, marker_index, coordinates, times, target, q, v, a, basis, work):
-    """Close the loops along a path, each instant starting from the one before.
+    """Close the loops along a path, starting at each sample from the previous one.
 
     Parameters
     ----------
     target : (times, 3, tasks) array
         Task coordinates, their rates and accelerations.
     q, v, a : (times, n) arrays
-        Written; q[0] holds the pose to start from.
+        Coordinates, velocities and accelerations. Written; q[0] holds the starting pose.
     basis : (times, n, tasks) array
-        Written: coordinates' change per change of the task coordinates, the null space of Phi_q in task terms.
+        Change of the coordinates per change of the task coordinates, the null space of Phi_q in task coordinates.
+        Written.
     work : ClosureScratch
+        Work arrays.
 
     Returns
     -------
     status, index, residual
-        Index of the last instant and its residual, for a status other than LOOPS_CLOSED: LOOPS_OPEN, LOOPS_SINGULAR,
-        or TOO_COARSE if a singular position may lie between this instant and the one before.
+        Status; if it is not LOOPS_CLOSED, index of the last sample and its residual. Other values are LOOPS_OPEN,
+        LOOPS_SINGULAR, and TOO_COARSE if a singular position may lie between this sample and the previous one.
     """
     marker = system.markers[marker_index]
     for k in range(times.size):

@@ -1,4 +1,4 @@
-"""Residuals of the equations of closed loops at a given motion, for derivatives."""
+"""Residuals of the equations of closed loops for a given motion, used for derivatives."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from paraflex.kernel.packed import INDEX_1
 
 @releases_lock
 def closure_residuals(system, signals, marker_index, coordinates, times, target, q, v, a, basis, out, jacobians, work):
-    """Residuals of positions, velocities, accelerations and of the basis at every instant.
+    """Compute the residuals of positions, velocities, accelerations and of the basis at every sample.
 
     Parameters
     ----------
     times, target, q, v, a, basis : arrays
-        As for `closure.close_path`; all are read.
+        Motion as for `closure.close_path`; all are read.
     out : (times, n, 3 + tasks) array
-        Written: constraints and task coordinates less their targets, the rates and the accelerations of these, and
-        the Jacobian's product with the basis.
+        Constraints and task coordinates less their targets, the rates and the accelerations of these, and the
+        Jacobian's product with the basis. Written.
     jacobians : (times, n, n) array
-        Written: [Phi_q; task_q].
+        Jacobians [Phi_q; task_q]. Written.
     work : ClosureScratch
+        Work arrays.
     """
     marker, m, tasks = system.markers[marker_index], system.rows.size, coordinates.size
     for k in range(times.size):

@@ -1,4 +1,4 @@
-"""Compilation of kernels: cached on disk, free to reorder sums; with own changes to Numba, or without them."""
+"""Decorators that compile kernels: cached on disk, free to reorder sums, with or without own changes to Numba."""
 
 from __future__ import annotations
 
@@ -20,54 +20,57 @@ else:
 
 __all__ = ["FAST_MATH", "Kernel", "by_reference", "inlined", "kernel", "releases_lock", "routine", "unoptimised"]
 
-# Sums may be reordered and fused for vector units; NaN and infinities keep their meaning, failures rest on them.
+# Sums may be reordered and fused for vector units. NaN and infinities keep their meaning, as they indicate failures.
 FAST_MATH = {"reassoc", "contract", "arcp", "nsz"}
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FAST_MATH}
 
-# Without the entry from Python.
+# Options that leave out the entry point for Python.
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True}
 
 
 def routine(function: Callable[..., Any]) -> Any:
-    """Decorate a function that only kernels call: called from Python it would crash the process."""
+    """Decorate a function that only kernels call; a call from Python would crash the process."""
     return compiled(function, **_OPTIONS, **_INNER)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Decorate a function that only kernels call, once per body in an inner loop."""
+    """Decorate a function that only kernels call, once per body in an inner loop, and that is inlined."""
     return compiled(function, **_OPTIONS, **_INNER, forceinline=True)
 
 
 class Kernel:
-    """A function for Python and other kernels, compiled at the first call of each.
+    """Function for Python and for other kernels, compiled for each at its first call.
 
     Attributes
     ----------
-    from_python, inner : numba dispatchers
+    from_python : numba dispatcher
+        Version that Python calls.
+    inner : numba dispatcher
+        Version that other kernels call.
     """
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         assert isinstance(function, FunctionType)
         update_wrapper(self, function)
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
-        # The cache goes by this name.
+        # The cache identifies the function by this name.
         entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
         self.from_python: Any = compiled(entry, **_OPTIONS, **options)
         self.inner: Any = routine(function)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call it from Python."""
+        """Call the kernel from Python."""
         return self.from_python(*arguments)
 
     @property
     def py_func(self) -> Any:
-        """The Python function."""
+        """Undecorated Python function."""
         return self.inner.py_func
 
     @property
     def signatures(self) -> list[Any]:
-        """Signatures for which it has been compiled."""
+        """Signatures for which the kernel has been compiled."""
         return [*self.from_python.signatures, *self.inner.signatures]
 
     @property
@@ -82,18 +85,21 @@ def _inner(value: Kernel, _: object) -> types.Dispatcher:
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:
-    """Make a kernel of a function."""
+    """Return a kernel made of a function."""
     return Kernel(function)
 
 
 def releases_lock(function: Callable[..., Any]) -> Kernel:
-    """Make a kernel of a long function, during which other threads can run.
+    """Return a kernel made of a long-running function, which releases the interpreter lock while it runs.
 
-    One that soon returns would have to wait for them.
+    A short function should keep the lock, as it would have to wait for other threads to get it back.
     """
     return Kernel(function, nogil=True)
 
 
 def unoptimised(function: Callable[..., Any]) -> Kernel:
-    """Make a kernel of a function that Python calls a few times per run: compiled in half the time, and slower."""
+    """Return a kernel made of a function that Python calls a few times per run: fast to compile, but slower.
+
+    Compiling takes half the time.
+    """
     return Kernel(function, quick=True)

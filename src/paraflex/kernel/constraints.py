@@ -1,4 +1,4 @@
-"""Constraints of the whole system: their values and Jacobian, and rates and slopes of compliant rows."""
+"""Constraints of the whole system: values, Jacobian, and rates and slopes of compliant rows."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.sums import body_sums
 
-# Friction that slides has next to no slope; its compliance is held finite by counting it no flatter than this
-# fraction of the steepest.
+# Sliding friction has nearly zero slope: to keep its compliance finite, the slope is at least this fraction of the
+# steepest.
 FLATTEST = 1e-9
 
 
 @unoptimised
 def constraint_values(system, signals, t, q, v, scratch, phi, dphi):
-    """Phi and Phi' at (t, q, v), into phi and dphi; zero in rows that are no constraints."""
+    """Compute Phi and Phi' at (t, q, v) into phi and dphi; zero in rows that are not constraints."""
     for r in range(system.rows.size):
         row = system.rows[r]
         phi[r], dphi[r] = row.ground if row.kind == CONSTRAINT else 0.0, 0.0
@@ -35,7 +35,7 @@ def constraint_values(system, signals, t, q, v, scratch, phi, dphi):
             phi[r] -= value
             dphi[r] -= rate
     for i in range(system.bodies.size):
-        # The acceleration slot is not used here: v stands in for an array of the right length.
+        # Accelerations are not used here: v serves as an array of the right length.
         body_sums(system, i, q, v, v, scratch)
         for k in range(system.bodies[i].port, system.bodies[i].port_end):
             port = system.ports[k]
@@ -57,7 +57,7 @@ def constraint_values(system, signals, t, q, v, scratch, phi, dphi):
 
 @unoptimised
 def fill_jacobian(system, q, jacobian):
-    """Phi_q into a dense (rows, n) array, zero in rows that are not constraints; not for the time loop."""
+    """Compute Phi_q into a dense (rows, n) array, zero in rows that are not constraints; not for the time loop."""
     for r in range(system.rows.size):
         fill(jacobian[r], 0.0)
     for k in range(system.ports.size):
@@ -76,13 +76,13 @@ def fill_jacobian(system, q, jacobian):
 
 @inlined
 def damped(kind):
-    """Whether rows of a kind contain the rate of a joint."""
+    """Return whether rows of a kind contain the rate of a joint."""
     return kind in (DAMPER, FRICTION)
 
 
 @routine
 def joint_rates(system, q, v, rates):
-    """Rates of the joints of dampers and friction into their entries of rates; whether there are any."""
+    """Compute the joint rates of dampers and friction into their entries of rates; return whether there are any."""
     some = False
     for r in range(system.rows.size):
         if damped(system.rows[r].kind):
@@ -103,7 +103,7 @@ def joint_rates(system, q, v, rates):
 
 @routine
 def dissipated_power(system, q, v, lam, rates):
-    """Power of dampers and friction; `rates` is scratch (m,)."""
+    """Return the power of dampers and friction; `rates` is scratch (m,)."""
     power = 0.0
     if not joint_rates(system, q, v, rates):
         return power
@@ -115,7 +115,7 @@ def dissipated_power(system, q, v, lam, rates):
 
 @kernel
 def note_friction(system, q, v, rates, compliance):
-    """Inverse slopes of friction at the rates in v, for the iteration matrix; whether there is any.
+    """Compute inverse slopes of friction at the rates in v, for the iteration matrix; return whether there is any.
 
     `rates` (m,) is scratch, `compliance` (m,) is written.
     """

@@ -1,8 +1,8 @@
 """Cache of kernels on disk: machine code of one state of the sources, made by one compiler.
 
-Numba looks at the file of a cached kernel, not at those of the kernels it calls. So each state of all kernels, of
-Numba, llvmlite and NumPy has a folder of its own, and what was compiled from another cannot be loaded. Files are
-pickles of machine code, which nothing should read that is not as it was written: each begins with a digest of the rest.
+Numba checks the file of a cached kernel, not those of the kernels it calls. Therefore each state of all kernels, Numba,
+llvmlite and NumPy has a folder of its own, and code compiled from another state cannot be loaded. Files are pickles of
+machine code, which must not be loaded if damaged: each begins with a digest of the rest.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from paraflex.kernel.notice import announce_damage, announce_no_room
 from paraflex.kernel.plain import STATE
 
-# States kept in one place: a checkout may be used by several environments, a cache in a home by several machines.
+# Number of states kept: a checkout may be used by several environments, a cache in a home folder by several machines.
 STATES_KEPT = 3
 
 _PREFIX = "paraflex-kernels-"
@@ -30,16 +30,16 @@ FOLDER = _PREFIX + STATE
 
 
 class _Sealed(IndexDataCacheFile):
-    """One file for each signature of a kernel, without Numba's index: two processes may compile at once.
+    """Cache with one file per signature of a kernel and without Numba's index, as two processes may compile at once.
 
-    With an index both could name different code alike. Damaged files are compiled anew.
+    With an index both could give different code the same name. Kernels whose files are damaged are compiled again.
     """
 
     def save(self, key: Any, data: Any) -> None:
         self._seal(self._file(key), (self._source_stamp, key, data))
 
     def load(self, key: Any) -> Any:
-        # The function may have been edited: those of others have no state of their own.
+        # The function may have been edited: functions outside paraflex are not part of the state.
         found = self._unsealed(self._file(key))
         return found[2] if found is not None and found[:2] == (self._source_stamp, key) else None
 
@@ -52,7 +52,7 @@ class _Sealed(IndexDataCacheFile):
             opened.write(_digest(content) + content)
 
     def _unsealed(self, file: str) -> Any:
-        """What a file holds, or None; one that is damaged is removed."""
+        """Return the content of a file, or None; a damaged file is removed."""
         try:
             content = Path(file).read_bytes()
         except FileNotFoundError:
@@ -71,13 +71,13 @@ def _digest(content: bytes) -> bytes:
 
 
 class KernelCache(FunctionCache):
-    """Numba's cache of a function, in a folder of this state of all kernels."""
+    """Numba's cache of a function, in a folder for this state of all kernels."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         self._place = Path(self._cache_path)
         self._cache_path = str(self._place / FOLDER)
-        # The function may stand in a file of somebody else's.
+        # The function may be defined in a file outside paraflex.
         stamp = self._impl.locator.get_source_stamp()
         self._cache_file = _Sealed(self._cache_path, self._impl.filename_base, stamp)
 
@@ -95,7 +95,7 @@ def make_folder(place: Path) -> Path:
     if folder.exists():
         return folder
     folder.mkdir(parents=True, exist_ok=True)
-    # Another process may be doing the same.
+    # Another process may delete folders at the same time.
     with suppress(OSError):
         others = [each for each in place.glob(_PREFIX + "*") if each != folder]
         for outdated in sorted(others, key=lambda each: -each.stat().st_mtime)[STATES_KEPT - 1 :]:

@@ -1,6 +1,6 @@
 """Error of a step: an estimate, filtered through the iteration matrix, in metres.
 
-Without the filter (Hosea and Shampine 1996) an undamped axial mode would dictate the step.
+Without the filter (Hosea and Shampine 1996) an undamped axial mode would determine the step size.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from paraflex.kernel.run_state import (
 )
 from paraflex.kernel.stage import largest_part
 
-# Steps after which the factor that filters velocity errors is renewed; it serves a norm, so an old one will do.
+# Number of steps after which the factor that filters velocity errors is renewed; a norm needs no recent one.
 SLOW_AGE = 25
-# A velocity error of a step that nothing turns round moves the mechanism for half of a cycle, on average: by the error
-# times this fraction of it.
+# A velocity error that no elastic force reverses displaces the mechanism on average by the error times this fraction of
+# the cycle.
 MEMORY_PART = 0.25
-# Vibrations are lost in steps so many times longer than the last one. Errors are so many times what is found lost:
-# vibrations with a period of a step are half found.
+# Vibrations are lost in steps longer than the last one by this factor. The error is this multiple of the loss found, as
+# only half of a vibration with a period of one step is found.
 GROWN = 1.2
 LOST_SHARE = 1.5
-# Constraints as they are: weights of velocities' errors in them.
+# Gains with which velocity errors enter the constraints unchanged.
 UNCHANGED = (1.0, 0.0, 0.0)
-# In a step forces are controlled no closer than to this part of the largest, well above rounding.
+# Smallest error allowed in forces in a step, as a part of the largest force, well above rounding.
 LEAST_PART = 1e-6
 
 
 @routine
 def embedded_error(tableau, h, march):
-    """Difference to the embedded formula, in q and v, into march.eq and march.ev."""
+    """Compute the difference from the embedded formula, in q and v, into march.eq and march.ev."""
     fill(march.eq, 0.0)
     fill(march.ev, 0.0)
     for s in range(tableau.c.size):
@@ -57,16 +57,16 @@ def embedded_error(tableau, h, march):
 
 @routine
 def history_error(h, march):
-    """Difference to formulas of higher order through the last step's acceleration, into march.eq and march.ev.
+    """Compute the difference from formulas of higher order through the last step's acceleration.
 
-    For v the integral of the parabola through the accelerations at t - h_0, t and t + h, for q that of the cubic with
-    the velocities and accelerations at t and t + h.
+    For v the formula is the integral of the parabola through the accelerations at t - h_0, t and t + h, for q that of
+    the cubic with the velocities and accelerations at t and t + h. The results are written to march.eq and march.ev.
     """
     h0 = march.clock[LAST_STEP]
     if h0 > 0.0:
         before, end = -h * h * h / (6.0 * h0 * (h0 + h)), h * (h / 3.0 + 0.5 * h0) / (h + h0)
     else:
-        # Nothing is known of the third derivative: it changes acceleration as much as the second does.
+        # The third derivative is unknown: it is assumed to change the acceleration as much as the second does.
         before, end = -h / 12.0, 5.0 * h / 12.0
     middle, last = h - before - end, march.stage_v.shape[0] - 1
     for j in range(march.q.size):
@@ -83,16 +83,17 @@ def history_error(h, march):
 
 @routine
 def filtered_error(system, g, gains, march, work, slow):
-    """Mass norms [m] of the estimate in march.eq and march.ev: of position, and of the later effect of velocity.
+    """Return the mass norms [m] of the position error and of the later effect of the velocity error.
 
-    The velocity error is filtered once more, as if by a step as long as a part of the cycle, its memory: what is left
-    of it is the part that no elastic force turns round, and that moves the mechanism by memory times its size.
+    The errors are those in march.eq and march.ev. The velocity error is filtered once more, as by a step as long as a
+    part of the cycle, its memory. The remainder is the part that no elastic force reverses, and that moves the
+    mechanism by the memory times its size.
 
-    With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and
-    (M + g D + b K) eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale,
-    for springs J eps_v - C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2. Where Phi' = 0 is
-    imposed, and no outcome of integration, Phi_q eps_v = 0. `gains` says which: 1, alpha and beta, or zeros. Over g
-    these are a stage's equations for an acceleration error, so mu / g is what the error makes of the multipliers.
+    With J the Jacobian of the index-1 equations, (1 - g J) eps = e gives eps_q = e_q + g eps_v and (M + g D + b K)
+    eps_v + Phi_q^T mu = M e_v - g K e_q, Phi_q eps_v = (Phi_q e_v - beta^2 g Phi_q e_q) / scale, for springs J eps_v -
+    C mu / b = -J e_q / g and for dampers J eps_v - C mu / g = 0, with b = g^2. If Phi' = 0 is imposed and not
+    integrated, Phi_q eps_v = 0. `gains` selects the case: 1, alpha and beta, or zeros. Divided by g these are a stage's
+    equations for an acceleration error, so mu / g is the effect of the error on the multipliers.
     """
     filter_error(system, g, gains, march.eq, march.ev, work)
     for r in range(work.mu.size):
@@ -114,10 +115,10 @@ def filtered_error(system, g, gains, march, work, slow):
 
 @routine
 def note_lost_vibrations(system, controls, h, g, march, work):
-    """Keep the multipliers of undamped vibrations that a step loses since it is much longer than the last one.
+    """Record the multipliers of undamped vibrations lost in a step that is much longer than the last one.
 
     A vibration with acceleration A phi, (K - omega^2 M) phi + Phi_q^T nu = 0, has multipliers A nu / omega^2. Filtering
-    its acceleration gives g^2 A nu / (1 + g^2 omega^2): all of them if it is much faster than the step, nothing for
+    its acceleration gives g^2 A nu / (1 + g^2 omega^2): all of them if it is much faster than the step, zero for
     motions without deflection. Filtering twice leaves out vibrations that are resolved. The stages of the last step
     have all phases.
     """
@@ -137,7 +138,10 @@ def note_lost_vibrations(system, controls, h, g, march, work):
 
 @routine
 def force_error(controls, h, march):
-    """What the step's error makes of the multipliers over what is allowed; zero where forces are not controlled."""
+    """Return the effect of the step's error on the multipliers, relative to the allowed effect.
+
+    It is zero if forces are not controlled.
+    """
     if controls.force_control == 0 or march.counts[NEAR] > 0 or largest(march.forces[PEAK]) == 0.0:
         return 0.0
     return largest_part(march.forces[LOCAL], march.forces[PEAK]) / allowed_part(controls, h, march)
@@ -145,13 +149,13 @@ def force_error(controls, h, march):
 
 @inlined
 def allowed_part(controls, h, march):
-    """Error allowed in forces in a step, as a part of the largest."""
+    """Return the error allowed in forces in a step, as a part of the largest force."""
     return max(controls.force_part * h / march.clock[CYCLE], LEAST_PART)
 
 
 @routine
 def note_forces(controls, h, march):
-    """Keep the largest multipliers, and what local errors have changed them by within some cycles."""
+    """Record the largest multipliers, and their changes by local errors within some cycles."""
     forgotten = exp(-h / (controls.force_cycles * march.clock[CYCLE]))
     for r in range(march.guess_lam.size):
         march.forces[PEAK, r] = max(march.forces[PEAK, r], abs(march.stage_lam[0, r]))
@@ -163,7 +167,7 @@ def note_forces(controls, h, march):
 
 @routine
 def filter_error(system, g, gains, eq, ev, work):
-    """eps_v of (1 - g J) eps = (e_q, e_v) into work.x, with the factor in `work` made for b = g^2."""
+    """Compute eps_v of (1 - g J) eps = (e_q, e_v) into work.x, with the factor in `work` made for b = g^2."""
     of_v, alpha, beta = gains
     scale = 1.0 + 2.0 * alpha * g + beta * beta * g * g
     for j in range(eq.size):

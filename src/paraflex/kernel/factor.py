@@ -1,9 +1,10 @@
-"""The iteration matrix of one body at a time: its factor, and its response to its constraint rows.
+"""Iteration matrix of one body at a time: its factor, and the body's response to its constraint rows.
 
-It is an arrow: diag(1 + g d + b omega^2) bordered by three rigid rows, so factoring it costs O(nf). In the body's own
-frame only s, M_phiphi and M_phif depend on its coordinates, through its deformation: bodies are factored in their
-frames, and `kernel.linear` turns them to where they stand anew at every step, which costs a sixth and keeps an old
-factor good. Of second-order geometry, and where damping couples the modes, the matrix is dense: see `kernel.bending`.
+The matrix is an arrow, diag(1 + g d + b omega^2) bordered by three rigid rows, so factoring it costs O(nf). In the body
+frame only s, M_phiphi and M_phif depend on the body's coordinates, through its deformation. Bodies are therefore
+factored in their frames, and `kernel.linear` rotates them to their current angles at every step, which costs a sixth
+and keeps an old factor accurate. In second-order geometry, and if damping couples the modes, the matrix is dense: see
+`kernel.bending`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from paraflex.kernel.packed import ANGLE, DAMPING, DINV, GJ, MPF, NX, NY, OMEGA2
 from paraflex.kernel.sums import I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums
 from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
-# Springs divide by b: where it is zero (accelerations at an instant), by this instead.
+# Rows of springs are divided by b; if it is zero (accelerations at one time), they are divided by this.
 SMALLEST_B = 1e-18
 
 
@@ -73,7 +74,10 @@ def solve_rigid(fr, r0, r1, r2):
 
 @routine
 def respond(system, i, work):
-    """Response of body i to its constraint rows, (M + b K)^-1 J^T, and to its rigid coordinates, into work.response."""
+    """Compute the response of body i to its constraint rows, (M + b K)^-1 J^T, and to its rigid coordinates.
+
+    The result is written to work.response.
+    """
     body = system.bodies[i]
     n, k, lanes, fr = body.nf, body.flex, body.lanes, work.frame[i]
     for block in range(0, lanes, LANES):
@@ -84,7 +88,7 @@ def respond(system, i, work):
             r0 = add_scaled(r0, row, -d * system.modal[S2X, k + j])
             r1 = add_scaled(r1, row, -d * system.modal[S2Y, k + j])
             r2 = add_scaled(r2, row, -d * work.flex[MPF, k + j])
-        # As `solve_rigid`, eight at once.
+        # `solve_rigid` for eight columns at once.
         r0 = add_scaled(zeros(), r0, fr[5])
         r1 = add_scaled(zeros(), add_scaled(r1, r0, -fr[6]), fr[7])
         r2 = add_scaled(zeros(), add_scaled(add_scaled(r2, r0, -fr[8]), r1, -fr[9]), fr[10] * fr[10])
@@ -111,7 +115,7 @@ def respond(system, i, work):
 
 @inlined
 def body_jacobian(system, i, q, work):
-    """Parts of body i's constraint rows in its own frame, [1, E s, N] and [0, 1, N2'], into the lanes of work.jac."""
+    """Compute parts of body i's constraint rows in its frame, [1, E s, N] and [0, 1, N2'], into lanes of work.jac."""
     body = system.bodies[i]
     n, lanes, scratch = body.nf, body.lanes, work.scratch
     at = body.jac
@@ -148,7 +152,7 @@ def body_jacobian(system, i, q, work):
 
 @inlined
 def body_block(system, i, work):
-    """J M^-1 J^T of body i in its frame, into work.blocks."""
+    """Compute J M^-1 J^T of body i in its frame into work.blocks."""
     body = system.bodies[i]
     lanes = body.lanes
     for r in range(body.parts):
@@ -161,7 +165,7 @@ def body_block(system, i, work):
 
 @kernel
 def factor_bodies(system, b, q, work):
-    """Factor every body's M + b K at its deformation in q, in its own frame."""
+    """Factor M + b K of every body at its deformation in q, in the body frame."""
     work.step[0] = max(b, SMALLEST_B)
     turn_axes(system, q, work.axes)
     for i in range(system.bodies.size):

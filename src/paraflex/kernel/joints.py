@@ -1,9 +1,9 @@
 """Terms of joints and motors: constraints with two derivatives, constraint forces, motor torques.
 
-A marker stands at p = r + R s with s = x0 + N u, and
-p'' = r'' + R (phi'' E s - phi'^2 s + 2 phi' E N u' + N u''): the velocity-dependent part of the constraint on
-accelerations is not a formula of its own. A marker's angle is phi + N2' u. With second-order geometry s, N u' and N u''
-lose f/2, f'/2 and f''/2 along x.
+A marker has the position p = r + R s with s = x0 + N u, and the acceleration
+p'' = r'' + R (phi'' E s - phi'^2 s + 2 phi' E N u' + N u''), so the velocity-dependent part of the constraint on
+accelerations needs no separate formula. A marker's angle is phi + N2' u. In second-order geometry s, N u' and N u'' are
+reduced by f/2, f'/2 and f''/2 along x.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
 @inlined
 def marker_shape(system, marker, vector):
-    """Body-frame displacement N z of a marker for the flexible part of a system vector z (q, v or a)."""
+    """Return the body-frame displacement N z of a marker for the flexible part of a system vector z (q, v or a)."""
     body = system.bodies[marker.body]
     e, k = body.offset + 3, marker.shape
     x, y = 0.0, 0.0
@@ -31,9 +31,9 @@ def marker_shape(system, marker, vector):
 
 @inlined
 def marker_shortening(system, bending, marker, q, v, a):
-    """Half of f, f' and f'' of a marker: displacement by bending towards the beam's first end.
+    """Return halves of f, f' and f'' of a marker, its displacement by bending towards the beam's first end.
 
-    `bending` is p.bending, None for linear geometry.
+    `bending` is system.bending, None for linear geometry.
     """
     f0, f1, f2 = 0.0, 0.0, 0.0
     if bending is None:
@@ -55,7 +55,7 @@ def marker_shortening(system, bending, marker, q, v, a):
 
 @inlined
 def marker_angle(system, marker, vector):
-    """The angle phi + N2' u of a marker, or its rate or acceleration, depending on the system vector."""
+    """Return the angle phi + N2' u of a marker, or its rate or acceleration, depending on the system vector."""
     body = system.bodies[marker.body]
     e, k = body.offset + 3, marker.shape
     angle = vector[body.offset + 2]
@@ -66,20 +66,20 @@ def marker_angle(system, marker, vector):
 
 @inlined
 def marker_angles(system, marker, q, v, a):
-    """The angle of a marker, its rate and its acceleration."""
+    """Return the angle of a marker, its rate and its acceleration."""
     return marker_angle(system, marker, q), marker_angle(system, marker, v), marker_angle(system, marker, a)
 
 
 @inlined
 def marker_shapes(system, marker, q, v, a):
-    """N u of a marker with its two derivatives, and halves of f with its."""
+    """Return N u of a marker with its two derivatives, and f/2 with its two derivatives."""
     shapes = marker_shape(system, marker, q), marker_shape(system, marker, v), marker_shape(system, marker, a)
     return shapes, marker_shortening(system, system.bending, marker, q, v, a)
 
 
 @inlined
 def marker_motion(system, marker, q, v, a):
-    """Position, velocity and acceleration of a marker in the ground frame, and its s there: (p, p', p'', R s)."""
+    """Return position, velocity and acceleration of a marker, and its R s, in the ground frame: (p, p', p'', R s)."""
     angle = q[system.bodies[marker.body].offset + 2]
     shapes, shortening = marker_shapes(system, marker, q, v, a)
     return point_motion(system, marker, cos(angle), sin(angle), shapes, shortening, q, v, a)
@@ -87,7 +87,7 @@ def marker_motion(system, marker, q, v, a):
 
 @inlined
 def point_motion(system, marker, c, s, shapes, shortening, q, v, a):
-    """Result of `marker_motion`, by N u and its rates, halves of f and its, cosine and sine of the body's angle."""
+    """Return the result of `marker_motion` from N u, f/2 and their rates, and cosine and sine of the body's angle."""
     o = system.bodies[marker.body].offset
     (sx, sy), _, (vx, vy), (ax, ay) = relative_motion(marker, v[o + 2], a[o + 2], shapes, shortening)
     rx, ry = c * sx - s * sy, s * sx + c * sy
@@ -105,7 +105,10 @@ def point_motion(system, marker, c, s, shapes, shortening, q, v, a):
 
 @inlined
 def relative_motion(marker, w, dw, shapes, shortening):
-    """Motion of a marker relative to its body's origin, in the body frame: s, its own rate, velocity, acceleration."""
+    """Return the motion of a marker relative to its body's origin, in the body frame.
+
+    The result has s, the rate of s in the body frame, velocity and acceleration.
+    """
     (sx, sy), (ux, uy), (bx, by) = shapes
     f0, f1, f2 = shortening
     sx += marker.x - f0
@@ -161,7 +164,7 @@ def apply_torque(system, marker, torque, f):
 
 @kernel
 def start_rows(system, signals, t, weights, rows):
-    """Contribution of ground points and prescribed values to the constraint rows."""
+    """Initialise the constraint rows with the contributions of ground points and prescribed values."""
     weight_a, weight_v, weight_q = weights
     for r in range(system.rows.size):
         row = system.rows[r]
@@ -173,7 +176,11 @@ def start_rows(system, signals, t, weights, rows):
 
 @routine
 def start_compliant_rows(system, lam, rows):
-    """Rows of springs, dampers and friction before any body: less the rest value, less compliance times the force."""
+    """Initialise the rows of springs, dampers and friction.
+
+    Rows of springs and dampers begin with minus the rest value and minus compliance times the force, rows of friction
+    with zero.
+    """
     for r in range(system.rows.size):
         if system.rows[r].kind == FRICTION:
             rows[r] = 0.0
@@ -183,9 +190,10 @@ def start_compliant_rows(system, lam, rows):
 
 @routine
 def finish_friction(system, lam, compliance, rows):
-    """Turn the rates of joints in rows of friction into their residuals.
+    """Convert the joint rates in rows of friction into residuals.
 
-    compliance (limit tanh(rate / speed) - lambda) has the slope 1 against the rate where `compliance` was noted.
+    The residual compliance (limit tanh(rate / speed) - lambda) has slope 1 with respect to the rate at the rate for
+    which `compliance` was computed.
     """
     for r in range(system.rows.size):
         row = system.rows[r]
@@ -195,7 +203,7 @@ def finish_friction(system, lam, compliance, rows):
 
 @routine
 def spring_energy(system, lam):
-    """Energy of the springs, from their torques."""
+    """Return the energy of the springs, computed from their torques."""
     energy = 0.0
     for r in range(system.rows.size):
         if system.rows[r].kind == SPRING:
@@ -205,7 +213,7 @@ def spring_energy(system, lam):
 
 @routine
 def modal_damping_power(system, v):
-    """Power of the damping of the flexible coordinates."""
+    """Return the power dissipated by the damping of the flexible coordinates."""
     power = 0.0
     for i in range(system.bodies.size):
         body = system.bodies[i]
@@ -220,7 +228,7 @@ def modal_damping_power(system, v):
 
 @inlined
 def load_at(load, torques):
-    """Force and torque of a load: (fx, fy, torque)."""
+    """Return force and torque of a load: (fx, fy, torque)."""
     fx = load.fx if load.x_signal < 0 else torques[load.x_signal]
     fy = load.fy if load.y_signal < 0 else torques[load.y_signal]
     return fx, fy, load.torque if load.torque_signal < 0 else torques[load.torque_signal]
@@ -228,7 +236,7 @@ def load_at(load, torques):
 
 @routine
 def apply_loads(system, q, torques, f):
-    """Subtract the generalised forces of loads from f; `torques` has those that are given in time."""
+    """Subtract the generalised forces of loads from f; `torques` has the time-dependent components."""
     for k in range(system.loads.size):
         load = system.loads[k]
         marker = system.markers[load.marker]
@@ -240,7 +248,10 @@ def apply_loads(system, q, torques, f):
 
 @inlined
 def end_motion(system, marker, x, y, q, v, a):
-    """Motion of one end of an axis or a line, as `marker_motion`: a marker, or at rest at (x, y) on the ground."""
+    """Return the motion of one end of an axis or a line, as `marker_motion` does.
+
+    The end is a marker or a fixed point (x, y) on the ground.
+    """
     if marker < 0:
         return x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return marker_motion(system, system.markers[marker], q, v, a)
@@ -248,7 +259,7 @@ def end_motion(system, marker, x, y, q, v, a):
 
 @routine
 def line_state(system, k, q, v):
-    """Elongation, its rate, and the unit vector from a to b of line spring k; zero length has no direction."""
+    """Return elongation, its rate, and the unit vector from a to b of line spring k; a zero vector at zero length."""
     line = system.lines[k]
     ax, ay, vax, vay, _, _, _, _ = end_motion(system, line.a, line.ax, line.ay, q, v, v)
     bx, by, vbx, vby, _, _, _, _ = end_motion(system, line.b, line.bx, line.by, q, v, v)
@@ -279,7 +290,7 @@ def apply_lines(system, q, v, f):
 
 @routine
 def line_energy(system, q, v):
-    """Energy of the springs between points, and power of their dampers."""
+    """Return the energy of the springs between points, and the power of their dampers."""
     energy, power = 0.0, 0.0
     for k in range(system.lines.size):
         stretch, rate, _, _ = line_state(system, k, q, v)
@@ -290,7 +301,7 @@ def line_energy(system, q, v):
 
 @routine
 def load_power(system, q, v, torques):
-    """Power of loads."""
+    """Return the power of the loads."""
     power = 0.0
     for k in range(system.loads.size):
         load = system.loads[k]
@@ -303,7 +314,7 @@ def load_power(system, q, v, torques):
 
 @inlined
 def row_part(kind, weights, values):
-    """Contribution of a value and its two derivatives to a row of a kind; linear in these."""
+    """Return the contribution of a value and its two derivatives to a row of a given kind; linear in these."""
     if kind == CONSTRAINT:
         return weights[0] * values[2] + weights[1] * values[1] + weights[2] * values[0]
     return values[0] if kind == SPRING else values[1]
@@ -311,14 +322,14 @@ def row_part(kind, weights, values):
 
 @inlined
 def angle_by_sums(system, marker, q, v, a, scratch):
-    """Angle of a marker with its rate and acceleration, by the sums of its body."""
+    """Return angle of a marker, its rate and its acceleration, from the sums of its body."""
     turn, z = system.bodies[marker.body].offset + 2, marker.column + SLOPE
     return q[turn] + scratch.q[z], v[turn] + scratch.v[z], a[turn] + scratch.a[z]
 
 
 @inlined
 def motion_by_sums(system, marker, q, v, a, scratch):
-    """Result of `marker_motion`, by the sums of the marker's body."""
+    """Return the result of `marker_motion` from the sums of the marker's body."""
     x = marker.column
     y = x + 1
     shapes = (scratch.q[x], scratch.q[y]), (scratch.v[x], scratch.v[y]), (scratch.a[x], scratch.a[y])
@@ -328,7 +339,10 @@ def motion_by_sums(system, marker, q, v, a, scratch):
 
 @inlined
 def shortening_by_products(system, bending, marker, q, v, a, points):
-    """Result of `marker_shortening`; bending u stays in points.B_q. Both are None for linear geometry."""
+    """Return the result of `marker_shortening` and leave bending u in points.B_q.
+
+    `bending` and `points` are None for linear geometry.
+    """
     f0, f1, f2 = 0.0, 0.0, 0.0
     if bending is None:
         return f0, f1, f2
@@ -354,7 +368,7 @@ def shortening_by_products(system, bending, marker, q, v, a, points):
 
 @inlined
 def shorten_by_products(system, bending, marker, scale, f, points):
-    """Add scale times the derivative of a marker's f/2 to f, just after `shortening_by_products`."""
+    """Add scale times the derivative of a marker's f/2 to f, directly after `shortening_by_products`."""
     if bending is None:
         return
     if marker.bending >= 0:

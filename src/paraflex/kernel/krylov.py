@@ -1,8 +1,9 @@
-"""Stages whose corrections do not converge: GMRES with the exact derivative, preconditioned as in a run.
+"""GMRES with the exact derivative, preconditioned as in a run, for stages whose corrections do not converge.
 
-The iteration matrix of a run leaves out terms in velocities and, in linear geometry, those of axial forces. Where they
-outweigh what is kept, as beside an instability that grows within a step, corrections with it grow. The minimal residual
-method needs products with the exact matrix alone, and converges as long as that is regular (Saad and Schultz, 1986).
+The iteration matrix of a run leaves out terms in velocities and, in linear geometry, those of axial forces. If these
+outweigh the terms that are kept, as at an instability that grows within a step, corrections with that matrix grow. The
+minimal residual method needs only products with the exact matrix, and converges as long as that is regular (Saad and
+Schultz, 1986).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
 from paraflex.kernel.linear import right_hand_side, solve_system
 from paraflex.kernel.tangent import residual_tangent
 
-# Vectors of a basis, and the part of its right-hand side to which a system is solved with one.
+# Largest number of basis vectors, and relative residual to which a system is solved.
 MOST_VECTORS, ENOUGH = 60, 1e-12
 
 
@@ -28,7 +29,7 @@ class Krylov(NamedTuple):
 
     basis: NDArray[np.float64]  # (vectors + 1, n + m) orthonormal, multipliers scaled
     hessenberg: NDArray[np.float64]  # (vectors, vectors + 1) columns as rows, made triangular by rotations
-    cosines: NDArray[np.float64]  # (vectors,) of the rotations
+    cosines: NDArray[np.float64]  # (vectors,) cosines of the rotations
     sines: NDArray[np.float64]
     rest: NDArray[np.float64]  # (vectors + 1,) right-hand side, rotated; then the solution in the basis
     guess_a: NDArray[np.float64]  # (n,)
@@ -44,7 +45,7 @@ def make_krylov(n: int, m: int) -> Krylov:
 
 @inlined
 def inner(x, y):
-    """Product of two vectors."""
+    """Return the scalar product of two vectors."""
     total = 0.0
     for j in range(x.size):
         total += x[j] * y[j]
@@ -53,7 +54,7 @@ def inner(x, y):
 
 @routine
 def matrix_times(system, g, b, weights, scale, q, v, a, lam, torques, unit, x, direction, work, out):
-    """Preconditioned exact matrix of a stage times x, into out; multipliers in units of `unit`."""
+    """Multiply x by the preconditioned exact matrix of a stage, into out; multipliers in units of `unit`."""
     n = a.size
     for j in range(n):
         direction.q[j], direction.v[j], direction.a[j] = b * x[j], g * x[j], x[j]
@@ -66,7 +67,7 @@ def matrix_times(system, g, b, weights, scale, q, v, a, lam, torques, unit, x, d
         work.rows[r] = direction.rows[r]
     right_hand_side(system, work, scale)
     solve_system(system, work, work.x, work.mu)
-    # Solutions of a run are corrections: less the residual.
+    # Solutions in a run are corrections, with the sign of minus the residual.
     for j in range(n):
         out[j] = -work.x[j]
     for r in range(lam.size):
@@ -75,7 +76,7 @@ def matrix_times(system, g, b, weights, scale, q, v, a, lam, torques, unit, x, d
 
 @inlined
 def rotate(space, k):
-    """Make column k of the least-squares problem triangular; the remaining right-hand side."""
+    """Make column k of the least-squares problem triangular; return the remaining right-hand side."""
     column = space.hessenberg[k]
     for i in range(k):
         c, s = space.cosines[i], space.sines[i]
@@ -90,7 +91,7 @@ def rotate(space, k):
 
 @inlined
 def orthogonalise(space, k):
-    """Make vector k + 1 orthogonal to those before it, twice, and of unit length; False if it is zero."""
+    """Make vector k + 1 orthogonal to those before it, twice, and of unit length; return False if it is zero."""
     new, column = space.basis[k + 1], space.hessenberg[k]
     fill(column, 0.0)
     for _ in range(2):
@@ -109,7 +110,7 @@ def orthogonalise(space, k):
 
 @inlined
 def combine(space, count, unit, work):
-    """The solution in work.x and work.mu: back substitution, and the sum of the basis vectors."""
+    """Compute the solution into work.x and work.mu: back substitution, and the sum of the basis vectors."""
     for i in range(count - 1, -1, -1):
         for k in range(i + 1, count):
             space.rest[i] -= space.hessenberg[k, i] * space.rest[k]
@@ -125,14 +126,14 @@ def combine(space, count, unit, work):
 
 @kernel
 def exact_correction(system, g, b, weights, q, v, a, lam, torques, unit, direction, space, work):
-    """Turn the correction of a run in work.x and work.mu into that of the exact matrix.
+    """Convert the correction of a run in work.x and work.mu to the correction with the exact matrix.
 
     Parameters
     ----------
     q, v, a, lam
-        Where the stage stands, with the iteration matrix factored there and `note_slopes` called.
+        State of the stage, at which the iteration matrix has been factored and `note_slopes` called.
     unit : float
-        Of multipliers, so that they weigh as much as accelerations.
+        Unit of multipliers, chosen so that they have the same weight as accelerations.
     """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     n, first = a.size, space.basis[0]

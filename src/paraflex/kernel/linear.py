@@ -1,7 +1,8 @@
-"""The linear system of one iteration: bodies eliminated first (`kernel.factor`), then the multipliers.
+"""Linear system of one iteration: bodies are eliminated first (`kernel.factor`), then the multipliers.
 
-The Schur complement of the multipliers, S = sum J M^-1 J^T, is symmetric positive definite where Phi_q has full rank;
-it is stored and factored within its envelope, rows ordered once when the system is built.
+The Schur complement of the multipliers, S = sum J M^-1 J^T, is symmetric, and positive definite if Phi_q has full rank.
+It is stored and factored within its envelope; the rows are ordered once, when the system is built. The *relative pivot*
+of a row is the part of its diagonal entry that remains when the rows before it are eliminated.
 """
 
 from __future__ import annotations
@@ -17,19 +18,23 @@ from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DINV, POINT, SPRING
 from paraflex.kernel.sums import row_product
 from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
 
-# A pivot smaller than this fraction of its diagonal entry marks a constraint row that depends on those before it.
+# A smaller relative pivot marks a constraint row that depends on the rows before it.
 DEPENDENT_ROW = 1e-12
-# Where any row has less than this of its square left a position is singular.
+# A position is singular if any row has a smaller relative pivot.
 SINGULAR_PART = 1e-10
-# A row redundant at the start that has this part left is so no longer: the start was a singular position.
+# A row redundant at the start is independent above this relative pivot: the start was a singular position.
 INDEPENDENT = 1e-3
-# The square of a second row beside its first is taken as no less than this part of it: below is rounding.
+# The square of the second row of a point, without the part in common with the first, is at least this part of it:
+# smaller values are rounding.
 LEAST_SQUARE = 1e-6
 
 
 @inlined
 def share(work, port, r, part, c, s):
-    """Contribution of one part of a port, in the body frame, to its constraint row r; c and s rotate that frame."""
+    """Return the contribution of one part of a port, in the body frame, to its constraint row r.
+
+    c and s rotate the body frame.
+    """
     if port.kind == ANGLE:
         return port.weight
     if port.kind == POINT:
@@ -41,15 +46,15 @@ def share(work, port, r, part, c, s):
         return port.weight * (c * ex + s * ey)
     if part == 1:
         return port.weight * (c * ey - s * ex)
-    # Only the end that carries the axis has more parts; its weight is that of the axis, less.
+    # Only the end that carries the axis has more parts; its weight is minus that of the axis.
     return -port.weight * work.axes[port.axis, 2] if part == 2 else port.weight
 
 
 @inlined
 def add_pair_entry(system, work, row, column, same, value):
-    """Add the contribution of two ports to an entry of the Schur complement, in its lower half.
+    """Add the contribution of two ports to an entry in the lower half of the Schur complement.
 
-    To a diagonal one two different ports contribute twice.
+    Two different ports contribute twice to a diagonal entry.
     """
     high, low = max(row, column), min(row, column)
     twice = 1.0 if same or row != column else 2.0
@@ -58,7 +63,7 @@ def add_pair_entry(system, work, row, column, same, value):
 
 @routine
 def add_axis_pair(system, work, body, port, other, same, c, s):
-    """Add the entries between two ports of a body of which at least one is an axis."""
+    """Add the entries for two ports of a body, at least one of which is an axis."""
     for r in range(port.rows):
         for q in range(r + 1 if same else other.rows):
             value = 0.0
@@ -71,7 +76,7 @@ def add_axis_pair(system, work, body, port, other, same, c, s):
 
 @inlined
 def add_schur(system, i, work):
-    """Turn body i's J M^-1 J^T to the ground frame and add it to the Schur complement."""
+    """Rotate J M^-1 J^T of body i to the ground frame and add it to the Schur complement."""
     body = system.bodies[i]
     c, s = work.frame[i, 0], work.frame[i, 1]
     for k in range(body.port, body.port_end):
@@ -83,7 +88,7 @@ def add_schur(system, i, work):
                 continue
             weight = port.weight * other.weight
             at = body.block + port.local * body.lanes + other.local
-            # A 2 x 2 block, of which an angle's row or column is missing.
+            # A 2 x 2 block, without the second row or column for an angle.
             b00, b01, b10, b11 = work.blocks[at], 0.0, 0.0, 0.0
             if other.kind == POINT:
                 b01 = work.blocks[at + 1]
@@ -104,9 +109,9 @@ def add_schur(system, i, work):
 
 @inlined
 def own_square(square, product, first_square):
-    """Square of the second of two rows that hold a point, without what it has in common with the first.
+    """Return the square of the second of two rows that hold a point, without the part in common with the first.
 
-    Both would seem to depend on each other where a body turns about the point far more easily than it moves.
+    With that part, both rows would seem dependent if a body rotates about the point far more easily than it translates.
     """
     if first_square <= 0.0:
         return square
@@ -115,10 +120,10 @@ def own_square(square, product, first_square):
 
 @routine
 def factor_schur(system, work, dependent_part):
-    """Cholesky factor of the Schur complement in place, row by row within the envelope.
+    """Compute the Cholesky factor of the Schur complement in place, row by row within the envelope.
 
-    Returns the number of dependent rows found; each gets multiplier zero, which leaves the accelerations those of
-    the pseudo-inverse (Eq. 59) as long as the constraints are consistent.
+    Returns the number of dependent rows. Each gets a zero multiplier; the accelerations are then those of the
+    pseudo-inverse (Eq. 59) as long as the constraints are consistent.
     """
     dependent, before = 0, 0.0
     work.least[0] = 1.0
@@ -133,7 +138,7 @@ def factor_schur(system, work, dependent_part):
             total = work.schur[start + j]
             for k in range(max(first, first_j), j):
                 total -= work.schur[start + k] * work.schur[start_j + k]
-            # Diagonals hold reciprocals; that of a dependent row is zero and keeps its column at zero.
+            # Diagonals hold reciprocals; the diagonal of a dependent row is zero, which keeps its column zero.
             work.schur[start + j] = total * work.schur[start_j + j]
         diagonal = work.schur[start + i]
         pivot = diagonal
@@ -141,7 +146,7 @@ def factor_schur(system, work, dependent_part):
             pivot -= work.schur[start + k] * work.schur[start + k]
         if work.redundant[i] > 0.0 and pivot > INDEPENDENT * diagonal:
             work.redundant[i] = 0.0
-        # Springs give: their rows never depend on others.
+        # Rows of springs are compliant and never depend on others.
         counts = system.rows[i].kind == CONSTRAINT and work.redundant[i] == 0.0
         if counts and pivot < work.least[0] * own:
             work.least[0], work.least[1] = pivot / own, i
@@ -171,7 +176,10 @@ def solve_schur(system, work, x):
 
 @inlined
 def row_scale(system, r, work, scale):
-    """Factor that makes the iteration matrix symmetric: scale for a constraint, 1/b for a spring, else 1/g."""
+    """Return the factor that makes the iteration matrix symmetric.
+
+    It is scale for a constraint, 1/b for a spring, else 1/g.
+    """
     kind = system.rows[r].kind
     if kind == SPRING:
         return 1.0 / work.step[0]
@@ -180,7 +188,10 @@ def row_scale(system, r, work, scale):
 
 @kernel
 def orient(system, q, work, dependent_part):
-    """Turn the factored bodies to their angles in q and factor the Schur complement; number of dependent rows."""
+    """Rotate the factored bodies to their angles in q and factor the Schur complement.
+
+    Returns the number of dependent rows.
+    """
     fill(work.schur, 0.0)
     turn_axes(system, q, work.axes)
     for i in range(system.bodies.size):
@@ -197,14 +208,14 @@ def orient(system, q, work, dependent_part):
 
 @unoptimised
 def factor_system(system, b, q, work):
-    """Factor the iteration matrix [M + b K, Phi_q^T; Phi_q, 0] at q; returns the number of dependent rows."""
+    """Factor the iteration matrix [M + b K, Phi_q^T; Phi_q, 0] at q; return the number of dependent rows."""
     factor_bodies(system, b, q, work)
     return orient(system, q, work, DEPENDENT_ROW)
 
 
 @inlined
 def to_body_frame(system, i, work, x):
-    """Turn the translational part of body i in x from the ground frame to the factor's body frame."""
+    """Rotate the translational part of body i in x from the ground frame to the factor's body frame."""
     o = system.bodies[i].offset
     c, s = work.frame[i, 0], work.frame[i, 1]
     x[o], x[o + 1] = c * x[o] + s * x[o + 1], c * x[o + 1] - s * x[o]
@@ -212,7 +223,7 @@ def to_body_frame(system, i, work, x):
 
 @inlined
 def to_ground_frame(system, i, work, x):
-    """Turn the translational part of body i in x back to the ground frame."""
+    """Rotate the translational part of body i in x back to the ground frame."""
     o = system.bodies[i].offset
     c, s = work.frame[i, 0], work.frame[i, 1]
     x[o], x[o + 1] = c * x[o] - s * x[o + 1], s * x[o] + c * x[o + 1]
@@ -220,7 +231,7 @@ def to_ground_frame(system, i, work, x):
 
 @inlined
 def lanes_times(system, i, matrix, x, scratch):
-    """Sums of x over the coordinates of body i by the lanes of work.jac or work.response, into scratch.lanes."""
+    """Sum x over the coordinates of body i by the lanes of work.jac or work.response, into scratch.lanes."""
     body = system.bodies[i]
     for block in range(0, body.lanes, LANES):
         total = zeros()
@@ -260,7 +271,7 @@ def jacobian_times(system, i, work, x, scale, spring_scale, damper_scale, rows):
 
 @inlined
 def reactions(system, i, work, mu):
-    """Forces of multipliers on body i along the parts of its rows, negative: -J^T mu by lanes, into scratch.lanes."""
+    """Compute minus the forces of the multipliers on body i, -J^T mu by lanes, into scratch.lanes."""
     body = system.bodies[i]
     c, s, lanes = work.frame[i, 0], work.frame[i, 1], work.scratch.lanes
     for k in range(body.port, body.port_end):
@@ -280,7 +291,7 @@ def reactions(system, i, work, mu):
 
 @inlined
 def lanes_of(system, i, j, work):
-    """The sum of scratch.lanes for coordinate j of body i."""
+    """Return the sum of scratch.lanes for coordinate j of body i."""
     body = system.bodies[i]
     return row_product(work.response, body.jac + j * body.lanes, body.lanes, work.scratch.lanes)
 
@@ -289,14 +300,14 @@ def lanes_of(system, i, j, work):
 def solve_system(system, work, x, mu):
     """Solve [M + b K, Phi_q^T; Phi_q, -C/b] [x; mu] = [x; mu] in place; x in the ground frame.
 
-    C holds the compliance of springs, zero for constraints; for dampers it is -C/g.
+    C holds the compliance of springs, zero for constraints; the block is -C/g for dampers.
     """
     solve_all(system, work, work.inverse, x, mu)
 
 
 @inlined
 def solve_all(system, work, inverse, x, mu):
-    """See `solve_system`; `inverse` is work.inverse, None for linear geometry."""
+    """Solve as `solve_system`; `inverse` is work.inverse, None if no body has a dense matrix."""
     lanes = work.scratch.lanes
     for r in range(mu.size):
         mu[r] = -mu[r]
@@ -329,7 +340,7 @@ def solve_all(system, work, inverse, x, mu):
 
 @routine
 def right_hand_side(system, work, scale):
-    """-f and -rows as the right-hand side of `solve_system`; rows times their `row_scale`."""
+    """Set the right-hand side of `solve_system` to -f and -rows, with rows times their `row_scale`."""
     for j in range(work.f.size):
         work.x[j] = -work.f[j]
     for r in range(work.rows.size):

@@ -1,11 +1,12 @@
-"""Machine code of kernels: one for each function that Python calls, with its own copies of all functions it calls.
+"""Machine code of kernels: one unit for each function that Python calls, with its own copies of all functions it calls.
 
-Numba makes machine code of every function and lets the first copy of a function that a process has loaded stand in for
-all others. But copies are fitted to where they are called, and sums may be reordered there: what a kernel computes
-would depend, in the last bits, on what was loaded before it.
+Plain Numba makes machine code of every function and uses the first copy of a function that a process has loaded for all
+callers. But copies are optimised for their callers, and sums may be reordered in them: the last bits of a kernel's
+results would depend on the order of loading.
 
-And Numba counts the references to every array that a local name stands for, one field of a workspace and all of its
-others with it, by atomic operations that cost more than the arithmetic. Kernels make no arrays: their caller owns them.
+Plain Numba also counts references to every array that a local name refers to (for one field of a workspace, those of
+all others too) by atomic operations, which cost more than the arithmetic. Kernels create no arrays: their caller owns
+them.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from paraflex.kernel.disk_cache import KernelCache
 from paraflex.kernel.notice import announce_compiling
 from paraflex.kernel.passes import kernel_passes, remembered_signatures
 
-# Level of optimisation, of three.
+# Optimisation level of LLVM, 0 to 3.
 _LITTLE = 0
 
 
 class _Library(JITCodeLibrary):
-    """The code of a function: optimised and made machine code only if Python calls it."""
+    """Code of a function, optimised and made machine code only if Python calls the function."""
 
     called_from_python = True
 
@@ -38,7 +39,7 @@ class _Library(JITCodeLibrary):
             super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
-        # Read from the cache, it is in these two parts already.
+        # Code read from the cache is already divided into these two parts.
         if self._shared_module is None:
             self._divide()
         super()._finalize_final_module()
@@ -48,7 +49,7 @@ class _Library(JITCodeLibrary):
         module = self._final_module
         variables = [f'@"{each.name}" = common global ptr null' for each in module.global_variables if _is_kept(each)]
         if self.called_from_python:
-            # Nobody copies it: names are enough to find it again in the cache.
+            # No other function copies this code: names suffice to find it in the cache.
             entries = [each.name for each in module.functions if _is_entry(each)]
             stubs = [f'define void @"{name}"() {{ ret void }}' for name in entries]
             self._shared_module = _parsed(stubs + variables, module.name)
@@ -59,7 +60,7 @@ class _Library(JITCodeLibrary):
 
 
 class _QuickLibrary(_Library):
-    """The code of a function, compiled in less time and slower."""
+    """Code of a function, compiled in less time, but slower."""
 
     def _optimize_final_module(self) -> None:
         manager, builder = self._codegen._module_pass_manager(opt=_LITTLE, loop_vectorize=False, slp_vectorize=False)
@@ -70,7 +71,7 @@ class _QuickLibrary(_Library):
             super()._finalize_final_module()
             return
         self._divide()
-        # Numba's engine has one level for all, but takes what has been made already, as from the cache.
+        # Numba's engine has one optimisation level for all code, but accepts code made before, as from the cache.
         code = _quick_machine(self._codegen).emit_object(self._final_module)
         self._compiled_object = code
         super()._finalize_final_module()
@@ -90,7 +91,7 @@ class SeparateCode(CompilerBase):
     library = _Library
 
     def define_pipelines(self) -> list[PassManager]:
-        """The only pipeline of kernels."""
+        """Return the only pipeline of kernels."""
         return [kernel_passes()]
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
@@ -98,7 +99,7 @@ class SeparateCode(CompilerBase):
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.called_from_python = not self.state.flags.no_cpython_wrapper
         if library.called_from_python:
-            # Not in the cache on disk, or it would not have come to this.
+            # The function is not in the cache on disk, otherwise it would not be compiled.
             announce_compiling()
         library.enable_object_caching()
         self.state.library = library
@@ -107,15 +108,15 @@ class SeparateCode(CompilerBase):
 
 
 class QuickCode(SeparateCode):
-    """Compiler for functions with so few calls that optimised compilation would take longer."""
+    """Compiler for functions with so few calls that optimised compilation would take longer than it saves."""
 
     library = _QuickLibrary
 
 
 class _Cache:
-    """Cache of a kernel on disk, read when the kernel is first needed.
+    """Cache of a kernel on disk, opened when the kernel is first needed.
 
-    What is found there is loaded without all that Numba declares for compiling, which takes longer than loading.
+    Cached code is loaded without initialising Numba's declarations for compiling, which takes longer than loading.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -126,7 +127,7 @@ class _Cache:
         return KernelCache(self._function)
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """What has been compiled for a signature, or None."""
+        """Return the code compiled for a signature, or None."""
         with self._on_disk._guard_against_spurious_io_errors():
             return self._on_disk._load_overload(signature, context)
 
@@ -135,7 +136,7 @@ class _Cache:
 
 
 def compiled(function: Callable[..., Any], *, quick: bool = False, **options: Any) -> Any:
-    """A function compiled by `SeparateCode`; `quick` by `QuickCode`."""
+    """Return a function compiled by `SeparateCode`, or by `QuickCode` if `quick`."""
     own = {"no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": QuickCode if quick else SeparateCode}
     found: Any = njit(**options, **own)(function)
     found._cache = _Cache(function)
@@ -153,7 +154,7 @@ def _is_entry(function: Any) -> bool:
 
 
 def _is_kept(variable: Any) -> bool:
-    """Whether Numba looks for it in the cache, which may be empty."""
+    """Return whether Numba looks the variable up in the cache; its definition there may be empty."""
     return variable.name.startswith("_ZN08NumbaEnv")
 
 

@@ -1,4 +1,4 @@
-"""The time loop: accepted and rejected steps, their size, energy, dense output."""
+"""Time loop: accepted and rejected steps, step size control, energy, dense output."""
 
 from __future__ import annotations
 
@@ -67,31 +67,32 @@ from paraflex.kernel.stage import equations
 from paraflex.kernel.step import attempt, input_power
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
-# A step after a jump over one in which that moves the mechanism by the tolerance.
+# Step size after a jump, relative to one in which the jump moves the mechanism by the tolerance.
 AFTER_JUMP = 1e-3
-# Errors of vibrations rise and fall within a period: the error before has a say as well (Gustafsson 1994). None counts
-# as smaller than this part of what is allowed.
+# Errors of vibrations vary within a period, so the step size depends on the previous error as well (Gustafsson 1994).
+# No error counts as smaller than this part of the allowed one.
 BY_ERROR, BY_LAST_ERROR, SMALLEST_ERROR = 0.7, 0.4, 1e-3
-# A new step this close to the old one is not worth a new factorisation.
+# A new step size within these factors of the old one is not worth a new factorisation.
 KEEP_ABOVE, KEEP_BELOW = 0.92, 1.2
-# A run comes near a singular position no further off the constraints than this many times the error allowed there.
+# Largest distance from the constraints at which a run can enter a singular position, in errors allowed there.
 ENTRY = 100.0
-# Near a singular position the change in a step, of the root of what the row nearest to dependence has left.
+# Near a singular position: least change of the root per step, as a part of its largest value.
 LEAST_PACE = 3e-3
-# There a step with an error so small, as part of what is allowed, may be twice as long.
+# Near a singular position the step size may double if the error is below this part of the allowed one.
 GROWING = 0.05
-# Steps grow no further where elasticity alone leaves less than this of a row's square: rounding would hide it.
+# The step size does not grow if the smallest relative pivot is below this part: rounding would hide a contribution
+# of elasticity alone.
 LEAST_PART = 1e-11
-# A fixed step in which Newton's iteration does not converge is divided, and its parts down to this part of it.
+# A fixed step in which Newton's iteration does not converge is divided, down to this part of it.
 SMALLEST_PART = 1e-4
 TURN = 2.0 * pi
-# Steps from one instant to the next that differ by less than this part of them, by rounding, are of one length.
+# Steps whose sizes differ by less than this part of them, by rounding, count as equal.
 SAME_STEP = 1e-11
 
 
 @routine
 def first_stage(system, signals, t, controls, march, work):
-    """Accelerations and multipliers at (t, q, v), solved exactly, as the first stage."""
+    """Solve for accelerations and multipliers at (t, q, v) to rounding, as the first stage."""
     a, lam = march.stage_a[1, 0], march.stage_lam[0]
     note_friction(system, march.q, march.v, work.mu, work.compliance)
     factor_bodies(system, 0.0, march.q, work)
@@ -102,7 +103,7 @@ def first_stage(system, signals, t, controls, march, work):
     weights = INDEX_1
     if controls.treatment == BAUMGARTE and controls.gain == 0.0:
         weights = (1.0, 2.0 * controls.alpha, controls.beta * controls.beta)
-    # Linear in a and lambda with this very matrix: the second pass only removes rounding.
+    # The equations are linear in a and lambda, with this matrix: the second pass only removes rounding.
     for _ in range(2):
         equations(system, signals, t, weights, march.q, march.v, a, lam, march.torques, work)
         right_hand_side(system, work, 1.0)
@@ -113,9 +114,9 @@ def first_stage(system, signals, t, controls, march, work):
 
 @routine
 def enter(system, signals, t, controls, march, work):
-    """Near a singular position: project the state onto the constraints, as residuals would grow.
+    """Project the state onto the constraints near a singular position, as residuals would grow there.
 
-    Where there is no place on them so near by the mechanism is driven beyond its reach, and cannot pass.
+    If no position on the constraints is close enough, the mechanism is driven beyond its reach and cannot pass.
     """
     copy(march.q, march.eq)
     copy(march.v, march.ev)
@@ -136,12 +137,12 @@ def enter(system, signals, t, controls, march, work):
 
 @routine
 def begin(system, signals, controls, march, work):
-    """First stage of a run, or after a jump."""
+    """Compute the first stage of a run, or after a jump."""
     t = march.clock[TIME]
     march.counts[JUMPED] = 0
     first_stage(system, signals, t, controls, march, work)
     a, lam = march.stage_a[1, 0], march.stage_lam[0]
-    # No starting guess reaches across a jump: what was before does not count as another time.
+    # Starting guesses must not extrapolate across a jump: stages before it do not count as other times.
     fill(march.stage_t[0], t)
     march.stage_t[1, 0] = t
     copy(march.q, march.stage_q[0])
@@ -157,10 +158,11 @@ def begin(system, signals, controls, march, work):
 
 @routine
 def resume(system, signals, controls, march, work, aside):
-    """First stage after a jump, its matrix in a workspace aside: the factor in use stays.
+    """Compute the first stage after a jump with a matrix in the workspace `aside`, so that the factor in use stays.
 
     If the change of acceleration would move the mechanism by the tolerance in a step as long as the last one, the next
-    is much shorter than one in which it would: the error estimate leaves out what a long one makes of a jump.
+    step is much shorter than a step in which it would: the error estimate of a long step does not contain the effect of
+    a jump.
     """
     factor = march.clock[FACTOR_B]
     copy(work.redundant, aside.redundant)
@@ -176,7 +178,7 @@ def resume(system, signals, controls, march, work, aside):
 
 @kernel
 def start(system, signals, controls, march, work, out):
-    """First stage and first sample of a run."""
+    """Compute the first stage and the first sample of a run."""
     begin(system, signals, controls, march, work)
     t, a, lam = march.clock[TIME], march.stage_a[1, 0], march.stage_lam[0]
     kinetic, strain, march.clock[WEIGHT_0] = stored_energy(system, march.q, march.v, lam, work.scratch)
@@ -192,7 +194,7 @@ def start(system, signals, controls, march, work, out):
 
 @routine
 def note_constraints(system, signals, t, march, work):
-    """Keep the largest constraint violation seen at accepted steps."""
+    """Record the largest constraint violation at accepted steps."""
     constraint_values(system, signals, t, march.q, march.v, work.scratch, work.rows, work.mu)
     for r in range(work.rows.size):
         march.clock[PHI_MAX] = max(march.clock[PHI_MAX], abs(work.rows[r]))
@@ -201,9 +203,10 @@ def note_constraints(system, signals, t, march, work):
 
 @routine
 def note_cycle(system, controls, march):
-    """The time in which errors may add up to the tolerance: a turn of the fastest body so far, the run at most.
+    """Update the time in which errors may add up to the tolerance.
 
-    A body that moves as fast as its mechanism is large turns by a radian in that time.
+    It is the time of one revolution of the fastest body so far, at most that of the run. A body whose speed is the size
+    of the mechanism per second counts as rotating at 1 rad/s.
     """
     if controls.by_cycle == 0:
         return
@@ -217,7 +220,7 @@ def note_cycle(system, controls, march):
 
 @routine
 def resolved(controls, t, h, march):
-    """A step from t as long as h at most that resolves what is given in time, and how forces on bodies turn."""
+    """Return a step size of at most h from t that resolves the inputs, and the rotation of forces on bodies."""
     for j in controls.turning:
         if abs(march.v[j]) * h > controls.turn_in_step:
             h = controls.turn_in_step / abs(march.v[j])
@@ -236,7 +239,7 @@ def resolved(controls, t, h, march):
 
 @routine
 def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
-    """Take the step: move on, sample, count, and keep the stages for the next starting guess."""
+    """Accept the step: advance, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1
     if march.counts[NEAR] > 0:
         note_crossing(system, t, h, march, work)
@@ -279,14 +282,15 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
 
 @releases_lock
 def march(system, signals, tableau, controls, stops, max_steps, march, work, slow, out, law, aside):
-    """Advance by up to max_steps attempted steps, ending steps exactly at each of the times in `stops`.
+    """Advance by up to max_steps attempted steps, with steps that end exactly at each of the times in `stops`.
 
-    Under a sampled law steps end at its instants as well, and what is due at the start is done first.
+    Under a sampled controller steps also end at its sample and actuation times, and actions due at the start come
+    first.
 
     Returns
     -------
     int
-        PAUSED, FINISHED, LAW_FAILED, or why it cannot go on.
+        PAUSED, FINISHED, LAW_FAILED, or the cause of a failure.
     """
     if law.counts.size == 0:
         if march.counts[JUMPED] == 1:
@@ -314,7 +318,7 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
 
 @routine
 def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, march, work, slow, out, aside):
-    """Advance to the last of the stops, or to a pause before it, or to a stop within a slack of that: see `march`."""
+    """Advance to the last of the stops, to a pause before it, or to a stop within a slack of the pause: see `march`."""
     exponent = 1.0 / tableau.order
     for _ in range(max_steps):
         t = march.clock[TIME]
@@ -333,9 +337,9 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
         if controls.fixed_step == 0.0:
             h = resolved(controls, t, h, march)
         if controls.fixed_step > 0.0:
-            # Intervals between stops are divided evenly.
+            # Divide intervals between stops evenly.
             h = left / max(1.0, ceil(left / longest - 1e-6))
-            # But for rounding the same step: its factor still serves.
+            # If only rounding differs, keep the step size, and with it the factor.
             if abs(h - march.clock[STEP]) <= 1e-9 * h:
                 h = march.clock[STEP]
             march.clock[STEP] = h
@@ -343,7 +347,7 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
             h, landing = left, True
         elif left < 2.0 * h and controls.fixed_step == 0.0:
             h = 0.5 * left
-        # After a jump, but for rounding, the step before it: its factor still serves.
+        # After a jump, if only rounding differs, keep the step size before it, and with it the factor.
         if march.clock[LAST_STEP] == 0.0 and abs(h - march.clock[TRIED]) <= SAME_STEP * h:
             h = march.clock[TRIED]
         march.clock[TRIED] = h
@@ -357,7 +361,7 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
             march.clock[TIME] = end if landing else t + h
             if controls.fixed_step > 0.0:
                 continue
-            # Near a singular position steps are of one length, and not so short that rounding tells.
+            # Near a singular position the step size is constant, and not so small that rounding dominates.
             if march.counts[NEAR] > 0:
                 pace = abs(march.clock[ROOT_RATE]) * h
                 if pace < LEAST_PACE * sqrt(march.clock[WIDEST]) and error < GROWING and not after_failure:
@@ -367,8 +371,8 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
             factor = error ** (-BY_ERROR * exponent) * march.clock[LAST_ERROR] ** (BY_LAST_ERROR * exponent)
             factor = min(MAX_FACTOR, factor)
             march.clock[LAST_ERROR] = error
-            # Keep the step, and with it the factor, unless the change is worth it; a step cut short to land on a stop
-            # says nothing about longer ones.
+            # Keep the step size, and with it the factor, unless the change is worth it; a step reduced to end at a stop
+            # gives no information about longer ones.
             grows = h >= march.clock[STEP] and not after_failure and work.least[0] > LEAST_PART
             if factor < KEEP_ABOVE or (factor > KEEP_BELOW and grows):
                 march.clock[STEP] = factor * h
@@ -381,7 +385,7 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
                 march.clock[PART_END] = end if landing else t + h
             march.clock[PART] = MIN_FACTOR * h
         if march.counts[FAILURES] == 1:
-            # The first stage is the last step's last, with the error its longer step could bear: not so a shorter one.
+            # The first stage is the last stage of the previous step; its error may be too large for a shorter step.
             first_stage(system, signals, t, controls, march, work)
             if tableau.newmark.size > 0:
                 restart_algorithmic(tableau.newmark, march)

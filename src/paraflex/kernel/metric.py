@@ -1,4 +1,4 @@
-"""The mass matrix at the factor's deformation: its product with a vector, and its norm, in metres."""
+"""Product of a vector with the mass matrix at the deformation of the factor, and the norm by that matrix, in metres."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from paraflex.kernel.packed import MPF, S2X, S2Y
 
 @inlined
 def mass_times(system, i, work, mass, x):
-    """M x of body i in place, with the mass matrix of the factor; x in the body frame.
+    """Multiply x by M of body i in place, with the mass matrix of the factor; x in the body frame.
 
     `mass` is work.mass, None for linear geometry.
     """
@@ -39,7 +39,7 @@ def mass_times(system, i, work, mass, x):
 
 @inlined
 def mass_square(system, i, work, mass, x):
-    """x^T M x of body i for a ground-frame vector; `mass` as for `mass_times`."""
+    """Return x^T M x of body i for a ground-frame vector; `mass` as for `mass_times`."""
     body = system.bodies[i]
     o, k = body.offset, body.flex
     c, s = work.frame[i, 0], work.frame[i, 1]
@@ -61,7 +61,10 @@ def mass_square(system, i, work, mass, x):
 
 @kernel
 def mass_norm(system, work, x):
-    """sqrt(x^T M x / m_total) of a ground-frame vector: metres for a displacement, whatever the coordinates."""
+    """Return sqrt(x^T M x / m_total) of a ground-frame vector.
+
+    The norm of a displacement is in metres and does not depend on the coordinates.
+    """
     total = 0.0
     for i in range(system.bodies.size):
         total += mass_square(system, i, work, work.mass, x)

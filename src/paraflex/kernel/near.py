@@ -1,11 +1,11 @@
-"""Steps near and across a singular position, where constraint rows depend on one another for an instant.
+"""Steps near and across a singular position, where constraint rows are linearly dependent at one time.
 
-There motion is smooth but multipliers have a pole, and what is left of the constraints, Phi, moves the mechanism by
-Phi / root, with root^2 the part of its square that the row nearest to dependence has left when others are eliminated.
-So a run is brought back to the constraints where it comes near (`kernel.march.enter`), and at the end of each step
-there. A stage factors its matrix where it stands. Rows closer to dependence than their own lag leave accelerations as
-extrapolated from the stages before: the constraints' second derivatives do not determine them there. Steps keep
-their length meanwhile, so that a handful of them straddles the position.
+The motion is smooth there, but the multipliers have a pole, and a residual Phi of the constraints displaces the
+mechanism by Phi / root. The *root* is the square root of the relative pivot of the row nearest to dependence. A run is
+therefore projected onto the constraints where it comes near such a position (`kernel.march.enter`), and at the end of
+each step there. Stages factor the matrix at their current position. Rows closer to dependence than their own lag leave
+the accelerations as extrapolated from earlier stages: the constraints' second derivatives do not determine them there.
+The step size is kept meanwhile, so that a few steps span the position.
 """
 
 from __future__ import annotations
@@ -32,38 +32,39 @@ from paraflex.kernel.run_state import (
     WIDEST,
 )
 
-# A run is near a singular position where it could be there within so many steps, or where the root of what some row
-# has left is less than this of the most that rows had left; in either case what it has left is less than this part.
+# A run is near a singular position if it could reach it within this many steps, or if the root is less than this part
+# of its largest value so far; in either case only if the relative pivot is less than this part of its largest value.
 NEAR_STEPS, NEAR_ROOT, NEAR_PART = 8.0, 0.02, 0.1
-# Rows are not trusted closer to a singular position than this many times their lag behind its motion, and not closer
-# than so many g.
+# Rows are held closer to a singular position than this many times their lag, or than this many g, but not above this
+# root.
 HELD, LEAST_HELD, MOST_HELD = 3.0, 0.5, 0.3
-# How fast what is known of a row's speed is forgotten, by step.
+# Factor per step by which the recorded rate of change of the root decays.
 FORGETTING = 0.9
-# What has gathered in a step that ended that close no shorter one takes back: at the end of the next ones that distance
+# Shorter steps do not remove the drift of a step that ended with held rows: at the end of the next step the distance
 # counts by this fraction.
 LEAVING = 0.03
-# Corrections of position, and of velocity, towards the constraints.
+# Number of corrections of position, and of velocity, towards the constraints.
 PASSES = 2
-# Singular positions closer than so many steps are one.
+# Singular positions closer than this many steps count as one.
 SAME_POSITION = 2.0
-# Rows this many times further from dependence than those that are held are as good as any.
+# Rows with a root above this many times the limit for held rows are not changed.
 FAR = 10.0
 
 
 @inlined
 def elastic_measure_changes(system, b, march):
-    """Whether this is the first attempt of a step whose b is not the last one's, in a mechanism with elastic links."""
+    """Return whether this is a step's first attempt with a b other than the last step's, with elastic links."""
     first = 0 <= march.counts[ROOT_STEP] < march.counts[STEPS]
     return first and b != march.clock[ROOT_B] and system.modal.size > 0
 
 
 @routine
 def note_root(system, march, work):
-    """Note how near to dependence constraint rows are at the start of a step, and the rate of change.
+    """Record the root of the row nearest to dependence at the start of a step, and its rate of change.
 
-    Both are in the metric M + b K of a step. Where welds are redundant but for elasticity the root falls with longer
-    steps: what changes with b at one pose is no approach to a singular position, and rescales what is compared with it.
+    Both are in the metric M + b K of a step. If welds are independent only by elasticity, the root falls with longer
+    steps. A change of the root with b at the same pose is therefore not an approach to a singular position; it rescales
+    the values that the root is compared with.
     """
     root, change, b = sqrt(max(work.least[0], 0.0)), 0.0, work.step[0]
     if march.counts[ROOT_STEP] == march.counts[STEPS]:
@@ -84,23 +85,24 @@ def note_root(system, march, work):
 
 @routine
 def comes_near(h, march):
-    """Whether a step begins near a singular position."""
+    """Return whether a step begins near a singular position."""
     return march.clock[ROOT] < max(NEAR_STEPS * abs(march.clock[ROOT_RATE]) * h, NEAR_ROOT * sqrt(march.clock[WIDEST]))
 
 
 @routine
 def share_of_passage(h, march):
-    """The fraction of the passage of a singular position that a step covers."""
+    """Return the fraction of the passage through a singular position that a step covers."""
     return min(1.0, abs(march.clock[ROOT_RATE]) * h / (NEAR_ROOT * sqrt(march.clock[WIDEST])))
 
 
 @routine
 def trust(weights, g, b, ahead, march):
-    """Weights of constraint rows near a singular position: `held` and `lag` of `hold_rows`.
+    """Return `held` and `lag` of `hold_rows`, the weights of constraint rows near a singular position.
 
-    With root(t) what is left of a row, constraint rows w_a Phi'' + w_v Phi' + w_q Phi of a stage change with its
-    acceleration along the opening direction by root (w_a + w_v g + w_q b) + root' (2 w_a g + w_v b): the matrix knows
-    the first only, and before a singular position both cancel. The stage is so long `ahead` of the start of the step.
+    With root(t) the root of a row, constraint rows w_a Phi'' + w_v Phi' + w_q Phi of a stage change with its
+    acceleration along the opening direction by root (w_a + w_v g + w_q b) + root' (2 w_a g + w_v b). The matrix
+    contains the first term only, and before a singular position the two cancel. The stage is at the time `ahead` after
+    the start of the step.
     """
     lag = (2.0 * weights[0] * g + weights[1] * b) / (weights[0] + weights[1] * g + weights[2] * b)
     speed = abs(march.clock[ROOT_RATE])
@@ -111,11 +113,11 @@ def trust(weights, g, b, ahead, march):
 
 @routine
 def hold_rows(system, work, held, lag, rows, scratch):
-    """Right-hand sides of rows that nearly depend on others, reduced as by `trust`.
+    """Reduce the right-hand sides of rows that nearly depend on others, by `held` and `lag` of `trust`.
 
-    A row whose part left has a root below `held` gets what follows from the others: the solution does not move along
-    the direction in which it nearly depends on them. Of others the true derivative along that direction is the
-    matrix's times 1 + lag / root.
+    A row with a root below `held` gets the value that follows from the other rows: the solution does not move along the
+    direction in which it nearly depends on them. For the others the true derivative along that direction is that of the
+    matrix times 1 + lag / root.
     """
     for i in range(system.rows.size):
         follows, inverse, root = rest_of_row(system, work, i, scratch)
@@ -128,7 +130,7 @@ def hold_rows(system, work, held, lag, rows, scratch):
 
 @routine
 def damp_rows(system, work, held, rows, scratch):
-    """Right-hand sides of rows, reduced as if roots below `held` were `held`."""
+    """Reduce the right-hand sides of rows as if roots below `held` were equal to `held`."""
     for i in range(system.rows.size):
         follows, inverse, root = rest_of_row(system, work, i, scratch)
         scratch[i] = (rows[i] - follows) * inverse
@@ -139,7 +141,7 @@ def damp_rows(system, work, held, rows, scratch):
 
 @inlined
 def rest_of_row(system, work, i, scratch):
-    """Contribution of the reduced rows before row i, inverse of its pivot, and root of its part left."""
+    """Return the contribution of the reduced rows before row i, the inverse of its pivot, and its root."""
     first, start = system.rows[i].first, system.rows[i].start - system.rows[i].first
     follows, square = 0.0, 0.0
     for k in range(first, i):
@@ -162,10 +164,10 @@ def rest_of_row(system, work, i, scratch):
 
 @routine
 def return_to_constraints(system, signals, t, held, march, work):
-    """Project the end of a step near a singular position onto the constraints; the distance from them [m].
+    """Project the end of a step near a singular position onto the constraints; return the distance from them [m].
 
-    Only as far as rows are trusted. Where they are not, what they are off by, and its rate times the time it takes to
-    where they are, still tell of that distance.
+    Rows are projected only as far as they are trusted. For the others, the violation and its rate, times the time until
+    the rows are trusted again, still contribute to the distance.
     """
     last = march.stage_q.shape[0] - 1
     q, v = march.stage_q[last], march.stage_v[last]
@@ -195,7 +197,7 @@ def remove_violation(system, held, x, work):
 
 @routine
 def damped_distance(system, rows, held, work):
-    """Distance from the constraints with these values [m], with nearly dependent rows reduced."""
+    """Return the distance from the constraints for these violations [m], with nearly dependent rows reduced."""
     if largest_violation(system, rows) <= NO_VIOLATION:
         return 0.0
     damp_rows(system, work, held, rows, work.mu)
@@ -205,7 +207,7 @@ def damped_distance(system, rows, held, work):
 
 @routine
 def begin_near(system, march, work):
-    """Near a singular position: keep the direction that opens the row nearest to dependence, at the step's start."""
+    """Store the direction that opens the row nearest to dependence, at the start of a step near a singular position."""
     march.counts[NEAR] = 1 + int(work.least[1])
     open_row(system, march.counts[NEAR] - 1, work)
     copy(work.x, march.opening)
@@ -213,7 +215,10 @@ def begin_near(system, march, work):
 
 @routine
 def open_row(system, row, work):
-    """The least change of coordinates that opens one row by one unit, into work.x: infinite at a singular position."""
+    """Compute the least change of coordinates that opens one row by one unit, into work.x.
+
+    It is infinite at a singular position.
+    """
     fill(work.x, 0.0)
     fill(work.mu, 0.0)
     work.mu[row] = 1.0
@@ -222,7 +227,7 @@ def open_row(system, row, work):
 
 @routine
 def note_crossing(system, t, h, march, work):
-    """Note that a step has passed a singular position: the opening direction has changed sign, through infinity."""
+    """Record the passage of a singular position if the opening direction changes sign in a step, through infinity."""
     open_row(system, march.counts[NEAR] - 1, work)
     product, start, end = 0.0, 0.0, 0.0
     for j in range(work.x.size):
@@ -232,13 +237,13 @@ def note_crossing(system, t, h, march, work):
     if product >= 0.0:
         return
     march.clock[ROOT] = -march.clock[ROOT]
-    # Both grow as one over the time from it.
+    # Both directions grow as the inverse of the time from the position.
     note_position(t + h * sqrt(end) / (sqrt(start) + sqrt(end)), t, h, march)
 
 
 @routine
 def note_position(at, t, h, march):
-    """Note that a step from t was at a singular position, with an interval of the step's length to both sides."""
+    """Record that a step from t reached a singular position, with an interval of the step's length on both sides."""
     last, around = march.counts[PASSAGES] - 1, max(at - t, t + h - at)
     if last >= 0:
         if abs(0.5 * (march.passages[0, last] + march.passages[1, last]) - at) < SAME_POSITION * h:
@@ -250,7 +255,7 @@ def note_position(at, t, h, march):
 
 @routine
 def note_passage(t, h, march):
-    """Note the interval of a singular position; adjacent steps are of one interval."""
+    """Record the interval of a singular position; adjacent steps form one interval."""
     last = march.counts[PASSAGES] - 1
     if last >= 0:
         if t <= march.passages[1, last]:

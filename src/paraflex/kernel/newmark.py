@@ -1,12 +1,12 @@
-"""A step of the Newmark family on the index-3 equations, with the algorithmic acceleration as a state.
+"""Step of the Newmark family on the index-3 equations, with the algorithmic acceleration as a state.
 
     (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) v_1' + alpha_f v_0'
     q_1 = q_0 + h v_0 + h^2 ((1/2 - beta) a_0 + beta a_1),    v_1 = v_0 + h ((1 - gamma) a_0 + gamma a_1)
 
 with balance and Phi = 0 at the end of the step (Arnold and Brüls 2007). Newmark's own method has alpha_m = alpha_f = 0,
-that of Hilber, Hughes and Taylor alpha_m = 0. The carried a_0 stands for v' at t + (alpha_m - alpha_f) h: where h
-changes it moves along. Wilson's method takes acceleration as linear up to t + theta h, has balance and Phi = 0 there,
-and what it has at t + h is brought back to the constraints and their two derivatives.
+the method of Hilber, Hughes and Taylor has alpha_m = 0. The stored a_0 approximates v' at t + (alpha_m - alpha_f) h and
+is adjusted if h changes. Wilson's method assumes a linear acceleration up to t + theta h, satisfies balance and Phi = 0
+there, and projects its result at t + h onto the constraints and their two derivatives.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ from paraflex.kernel.stage import equations
 
 @routine
 def newmark_start(numbers, t, h, march):
-    """Explicit parts of the stage into march.qs and march.vs; its time, g and b of q = q* + b v', v = v* + g v'."""
+    """Compute the explicit parts of the stage into march.qs and march.vs.
+
+    Returns its time, and g and b of q = q* + b v', v = v* + g v'.
+    """
     a0, theta = march.algorithmic[0], numbers[THETA]
     if theta > 1.0:
         h = theta * h
@@ -42,14 +45,14 @@ def newmark_start(numbers, t, h, march):
 
 @routine
 def shifted(where, h, march):
-    """Fraction of the last step's change of acceleration to add if the size of the step changes."""
+    """Return the fraction of the last step's change of acceleration to add if the step size changes."""
     last = march.clock[LAST_STEP]
     return where * (h - last) / last if last > 0.0 else 0.0
 
 
 @routine
 def restart_algorithmic(numbers, march):
-    """The algorithmic acceleration from true ones, after steps that were divided."""
+    """Set the algorithmic acceleration from true accelerations, after steps that were divided."""
     where = numbers[ALPHA_M] - numbers[ALPHA_F] if march.clock[LAST_STEP] > 0.0 else 0.0
     for j in range(march.q.size):
         a = march.stage_a[1, 0, j]
@@ -58,10 +61,10 @@ def restart_algorithmic(numbers, march):
 
 @routine
 def newmark_end(system, signals, numbers, varying, t, h, march, work):
-    """From the stage to the end of the step: q and v in work.q and work.v, the new algorithmic acceleration.
+    """Compute the end of the step from the stage: work.q, work.v and the new algorithmic acceleration.
 
-    Where steps vary, and with Wilson's method, velocities and algorithmic accelerations are brought back to their
-    constraints: what a step leaves of Phi' the next one takes back, and if that is shorter, by a larger force.
+    If the step size varies, and with Wilson's method, velocities and algorithmic accelerations are projected onto their
+    constraints: a step corrects the Phi' that the previous step has left, and if it is shorter, by a larger force.
     """
     if numbers[THETA] > 1.0:
         wilson_end(numbers[THETA], h, march, work)
@@ -76,7 +79,7 @@ def newmark_end(system, signals, numbers, varying, t, h, march, work):
 
 @routine
 def carry(numbers, h, march):
-    """The new algorithmic acceleration from the old one and those of both ends."""
+    """Compute the new algorithmic acceleration from the old one and the accelerations at both ends."""
     a0, a1, start, end = march.algorithmic[0], march.algorithmic[1], march.stage_a[1, 0], march.stage_a[1, 1]
     alpha_m, alpha_f = numbers[ALPHA_M], numbers[ALPHA_F]
     moved = shifted(alpha_m - alpha_f, h, march)
@@ -87,7 +90,7 @@ def carry(numbers, h, march):
 
 @routine
 def wilson_end(theta, h, march, work):
-    """From the solution at t + theta h to t + h, acceleration and multipliers being linear in time."""
+    """Compute the state at t + h from the solution at t + theta h; accelerations and multipliers are linear in time."""
     a0, a1, found = march.algorithmic[0], march.algorithmic[1], march.stage_a[1, 1]
     for j in range(march.q.size):
         a1[j] = a0[j] + (found[j] - a0[j]) / theta

@@ -1,7 +1,7 @@
-"""The lines that say why a run takes long: kernels are being compiled, and why again.
+"""Messages that explain why a run takes long: kernels are being compiled, or compiled again.
 
-They go through Python's logging, under the name "paraflex": to standard error where nobody has set logging up, and
-nowhere after `logging.getLogger("paraflex").setLevel("ERROR")`. Each is said once a process.
+They go through Python's logging, under the name "paraflex": to standard error where logging is not configured, and
+nowhere after `logging.getLogger("paraflex").setLevel("ERROR")`. Each is issued once per process.
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ _announced: set[str] = set()
 
 
 def announce_compiling(say: Callable[[str], None] | None = None) -> None:
-    """Say that kernels are compiled.
+    """Report that kernels are being compiled.
 
     Parameters
     ----------
     say : callable, optional
-        Called with the line; it is logged by default, as a warning: what is less urgent Python shows nobody.
+        Function called with the message. By default it is logged as a warning, as Python does not show lower levels.
     """
     _announce("compiling", NOTICE, say or LOG.warning)
 
 
 def announce_damage(file: Path) -> None:
-    """Say that a file of compiled kernels is not as it was written; worker processes may find one, too."""
+    """Report that a file of compiled kernels is damaged; worker processes may report it as well."""
     if not {"compiling", "damage"} & _announced:
         _announced.update(("compiling", "damage"))
         LOG.warning("paraflex: a compiled kernel is damaged and compiled anew (%s)", file)
 
 
 def announce_no_room(place: Path, error: OSError) -> None:
-    """Say that what was compiled could not be kept."""
+    """Report that compiled kernels could not be saved."""
     reason = (error.strerror or str(error)).lower()
     line = f"paraflex: compiled kernels cannot be kept in {place} ({reason}): the next process compiles anew"
     _announce("room", line, LOG.warning)
 
 
 def _announce(what: str, line: str, say: Callable[[str], None]) -> None:
-    """Worker processes leave it to the one that started them."""
+    """Issue a message once per process, and only in the parent process."""
     if what in _announced or multiprocessing.parent_process() is not None:
         return
     _announced.add(what)

@@ -1,6 +1,6 @@
-"""The equations for external solvers: an ODE in (q, v), multipliers eliminated (Eqs. 59-60), with its Jacobian.
+"""Equations for external solvers: an ODE in (q, v), with multipliers eliminated (Eqs. 59-60), and its Jacobian.
 
-A third part is added to (q, v), the work done so far: whoever integrates the motion integrates its power as well.
+A third part is added to (q, v), the work done so far, so that a solver integrates the power with the motion.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from paraflex.kernel.stage import equations
 from paraflex.kernel.step import input_power
 from paraflex.kernel.tangent import note_slopes, reaction_tangent, residual_tangent
 
-# b of the factor whose rows of springs and dampers hold their forces and nothing of the accelerations: they divide by
-# b and by its square root, and either must be nothing beside 1.
+# Value of b for rows of springs and dampers that determine their forces independently of the accelerations: the rows
+# are divided by b or by its square root, and both must be negligible beside 1.
 INSTANT_B = 1e-36
 
 
 @kernel
 def accelerations(system, signals, t, weights, q, v, a, lam, torques, work, dependent_part):
-    """Accelerations (n,) and multipliers (m,) at (t, q, v), into a and lam; the factor stays in work.
+    """Compute accelerations (n,) and multipliers (m,) at (t, q, v) into a and lam; the factor stays in work.
 
     Returns
     -------
     int
-        How many rows depend on others here, with less than `dependent_part` of their squares left: multipliers zero.
+        Number of dependent rows, with a relative pivot below `dependent_part`; their multipliers are zero.
     """
     fill(a, 0.0)
     fill(lam, 0.0)
@@ -35,7 +35,7 @@ def accelerations(system, signals, t, weights, q, v, a, lam, torques, work, depe
     factor_bodies(system, 0.0, q, work)
     work.step[0] = INSTANT_B
     dependent = orient(system, q, work, dependent_part)
-    # Linear in a and lambda with this very matrix: the second pass only removes rounding.
+    # The equations are linear in a and lambda, with this matrix: the second pass only removes rounding.
     for _ in range(2):
         equations(system, signals, t, weights, q, v, a, lam, torques, work)
         right_hand_side(system, work, 1.0)
@@ -47,12 +47,12 @@ def accelerations(system, signals, t, weights, q, v, a, lam, torques, work, depe
 
 @kernel
 def rates(system, signals, t, weights, y, a, lam, torques, work, dependent_part, dy):
-    """Derivative of y = (q, v, work done) into dy, both (2n + 1,); a and lam are left as `accelerations` has them.
+    """Compute the derivative of y = (q, v, work done) into dy, both (2n + 1,); a and lam as by `accelerations`.
 
     Returns
     -------
     int
-        See `accelerations`.
+        Number of dependent rows, see `accelerations`.
     """
     n = a.size
     q, v = y[:n], y[n : 2 * n]
@@ -66,10 +66,10 @@ def rates(system, signals, t, weights, y, a, lam, torques, work, dependent_part,
 
 @kernel
 def rates_jacobian(system, weights, y, a, lam, torques, work, direction, out):
-    """Derivative of `rates` by y, into out (2n + 1, 2n + 1), at the y it was last called with.
+    """Compute the derivative of `rates` by y into out (2n + 1, 2n + 1), at the y of its last call.
 
     The accelerations change by -[M, J^T; J, -C]^-1 (dF, dG). The row of the power is left zero: Newton's iteration
-    finds work from motion, one iteration behind.
+    obtains the work from the motion, one iteration later.
     """
     n = a.size
     q, v = y[:n], y[n : 2 * n]
@@ -95,12 +95,12 @@ def rates_jacobian(system, weights, y, a, lam, torques, work, direction, out):
 
 @kernel
 def descriptor_residual(system, signals, t, weights, y, dy, dropped, torques, work, out):
-    """Residual of the equations as a DAE of index 1 in y = (q, v, lambda, work done), into out.
+    """Compute the residual of the equations as a DAE of index 1 in y = (q, v, lambda, work done), into out.
 
     y, dy, out : (2n + m + 1,) arrays.
 
-    q' - v, then those of `equations` with v' as the acceleration, then work' less the power. `dropped` (m,) says which
-    rows follow from others: their multipliers are zero.
+    The entries are q' - v, then those of `equations` with v' as the acceleration, then work' less the power. `dropped`
+    (m,) marks rows that depend on others: their multipliers are zero.
     """
     n, m = work.f.size, work.rows.size
     q, v, a, lam = y[:n], y[n : 2 * n], dy[n : 2 * n], y[2 * n : 2 * n + m]
@@ -116,7 +116,7 @@ def descriptor_residual(system, signals, t, weights, y, dy, dropped, torques, wo
 
 @kernel
 def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direction, out):
-    """Derivative of `descriptor_residual` by y plus c times that by dy, into out, where it was last called.
+    """Compute the derivative of `descriptor_residual` by y plus c times that by dy, into out, at its last call.
 
     `out` is square, with a row for each entry of y; `direction` is scratch.
     """
@@ -147,14 +147,14 @@ def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direc
 
 @routine
 def fill_column(direction, first, rows, column, out):
-    """The changes of the equations of motion and of the rows into a column of out, from `first` and from `rows` on."""
+    """Copy the changes of the equations of motion and of the rows to a column of out, from `first` and `rows` on."""
     copy(direction.f, out[first : first + direction.f.size, column])
     copy(direction.rows, out[rows : rows + direction.rows.size, column])
 
 
 @routine
 def drop_rows(dropped, row, column, out):
-    """For dropped rows, from `row` on, write into out that the multiplier, from `column` on, is zero."""
+    """Replace dropped rows, from `row` on in out, by the equation that the multiplier, from `column` on, is zero."""
     for r in range(dropped.size):
         if dropped[r]:
             fill(out[row + r], 0.0)
@@ -163,12 +163,12 @@ def drop_rows(dropped, row, column, out):
 
 @kernel
 def stabilised_residual(system, signals, t, y, dy, dropped, weight, torques, idle, work, direction, phi, dphi, out):
-    """Residual of the stabilised form of index 2 in y = (q, v, lambda, mu, work done), into out.
+    """Compute the residual of the stabilised form of index 2 in y = (q, v, lambda, mu, work done), into out.
 
     y, dy, out : (2n + 2m + 1,) arrays; phi, dphi are scratch (m,), `idle` (motors,) is zero.
 
-    W (q' - v) + Phi_q^T mu, the equations of motion, Phi' and Phi, the power (Gear, Gupta and Leimkuhler 1985). W is
-    the diagonal `weight` (n,). Rows that are no constraints stand in place of their Phi', and have no mu.
+    The entries are W (q' - v) + Phi_q^T mu, the equations of motion, Phi' and Phi, the power (Gear, Gupta and
+    Leimkuhler 1985). W is the diagonal `weight` (n,). Rows that are not constraints replace their Phi', and have no mu.
     """
     n, m = work.f.size, work.rows.size
     q, v, a = y[:n], y[n : 2 * n], dy[n : 2 * n]
@@ -193,7 +193,7 @@ def stabilised_residual(system, signals, t, y, dy, dropped, weight, torques, idl
 
 @kernel
 def stabilised_jacobian(system, y, dy, c, dropped, weight, torques, idle, work, direction, out):
-    """Derivative of `stabilised_residual` by y plus c times that by dy, into out, where it was last called.
+    """Compute the derivative of `stabilised_residual` by y plus c times that by dy, into out, at its last call.
 
     `out` is square, with a row for each entry of y; `direction` is scratch.
     """

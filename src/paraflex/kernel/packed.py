@@ -1,9 +1,9 @@
 """Layout of the kernels' input (`PackedSystem`, `Signals`) and work arrays (`Workspace`).
 
-One record a body, port, marker, side of a motor and constraint row; flat arrays for what has a length of its own.
-A *marker* is a material point of a body with its shape rows; a constraint row is a weighted sum over *ports*, each an
-end on a moving body, of which several may be on one body. A motor that turns is a *side* on each moving body of its
-joint; one that slides is an axis.
+There is one record per body, port, marker, side of a motor and constraint row; data of variable length are in flat
+arrays. A *marker* is a material point of a body with its shape rows. A constraint row is a weighted sum over *ports*;
+each port is an end on a moving body, and several may be on one body. A rotary motor has a *side* on each moving body of
+its joint; a linear motor is an axis.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from paraflex.kernel.vectors import padded
 S2X, S2Y, I1, GJ, OMEGA2, DAMPING = range(6)
 # Rows of PackedSystem.shape.
 NX, NY, SLOPE = range(3)
-# Kinds of port: both coordinates of a point, an angle, one end of an axis.
+# Port kinds: both coordinates of a point, an angle, one end of an axis.
 POINT, ANGLE, AXIS = range(3)
-# Kinds of row: Phi = 0, or a multiplier that is the torque or force of a spring, of a damper or of dry friction.
+# Row kinds: Phi = 0, or a row whose multiplier is the torque or force of a spring, a damper or dry friction.
 CONSTRAINT, SPRING, DAMPER, FRICTION = range(4)
-# Weights of Phi'', Phi' and Phi: constraints on accelerations, without Baumgarte's terms.
+# Weights of Phi'', Phi' and Phi for constraints on accelerations, without Baumgarte's terms.
 INDEX_1 = (1.0, 0.0, 0.0)
 # Rows of Workspace.flex: M_phif and 1/(1 + b omega^2).
 MPF, DINV = range(2)
@@ -36,9 +36,9 @@ BODY = np.dtype(
         ("nf", np.int64),
         ("flex", np.int64),  # first column of the body in `modal` and `Workspace.flex`
         ("square", np.int64),  # first entry of its nf x nf matrices
-        ("port", np.int64),  # its ports: port .. port_end
+        ("port", np.int64),  # first of its ports, port .. port_end - 1
         ("port_end", np.int64),
-        ("motor", np.int64),  # its sides of motors that turn: motor .. motor_end
+        ("motor", np.int64),  # first of its sides of rotary motors, motor .. motor_end - 1
         ("motor_end", np.int64),
         ("columns", np.int64),  # first entry of its nf x width matrix in `columns`
         ("width", np.int64),
@@ -49,20 +49,20 @@ BODY = np.dtype(
         ("parts", np.int64),  # rows of its ports' Jacobians
         ("lanes", np.int64),  # columns of `Workspace.jac` and `Workspace.response`: these rows and three more, padded
         ("jac", np.int64),  # first entry of its (3 + nf) x lanes matrices there
-        ("points", np.int64),  # number of its mass points, of second-order geometry: none of linear
-        ("slopes", np.int64),  # the first so many of them are Gauss points
-        ("pitch", np.int64),  # the number of its mass points, padded
+        ("points", np.int64),  # number of its mass points in second-order geometry, 0 in linear geometry
+        ("slopes", np.int64),  # number of Gauss points, which come first among the mass points
+        ("pitch", np.int64),  # number of its mass points, padded
         ("places", np.int64),  # first entry of its nf x 3 pitch matrix in `places`
-        ("spans", np.int64),  # and of its slopes x pitch matrix in `spans`
-        ("inertias", np.int64),  # and of its 3 x pitch matrix in `inertias`
-        # 1 where its iteration matrix is dense: of second-order geometry, or where damping couples its modes.
+        ("spans", np.int64),  # first entry of its slopes x pitch matrix in `spans`
+        ("inertias", np.int64),  # first entry of its 3 x pitch matrix in `inertias`
+        # 1 if its iteration matrix is dense: in second-order geometry, or if damping couples its modes.
         ("full", np.int64),
         ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace
-        ("inverse", np.int64),  # and of that with rows padded
+        ("inverse", np.int64),  # first entry of its inverse in the workspace, with padded rows
         ("m", np.float64),
         ("S1x", np.float64),
         ("S1y", np.float64),
-        ("I0", np.float64),  # with the lumped moments of inertia, I0 + J
+        ("I0", np.float64),  # I0 + J, with the lumped moments of inertia
     ],
     align=True,
 )
@@ -70,8 +70,8 @@ MARKER = np.dtype(
     [
         ("body", np.int64),
         ("shape", np.int64),  # first column of its rows in `shape`
-        ("column", np.int64),  # its column x in `columns`, with y and slope after it
-        ("bending", np.int64),  # first entry of its matrix in `bending`, -1 for none
+        ("column", np.int64),  # its column x in `columns`, followed by y and slope
+        ("bending", np.int64),  # first entry of its matrix in `bending`, -1 if it has none
         ("x", np.float64),
         ("y", np.float64),
     ],
@@ -83,12 +83,12 @@ PORT = np.dtype(
         ("kind", np.int64),
         ("row", np.int64),  # first constraint row
         ("rows", np.int64),  # 2 for a point, else 1
-        # Rows in the body frame that these are made of: x and y of a point, an angle; of an axis x, y, and where the
-        # body carries it the angle, and the deflection along a track.
+        # Number of rows in the body frame that these are computed from: x and y of a point; an angle; x and y of an
+        # axis, and if the body carries the axis also the angle, and the deflection along a track.
         ("parts", np.int64),
-        ("local", np.int64),  # first of them among those of its body
-        ("axis", np.int64),  # which axis it is an end of, -1 for none
-        # What its contribution to the row is multiplied by: of a joint +1 on side b, -1 on side a.
+        ("local", np.int64),  # index of the first of them among those of its body
+        ("axis", np.int64),  # axis of which it is an end, -1 for none
+        # Factor of its contribution to the row: for a joint +1 on side b, -1 on side a.
         ("weight", np.float64),
     ],
     align=True,
@@ -100,18 +100,18 @@ LOAD = np.dtype(
         ("fx", np.float64),  # in the ground frame
         ("fy", np.float64),
         ("torque", np.float64),
-        # Of components that are given in time, else -1.
+        # Signals of the time-dependent components, -1 for constant ones.
         ("x_signal", np.int64),
         ("y_signal", np.int64),
         ("torque_signal", np.int64),
     ],
     align=True,
 )
-# Of what is between two ends, a and b.
+# Fields of elements between two ends, a and b.
 _ENDS = [
-    ("a", np.int64),  # markers of its ends, -1 on the ground; that of a carries an axis, b is measured along it
-    ("b", np.int64),
-    ("ax", np.float64),  # places of ends on the ground
+    ("a", np.int64),  # marker of end a, -1 on the ground; it carries an axis, along which b is measured
+    ("b", np.int64),  # marker of end b, -1 on the ground
+    ("ax", np.float64),  # positions of ends on the ground
     ("ay", np.float64),
     ("bx", np.float64),
     ("by", np.float64),
@@ -128,12 +128,12 @@ LINE = np.dtype(
 AXIS_RECORD = np.dtype(
     [
         *_ENDS,
-        ("angle", np.float64),  # of the axis against the marker that carries it
-        ("row", np.int64),  # -1 for a motor's
-        ("weight", np.float64),  # what its value is multiplied by in that row
-        ("signal", np.int64),  # of the motor, else -1
-        ("track", np.int64),  # the deflection that a sliding point follows, -1 for none
-        ("between", np.int64),  # 1 where it points from a to b, so that its value is their distance, else 0
+        ("angle", np.float64),  # angle of the axis relative to the marker that carries it
+        ("row", np.int64),  # constraint row, -1 for the axis of a motor
+        ("weight", np.float64),  # factor of its value in that row
+        ("signal", np.int64),  # signal of the motor, -1 for none
+        ("track", np.int64),  # deflection that a sliding point follows, -1 for none
+        ("between", np.int64),  # 1 if it points from a to b, so that its value is their distance, else 0
     ],
     align=True,
 )
@@ -141,7 +141,7 @@ TRACK = np.dtype(
     [
         ("first", np.int64),  # first of its breaks
         ("pieces", np.int64),
-        ("coefficients", np.int64),  # first of its coefficients: by piece, power and flexible coordinate
+        ("coefficients", np.int64),  # first of its coefficients, ordered by piece, power and flexible coordinate
     ],
     align=True,
 )
@@ -149,15 +149,15 @@ ROW = np.dtype(
     [
         ("kind", np.int64),
         ("signal", np.int64),  # prescribed value in time, -1 for none
-        ("ground", np.float64),  # what points on the ground contribute to Phi, less the rest angle of a spring
-        # Of a spring, angle - rest = compliance * lambda; of a damper, rate = compliance * lambda; of friction, the
-        # inverse of its steepest slope; else zero.
+        ("ground", np.float64),  # contribution of points on the ground to Phi, less the rest angle of a spring
+        # Compliance of a spring, angle - rest = compliance * lambda, or of a damper, rate = compliance * lambda; for
+        # friction the inverse of its steepest slope; else zero.
         ("compliance", np.float64),
-        ("limit", np.float64),  # of friction: lambda = limit tanh(rate / (compliance limit))
-        ("unit", np.float64),  # what Phi is compared with: the size of the mechanism for a length, 1 for an angle
-        ("second", np.int64),  # whether it is the second of two rows that hold one point
+        ("limit", np.float64),  # limit of friction, lambda = limit tanh(rate / (compliance limit))
+        ("unit", np.float64),  # scale of Phi: the size of the mechanism for a length, 1 for an angle
+        ("second", np.int64),  # 1 if it is the second of two rows that hold one point, else 0
         ("first", np.int64),  # first column of the row in the envelope of the Schur complement
-        ("start", np.int64),  # and where that column is stored
+        ("start", np.int64),  # storage index of that column
     ],
     align=True,
 )
@@ -179,43 +179,44 @@ class PackedSystem(NamedTuple):
     track_coefficients: NDArray[np.float64]
     rows: NDArray[np.void]
     modal: NDArray[np.float64]  # (6, total nf): S2x, S2y, I1, G1 + Jf, omega^2, diagonal of the damping matrix
-    damping: NDArray[np.float64]  # nf x stride of every body where that is not all: the rest of the damping matrix
-    I2: NDArray[np.float64]  # nf x nf of every body, row by row
+    damping: NDArray[np.float64]  # nf x stride, off-diagonal part of the damping matrix of bodies that have one
+    I2: NDArray[np.float64]  # nf x nf matrix of every body, row by row
     G2: NDArray[np.float64]
     shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every marker
-    # The same for vectors: what a body's coordinates give to its sums (see `kernel.sums`), and columns of G2 and I2.
+    # The same data laid out for vectors: contributions of a body's coordinates to its sums (see `kernel.sums`), and
+    # columns of G2 and I2.
     columns: NDArray[np.float64]
     products: NDArray[np.float64]
-    # Of second-order geometry; without it, and without dense iteration matrices, there is no `bending`, and kernels are
-    # compiled without all that needs it.
-    bending: NDArray[np.float64] | None  # nf x stride of every marker that bending moves: f = u . bending u
-    # Of every body's mass points: Nx, Ny and N2' of all by coordinate; weights of all by Gauss point; x, mass and
-    # moment of inertia.
+    # Data of second-order geometry. `bending` is None without second-order geometry and dense iteration matrices;
+    # kernels are then compiled without the code for these.
+    bending: NDArray[np.float64] | None  # nf x stride matrix of every marker that bending displaces: f = u . bending u
+    # Data of every body's mass points: Nx, Ny and N2' of all points by coordinate; weights of all points by Gauss
+    # point; x, mass and moment of inertia.
     places: NDArray[np.float64]
     spans: NDArray[np.float64]
     inertias: NDArray[np.float64]
     total_mass: float
-    size: float  # of the mechanism, see `dynamics.scale`: a power of two [m]
-    gravity: NDArray[np.float64]  # (2,) in the ground frame
+    size: float  # size of the mechanism [m], a power of two, see `dynamics.scale`
+    gravity: NDArray[np.float64]  # (2,) gravity in the ground frame [m/s^2]
 
 
 @by_reference
 class Signals(NamedTuple):
-    """Functions of time as piecewise quintics: motor torques first, then loads, then prescribed values."""
+    """Time profiles as piecewise quintics: motor torques first, then loads, then prescribed values."""
 
-    start: NDArray[np.int64]  # first break of each signal; one more at the end
+    start: NDArray[np.int64]  # first break of each signal, then the number of all breaks
     breaks: NDArray[np.float64]
-    coefficients: NDArray[np.float64]  # (breaks, 6), ascending powers of t - break; the last piece of a signal unused
+    coefficients: NDArray[np.float64]  # (breaks, 6), ascending powers of t - break; a signal's last piece is unused
 
 
 @by_reference
 class PointScratch(NamedTuple):
-    """Additional work arrays of one body of second-order geometry, by mass point."""
+    """Additional work arrays, by mass point, of one body of second-order geometry."""
 
     q: NDArray[np.float64]  # (3 pitch,) Nx u, Ny u and slopes
     v: NDArray[np.float64]
     a: NDArray[np.float64]
-    shares: NDArray[np.float64]  # (3 pitch,) what works on each
+    shares: NDArray[np.float64]  # (3 pitch,) force on each
     axial: NDArray[np.float64]  # (pitch,) axial forces at the Gauss points
     rows: NDArray[np.float64]  # (2 nf pitch,) ds/du: x and y of all points by coordinate
     B_q: NDArray[np.float64]  # (stride,) a marker's bending matrix times u
@@ -224,12 +225,12 @@ class PointScratch(NamedTuple):
 
 @by_reference
 class Scratch(NamedTuple):
-    """Work arrays for the terms of one body: sums of u, u' and u'' and results from them."""
+    """Work arrays for the terms of one body: sums of u, u' and u'' and results computed from them."""
 
     q: NDArray[np.float64]  # (widest,) sums of u
     v: NDArray[np.float64]
     a: NDArray[np.float64]
-    shares: NDArray[np.float64]  # (widest,) what works on each sum
+    shares: NDArray[np.float64]  # (widest,) force on each sum
     G2_q: NDArray[np.float64]  # (widest stride,) G2 u
     G2_v: NDArray[np.float64]
     I2_q: NDArray[np.float64]
@@ -250,24 +251,24 @@ class Workspace(NamedTuple):
     q: NDArray[np.float64]
     v: NDArray[np.float64]
     scratch: Scratch
-    step: NDArray[np.float64]  # (1,) b of the factor
-    axes: NDArray[np.float64]  # (axes, 4): e and n . d at the last `orient`, and where a sliding point stands
-    compliance: NDArray[np.float64]  # (m,) that of friction at the last `note_friction`
+    step: NDArray[np.float64]  # (1,) coefficient b of the factor
+    axes: NDArray[np.float64]  # (axes, 4): e, n . d and the place of a sliding point at the last `orient`
+    compliance: NDArray[np.float64]  # (m,) compliance of the rows, of friction at the last `note_friction`
     frame: NDArray[np.float64]  # (bodies, 12): cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
     flex: NDArray[np.float64]  # (2, total nf)
-    # By body, coordinate and lane: the Jacobian rows of its ports in the body frame; and these times the inverse of the
-    # iteration matrix, then what a force on the coordinate leaves to the three rigid ones.
+    # By body, coordinate and lane: the Jacobian rows of the body's ports in its frame; these rows times the inverse of
+    # the iteration matrix, then the part of a force on the coordinate that is passed to the three rigid coordinates.
     jac: NDArray[np.float64]
     response: NDArray[np.float64]
     blocks: NDArray[np.float64]  # J M^-1 J^T of every body, in its frame
     schur: NDArray[np.float64]  # envelope of the Schur complement, then its Cholesky factor
-    redundant: NDArray[np.float64]  # (m,) of rows redundant since the start: the part below which one is dependent
-    least: NDArray[np.float64]  # (2,) the smallest part of its square left of any other row, and which row
-    # Where there is `PackedSystem.bending`, of bodies with a dense iteration matrix, else None:
-    mass: NDArray[np.float64] | None  # M of every body, (3 + nf)^2
-    dense: NDArray[np.float64] | None  # the factor of M + b (K + K_g)
-    inverse: NDArray[np.float64] | None  # and its inverse, rows padded
-    geometric: NDArray[np.float64] | None  # K_g, nf^2
+    redundant: NDArray[np.float64]  # (m,) relative pivot up to which a row redundant at the start is dependent, else 0
+    least: NDArray[np.float64]  # (2,) smallest relative pivot of the other rows, and index of its row
+    # Matrices of bodies with a dense iteration matrix; None if `PackedSystem.bending` is None:
+    mass: NDArray[np.float64] | None  # M, (3 + nf)^2 entries per body
+    dense: NDArray[np.float64] | None  # Cholesky factor of M + b (K + K_g)
+    inverse: NDArray[np.float64] | None  # inverse of M + b (K + K_g), rows padded
+    geometric: NDArray[np.float64] | None  # K_g, nf^2 entries per body
 
 
 def make_workspace(system: PackedSystem) -> Workspace:

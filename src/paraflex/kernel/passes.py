@@ -1,7 +1,7 @@
-"""Numba's passes for a kernel before it is machine code, without those that no kernel needs.
+"""Numba's compiler passes for kernels, without those that no kernel needs.
 
 Numba's own list of passes is for any Python function: closures, contexts, parallel loops, rewritten array expressions.
-And it looks for the type of every sum and product anew, among dozens of candidates from strings to dates.
+Numba also resolves the types of every sum and product again, among dozens of candidates from strings to dates.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-# Signatures that have been found, and what implements them.
+# Signatures found so far, each with its implementation.
 _found: dict[Any, Any] = {}
 
 
 @contextmanager
 def remembered_signatures() -> Iterator[None]:
-    """Context in which Numba remembers the signatures of operators and built-in functions by types."""
+    """Return a context in which Numba remembers the signatures of operators and built-in functions by types."""
     functions: Any = types.Function
     look_up = functions.get_call_type
 
@@ -47,7 +47,7 @@ def remembered_signatures() -> Iterator[None]:
             signature = look_up(function, context, arguments, named)
             _found[key] = signature, function.get_impl_key(signature)
         signature, implementation = _found[key]
-        # Somebody else's function, compiled with other options, may have left its own.
+        # A function compiled elsewhere with other options may have replaced the implementation.
         function._impl_keys[signature.args] = implementation
         return signature
 
@@ -59,7 +59,7 @@ def remembered_signatures() -> Iterator[None]:
 
 
 class _Manager(PassManager):
-    """Pass manager without bookkeeping after each pass; `IRLegalization` does it once before code is made."""
+    """Pass manager without bookkeeping after each pass; `IRLegalization` does it once before code generation."""
 
     _ENFORCING = False
 
@@ -81,7 +81,7 @@ _PASSES = (
 
 
 def kernel_passes() -> PassManager:
-    """All passes for a kernel, in order."""
+    """Return the pass manager with all passes for a kernel, in order."""
     manager = _Manager("kernel")
     for each in _PASSES:
         manager.add_pass(each, each.__name__)

@@ -1,8 +1,8 @@
-"""Kernels compiled by plain Numba: slower to compile, the same results but for rounding.
+"""Kernels compiled by plain Numba: slower to compile, with the same results except for rounding.
 
-What changes Numba (`machine_code`, `passes`, `records`, `disk_cache`) rests on interfaces that it does not promise to
-keep. None of it is loaded where the environment sets `PARAFLEX_PLAIN_NUMBA=1`, nor with a release of Numba that it has
-not been tested with, unless the variable is 0.
+The changes to Numba (`machine_code`, `passes`, `records`, `disk_cache`) use internal interfaces, which may change. None
+of them is loaded if the environment variable `PARAFLEX_PLAIN_NUMBA` is 1, or with an untested release of Numba, unless
+the variable is 0.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ import numpy as np
 from paraflex.kernel.notice import LOG
 
 VARIABLE = "PARAFLEX_PLAIN_NUMBA"
-# First and last release that the changes are tested with; with those before no kernel compiles.
+# First and last release that the changes are tested with; with earlier releases no kernel compiles.
 TESTED = ("0.62", "0.68")
 
 
 def choose(release: str, environment: MutableMapping[str, str] = os.environ) -> bool:
-    """Whether kernels are compiled by plain Numba; an untested release is announced once, by the parent process."""
+    """Return whether kernels are compiled by plain Numba; the parent process reports an untested release once."""
     if not environment.get(VARIABLE):
         if _numbers(TESTED[0]) <= _numbers(release) <= _numbers(TESTED[1]):
             return False
@@ -42,26 +42,26 @@ def _numbers(release: str) -> tuple[int, ...]:
 
 
 def state_of_kernels() -> str:
-    """Digest of everything that machine code of kernels depends on but the processor, which Numba checks."""
+    """Return the digest of everything that machine code depends on, except the processor, which Numba checks."""
     digest = sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(sha256(source.read_bytes()).digest())
     return digest.hexdigest()[:16]
 
 
-# Taken when kernels are imported: a source that is edited later is not what this process compiles.
+# Computed at import: this process does not compile sources that are edited later.
 STATE = state_of_kernels()
 PLAIN = choose(numba.__version__)
 
 
 def compiled(function: Callable[..., Any], *, nogil: bool = False, **options: Any) -> Any:
-    """A function compiled by plain Numba; options of the own compiler are ignored."""
-    # The cache goes by this name, and looks at no other function's source.
+    """Return a function compiled by plain Numba; options of paraflex's own compiler are ignored."""
+    # The cache identifies the function by this name, and does not check the sources of other functions.
     function.__qualname__ = f"{function.__qualname__}_{STATE}"
     wanted = {name: options[name] for name in ("error_model", "fastmath")}
     return numba.njit(cache=True, nogil=nogil, **wanted)(function)
 
 
 def by_reference(record: type) -> type:
-    """Leave a named tuple as it is: Numba passes it as its fields."""
+    """Return the named tuple unchanged: plain Numba passes it as its fields."""
     return record

@@ -1,7 +1,7 @@
 """Projection onto the constraints: positions, then velocities, by the least change in the metric of the factor.
 
-That metric is M + b K, the mass matrix and the stiffness as a step of g^2 = b feels it (Cuadrado, Cardenal and
-Bayo 1997): with the mass alone a correction would ring in the stiffest modes.
+The metric is M + b K, the mass matrix and the stiffness as seen by a step of g^2 = b (Cuadrado, Cardenal and Bayo
+1997). With the mass matrix alone a correction would excite the stiffest modes.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.linear import solve_system
 
-# Violations this small count as none, in units of their rows; the factor is of the step's start, so each pass leaves a
-# small part.
+# Smaller violations, in units of their rows, count as zero; the factor is that of the step's start, so each pass
+# leaves a small part.
 NO_VIOLATION, PASSES = 4e-14, 4
 
 
@@ -35,7 +35,7 @@ def project(system, signals, t, q, v, work):
 
 @routine
 def largest_violation(system, rows):
-    """The largest violation of a constraint, or of its rate, as a part of the unit of its row."""
+    """Return the largest violation of a constraint, or of its rate, relative to the unit of its row."""
     violation = 0.0
     for r in range(rows.size):
         violation = max(violation, abs(rows[r]) / system.rows[r].unit)
@@ -44,7 +44,7 @@ def largest_violation(system, rows):
 
 @routine
 def least_change(system, violation, work):
-    """The least x with Phi_q x = -violation, into work.x."""
+    """Compute the least x with Phi_q x = -violation into work.x."""
     for r in range(violation.size):
         work.mu[r] = -violation[r]
     fill(work.x, 0.0)

@@ -1,7 +1,8 @@
-"""Named tuples that kernels take by reference: a pointer instead of some hundred machine words.
+"""Named tuples that kernels receive by reference: a pointer instead of some hundred machine words.
 
-Numba takes a named tuple apart into its fields, and arrays into seven words each, wherever one is handed on. Those of
-`@by_reference` are taken apart once, where Python calls. Kernels read their fields and do not make such tuples.
+Numba splits a named tuple into its fields, and every array into seven words, at each call. Tuples of classes decorated
+with `@by_reference` are split only once, where Python calls a kernel. Kernels read their fields and do not create such
+tuples.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ R = TypeVar("R", bound=type)
 
 
 class _Reference(types.Type):
-    """The type of a reference to a named tuple, for Numba."""
+    """Numba type of a reference to a named tuple."""
 
     def __init__(self, record: type, fields: tuple[types.Type, ...]) -> None:
         self.record, self.fields = record, dict(zip(record._fields, fields, strict=True))
@@ -43,7 +44,7 @@ class _Attributes(AttributeTemplate):
 
 
 def by_reference(record: R) -> R:
-    """Let kernels take a named tuple by reference."""
+    """Register a named tuple to be passed to kernels by reference."""
 
     @typeof_impl.register(record)
     def _(value, context):
@@ -63,7 +64,7 @@ def _unbox(typ, obj, c):
         item = c.pyapi.tuple_getitem(obj, k)
         target = cgutils.gep_inbounds(builder, place, 0, k)
         if isinstance(field, types.Array):
-            # Without a reference to count: the tuple keeps its arrays as long as the kernel runs.
+            # No reference counting: the tuple keeps its arrays alive as long as the kernel runs.
             kind = ir.FunctionType(ir.IntType(32), [c.pyapi.pyobj, c.pyapi.voidptr])
             adapt = cgutils.get_or_insert_function(builder.module, kind, "numba_adapt_ndarray")
             code = builder.call(adapt, [item, builder.bitcast(target, c.pyapi.voidptr)])
@@ -79,7 +80,7 @@ def _unbox(typ, obj, c):
 
 
 def _sealed(builder, place):
-    """The address, hidden from the compiler, which must not load a field before all are stored."""
+    """Return the address, hidden from the compiler, which must not load a field before all are stored."""
     kind = ir.FunctionType(place.type, [place.type])
     return builder.asm(kind, "", "=r,0,~{memory}", [place], side_effect=True)
 
@@ -101,7 +102,7 @@ def _field(context, builder, typ, value, attr):
 
 
 def _load(builder, place):
-    """The value at an address, which never changes."""
+    """Load the value at an address, marked as invariant."""
     kind = place.type.pointee
     if isinstance(kind, (ir.LiteralStructType, ir.ArrayType)):
         count = kind.count if isinstance(kind, ir.ArrayType) else len(kind.elements)

@@ -1,4 +1,4 @@
-"""Steps of a run solved again, each to rounding, as the base of derivatives."""
+"""Steps of a run solved again to rounding, as the base of derivatives."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from paraflex.kernel.stage import equations, note_torques, place
 from paraflex.kernel.step import baumgarte_gains, input_power, stage_start
 from paraflex.kernel.tangent import note_slopes
 
-# Corrections end where the next is to be expected below this part of what they correct, or where, below the second
-# bound, they fall no more.
+# Corrections end if the next one is expected below the first bound, relative to the corrected values, or if they no
+# longer decrease below the second bound; the third is the ratio from which on they count as not decreasing.
 LAST_CORRECTION, NEARLY, FALLING = 2e-16, 1e-9, 0.5
-# With the matrix of a run; after these, with the exact one.
+# Largest number of corrections with the iteration matrix, and after these with the exact matrix.
 MOST_CORRECTIONS, MOST_EXACT = 60, 20
-# What is no more than this part of the largest accelerations of a run, or forces, is solved no more closely than that.
+# Accelerations and forces below this part of the largest of a run are solved with the absolute accuracy of that size.
 NEGLIGIBLE = 1e-6
 
 
@@ -42,19 +42,19 @@ NEGLIGIBLE = 1e-6
 class History(NamedTuple):
     """Steps of a run in order, with the motion at every stage.
 
-    Until `solve_steps_to_rounding` has solved them accelerations and multipliers are guesses.
+    Accelerations and multipliers are guesses until `solve_steps_to_rounding` has solved the steps.
     """
 
-    t: NDArray[np.float64]  # (steps,) when each begins
-    h: NDArray[np.float64]
-    restart: NDArray[np.int64]  # (steps,) whether its first stage is solved anew
+    t: NDArray[np.float64]  # (steps,) start times
+    h: NDArray[np.float64]  # (steps,) step sizes
+    restart: NDArray[np.int64]  # (steps,) whether the first stage is solved again
     q: NDArray[np.float64]  # (steps, stages, n)
     v: NDArray[np.float64]
     a: NDArray[np.float64]
     lam: NDArray[np.float64]  # (steps, stages, m)
     power: NDArray[np.float64]  # (steps, stages)
-    left: NDArray[np.float64]  # (steps,) largest last correction, as a part of what it corrected
-    least: NDArray[np.float64]  # (2,) accelerations and multipliers, or derivatives, that are but rounding of a run's
+    left: NDArray[np.float64]  # (steps,) largest last relative correction
+    least: NDArray[np.float64]  # (2,) negligible sizes of accelerations and multipliers, or of their derivatives
 
 
 def make_history(steps: int, stages: int, n: int, m: int) -> History:
@@ -66,7 +66,7 @@ def make_history(steps: int, stages: int, n: int, m: int) -> History:
 
 @routine
 def baumgarte_weights(controls, alpha, beta, h):
-    """Weights of Phi'', Phi' and Phi in a step's stages; without a step, h = 0, those of a first stage."""
+    """Return the weights of Phi'', Phi' and Phi in a step's stages; for h = 0 those of a first stage."""
     if h > 0.0:
         alpha, beta = baumgarte_gains(controls, alpha, beta, h)
     elif controls.gain > 0.0:
@@ -76,7 +76,7 @@ def baumgarte_weights(controls, alpha, beta, h):
 
 @routine
 def ended(change, previous, iteration):
-    """Whether corrections are down to rounding, from the last two relative ones."""
+    """Return whether corrections have reached rounding, from the last two relative ones."""
     if iteration == 0:
         return change <= LAST_CORRECTION
     return change * change <= LAST_CORRECTION * previous or (change < NEARLY and change > FALLING * previous)
@@ -84,7 +84,7 @@ def ended(change, previous, iteration):
 
 @inlined
 def relative(x, mu, a, lam, least_a, least_lam):
-    """Corrections of accelerations and multipliers relative to these, or to the least that count."""
+    """Return the correction of accelerations and multipliers relative to these, or to their negligible sizes."""
     change, size = largest(x), max(largest(a), least_a)
     if size > 0.0:
         change /= size
@@ -96,7 +96,7 @@ def relative(x, mu, a, lam, least_a, least_lam):
 
 @routine
 def prepare_matrix(system, b, q, v, a, lam, dependent_part, work):
-    """The iteration matrix for a stage at (q, v, a, lambda)."""
+    """Prepare the iteration matrix for a stage at (q, v, a, lambda)."""
     note_friction(system, q, v, work.mu, work.compliance)
     if work.step[0] != b or b == 0.0:
         note_all_axial_forces(system, q, v, a, lam, work, work.geometric)
@@ -106,15 +106,16 @@ def prepare_matrix(system, b, q, v, a, lam, dependent_part, work):
 
 @inlined
 def multiplier_unit(least):
-    """Unit of multipliers relative to accelerations: the ratio of the largest ones of a run."""
+    """Return the unit of multipliers relative to accelerations: the ratio of the largest ones of a run."""
     return least[1] / least[0] if least[0] > 0.0 and least[1] > 0.0 else 1.0
 
 
 @routine
 def solve_to_rounding(system, signals, t, g, b, weights, dependent_part, march, a, lam, least, direction, space, work):
-    """Solve a stage from march.qs and march.vs to rounding: a and lam, q and v in `work`; the last relative correction.
+    """Solve a stage from march.qs and march.vs to rounding; return the last relative correction.
 
-    Where corrections with the iteration matrix do not get there, they begin anew from the guess with the exact one.
+    The solution is in a and lam, with q and v in `work`. If corrections with the iteration matrix do not converge, they
+    restart from the guess with the exact matrix.
     """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     change, previous = 0.0, 0.0
@@ -223,7 +224,7 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
 
 @kernel
 def sample_energies(system, q, v, lam, scratch, out):
-    """Kinetic energy, strain energy with that of springs, and work of gravity at samples, into out.
+    """Compute kinetic energy, strain energy including springs, and work of gravity at samples, into out.
 
     q, v : (k, n) arrays; lam : (k, m) array; out : (k, 3) array.
     """

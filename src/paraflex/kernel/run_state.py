@@ -1,4 +1,4 @@
-"""Data of a run for the time loop: its scheme, the user's controls, its state between calls, its samples."""
+"""Data of a run for the time loop: scheme, settings, state between calls, samples."""
 
 from __future__ import annotations
 
@@ -10,134 +10,135 @@ from numpy.typing import NDArray
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.compiling import by_reference
 
-# Singular positions kept of a run.
+# Largest number of singular positions recorded in a run.
 MOST_PASSAGES = 1000
-# Why `march` returned.
+# Return codes of `march`.
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
-# Why `attempt` did so besides: the step comes near a singular position, and its start is to be prepared.
+# Further return code of `attempt`: the step comes near a singular position, and its start is to be prepared.
 ENTERS = 5
-# A sampled law gives torques that are not finite.
+# Return code if the torques of a sampled controller are not finite.
 LAW_FAILED = 6
-# March.clock
+# Indices of March.clock.
 TIME, STEP, WORK, FACTOR_B, CONTRACTION, ENERGY_0 = range(6)
 WEIGHT_0, BALANCE, PHI_MAX, DPHI_MAX, LAST_STEP, LAST_ERROR = range(6, 12)
-# and of a fixed step in which Newton's iteration did not converge: when it ends, and how long its parts are.
+# Fixed step in which Newton's iteration did not converge: its end, and the length of its parts.
 PART_END, PART = range(15, 17)
-# and of the row nearest to dependence: the root of the part of its square left, how fast that changes [1/s], and the
-# largest part so far.
+# Row nearest to dependence: square root of its relative pivot, the rate of change of that root [1/s], and the largest
+# relative pivot so far.
 ROOT, ROOT_RATE, WIDEST = range(12, 15)
-# and the b of the iteration matrix that root and the largest part are in.
+# Coefficient b of the iteration matrix to which ROOT and WIDEST belong.
 ROOT_B = 17
-# The length of the last step attempted.
+# Size of the last step attempted.
 TRIED = 18
-# g and b of the last stage.
+# Coefficients g and b of the last stage.
 STAGE_G, STAGE_B = 19, 20
-# The time in which local errors may add up to the tolerance, the largest rate of the motion until now [1/s], and how
-# long a velocity error is taken to last in the factor that filters it.
+# Time in which local errors may add up to the tolerance, largest rate of the motion so far [1/s], and assumed duration
+# of a velocity error in the factor that filters it.
 CYCLE, FASTEST, MEMORY = 21, 22, 23
-# What the last sample solved has changed forces by, as a part of the largest.
+# Change of forces at the last sample solved, as a part of the largest force.
 SAMPLE_CHANGE = 24
-# Rows of March.forces: the largest multipliers, and what local errors have changed them by: in the last step, in the
-# last cycles, and in those that had most; vibrations that the last step has lost.
+# Rows of March.forces: the largest multipliers; their changes by local errors in the last step, in the last cycles, and
+# the largest such change so far; vibrations lost in the last step.
 PEAK, LOCAL, RECENT, UNRESOLVED, LOST = range(5)
-# March.counts
+# Indices of March.counts.
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)
-# and of the factor: iterations of a step while it was new, those beyond them since, steps since, steps to come with a
-# new one each.
+# Factor: iterations of a step while it was new, additional iterations since, steps since, and number of coming steps
+# that get a new factor each.
 FRESH, EXCESS, REUSED, IMPATIENT = range(8, 12)
-# Near a singular position: one more than the row nearest to dependence at the start of the step.
+# One plus the index of the row nearest to dependence at the start of a step near a singular position, else zero.
 NEAR = 12
-# The step at whose start ROOT was taken.
+# Step at whose start ROOT was computed.
 ROOT_STEP = 13
-# Whether the start of a step has been brought back to the constraints for that; -1 where it cannot be.
+# Whether the start of such a step has been projected onto the constraints; -1 if that is impossible.
 PREPARED = 14
-# Whether rows were not trusted at the end of the last step attempted, and of the last one taken.
+# Whether rows were held at the end of the last step attempted, and of the last step accepted.
 HELD_END, DRIFTED = 15, 16
-# Whether something given jumps at the time reached: first stages are found once more before the next step.
+# Whether an input jumps at the current time: the first stage is solved again before the next step.
 JUMPED = 17
 
 
-# What keeps the constraints, as integers for kernels; index 3 is POSITION.
+# Treatments of the constraints, as integers for kernels; index 3 is POSITION.
 BAUMGARTE, PROJECTION, GGL, POSITION = range(4)
-# Entries of Tableau.newmark.
+# Indices of Tableau.newmark.
 ALPHA_M, ALPHA_F, BETA, GAMMA, THETA = range(5)
 
 
 @by_reference
 class Tableau(NamedTuple):
-    """A scheme: data of a Runge-Kutta method for the ESDIRK family, coefficients for the Newmark family.
+    """Coefficients of a scheme: a Runge-Kutta method for the ESDIRK family, or parameters of the Newmark family.
 
-    A scheme of the Newmark family has the A and c of the trapezoidal rule, by which energy is counted.
+    A scheme of the Newmark family has A and c of the trapezoidal rule, by which energy is integrated.
     """
 
     A: NDArray[np.float64]
     c: NDArray[np.float64]
-    error: NDArray[np.float64]  # b - b^ of the embedded formula; empty where the error is estimated from the last step
+    error: NDArray[np.float64]  # b - b^ of the embedded formula; empty if the error is estimated from the last step
     dense: NDArray[np.int64]  # stages accurate enough to interpolate between, first and last among them
     nodes: NDArray[np.int64]  # stages through which multipliers are interpolated, ascending in time
-    order: int  # of the error estimate
+    order: int  # order of the error estimate
     newmark: NDArray[np.float64]  # alpha_m, alpha_f, beta, gamma, theta; empty for ESDIRK
 
 
 @by_reference
 class Controls(NamedTuple):
-    """Settings of a run by the user.
+    """Settings of a run.
 
-    Local errors add up to the tolerance within March.clock[CYCLE] when each step's stays below tolerance h / cycle.
+    Local errors add up to at most the tolerance within March.clock[CYCLE] if each step's stays below tolerance h /
+    cycle.
     """
 
     tolerance: float  # [m]
     span: float  # duration of the run [s]
-    by_cycle: int  # whether the cycle is that of the motion where that is shorter than the run
-    force_part: float  # error allowed in forces within a cycle, as a part of the largest; zero where none are looked at
-    force_control: int  # whether steps are chosen by that, too
-    force_cycles: float  # cycles in which a motion forgets errors of forces; infinite where vibrations do not die out
-    long_from: float  # length of steps from which on they are long beside vibrations [s]
-    newton_fraction: float  # of the error allowed in a step, the part left to Newton
+    by_cycle: int  # whether the cycle is that of the motion if that is shorter than the run
+    force_part: float  # error allowed in forces within a cycle, as a part of the largest; zero if not checked
+    force_control: int  # whether the step size is controlled by that error, too
+    force_cycles: float  # cycles in which errors of forces decay; infinite if vibrations are undamped
+    long_from: float  # step size from which on a step is long compared with vibrations [s]
+    newton_fraction: float  # part of the error allowed in a step that Newton's iteration may leave
     alpha: float
     beta: float
-    gain: float  # where positive alpha and beta are this over the step
+    gain: float  # if positive, alpha and beta are this divided by the step size
     treatment: int
-    least_step: float  # a run that needs shorter ones is given up [s]
+    least_step: float  # smallest step size [s]; a run that needs a smaller one fails
     max_step: float
-    fixed_step: float  # zero where steps are chosen by their errors
-    near_error: float  # error allowed in a step near a singular position, where that is more [m]
+    fixed_step: float  # zero if the step size is controlled by the error
+    near_error: float  # error allowed in a step near a singular position [m], if that is larger
     dependent_rows: int
-    turning: NDArray[np.int64]  # coordinates that are angles of bodies of which it matters how they stand
-    limit_t: NDArray[np.float64]  # times from which on steps are limited by what is given in time, ascending
-    limit_h: NDArray[np.float64]  # and the longest step from each to the next
-    turn_in_step: float  # by how much bodies turn within a step at most [rad]
-    dependent_part: float  # a row with less than this of its diagonal left when others are eliminated depends on them
+    turning: NDArray[np.int64]  # coordinates that are angles of bodies whose orientation matters
+    limit_t: NDArray[np.float64]  # times from which on the inputs limit the step size, ascending
+    limit_h: NDArray[np.float64]  # largest step size from each of these times to the next
+    turn_in_step: float  # largest rotation of these bodies within a step [rad]
+    dependent_part: float  # relative pivot below which a row is dependent
 
 
 @by_reference
 class March(NamedTuple):
-    """The state of a run between calls, and its work arrays."""
+    """State of a run between calls, and its work arrays."""
 
     clock: NDArray[np.float64]
     counts: NDArray[np.int64]
     q: NDArray[np.float64]  # (n,)
     v: NDArray[np.float64]
-    stage_t: NDArray[np.float64]  # (2, stages): of the last accepted step and of this one
+    stage_t: NDArray[np.float64]  # (2, stages): times in the last accepted step and in this one
     stage_q: NDArray[np.float64]  # (stages, n)
     stage_v: NDArray[np.float64]
-    stage_d: NDArray[np.float64]  # q' at the stages: stage_v itself, but for stabilised index 2
-    shift: NDArray[np.float64]  # (n,) of stabilised index 2, else empty
+    stage_d: NDArray[np.float64]  # q' at the stages: stage_v itself, except in stabilised index 2
+    shift: NDArray[np.float64]  # (n,) in stabilised index 2, else empty
     stage_a: NDArray[np.float64]  # (2, stages, n)
     stage_lam: NDArray[np.float64]  # (stages, m)
     power: NDArray[np.float64]  # (stages,)
     qs: NDArray[np.float64]  # (n,) explicit parts of a stage
     vs: NDArray[np.float64]
-    eq: NDArray[np.float64]  # (n,) estimated errors of a step
-    ev: NDArray[np.float64]
-    forces: NDArray[np.float64]  # (5, m) of multipliers: see PEAK
+    eq: NDArray[np.float64]  # (n,) estimated error of q in a step
+    ev: NDArray[np.float64]  # (n,) estimated error of v in a step
+    forces: NDArray[np.float64]  # (5, m) sizes and errors of multipliers: see PEAK
     guess_lam: NDArray[np.float64]  # (m,) multipliers of a sample before the equations of motion are solved there
-    torques: NDArray[np.float64]  # (acting,) of the motors at a stage, or forces, then of loads given in time
-    algorithmic: NDArray[np.float64]  # (2, n) accelerations that the Newmark family carries, of the last step and this
-    passages: NDArray[np.float64]  # (2, MOST_PASSAGES) from when to when more rows were dependent than at the start
-    opening: NDArray[np.float64]  # (n,) near a singular position: what opens the row nearest to dependence by one unit
+    torques: NDArray[np.float64]  # (acting,) motor torques or forces at a stage, then those of time-dependent loads
+    algorithmic: NDArray[np.float64]  # (2, n) algorithmic accelerations of the Newmark family, last and this step
+    passages: NDArray[np.float64]  # (2, MOST_PASSAGES) start and end of intervals around singular positions
+    opening: NDArray[np.float64]  # (n,) direction that opens the row nearest to dependence, near a singular position
     guess_t: NDArray[np.float64]  # (3,) times of the stages a guess is extrapolated from
-    guess_s: NDArray[np.int64]  # (3, 2) and where they stand in stage_a
+    guess_s: NDArray[np.int64]  # (3, 2) their indices in stage_a
 
 
 @by_reference
@@ -145,8 +146,8 @@ class Samples(NamedTuple):
     """Dense output: requested times and the solution there."""
 
     times: NDArray[np.float64]
-    asked: NDArray[np.bool_]  # (times,) those that are kept; others serve to find the largest loads
-    solved: NDArray[np.bool_]  # (times,) those where the equations of motion were solved, and no curve is
+    asked: NDArray[np.bool_]  # (times,) whether a sample is kept; others serve to find the largest loads
+    solved: NDArray[np.bool_]  # (times,) whether the equations of motion were solved, instead of interpolation
     q: NDArray[np.float64]  # (times, n)
     v: NDArray[np.float64]
     a: NDArray[np.float64]

@@ -1,10 +1,10 @@
-"""A sampled controller in the time loop: its readings, a linear law with limits, torques held between instants.
+"""Sampled controller in the time loop: its readings, a linear control law with limits, torques held between samples.
 
 With readings y, quantised and filtered, errors e = y - r_k and states x the law is
 
     w = P_k (h + C x + D e),   g = w within the limits,   x' = A x + B e + E (w - g),
 
-or a compiled function computes w from the errors and changes x. Torques g of sample k act (whole + part) periods later.
+or a compiled function computes w from the errors and updates x. Torques g of sample k act (whole + part) periods later.
 """
 
 from __future__ import annotations
@@ -22,37 +22,38 @@ from numpy.typing import NDArray
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.compiling import by_reference, routine
 
-# SampledLaw.counts: number of the next sample, of the next torques to act, whole periods of delay, what is wrong with
-# the next sample (0, NOT_FINITE or RAISED); the address of a compiled function.
+# Indices of SampledLaw.counts: number of the next sample, number of the next torques to act, whole periods of delay,
+# error of the next sample (0, NOT_FINITE or RAISED), address of a compiled function.
 SAMPLED, ACTED, WHOLE, WRONG, FUNCTION = range(5)
-# SampledLaw.clock: of the first sample, period [s]; part of a period of delay; instants closer than this are one [s].
+# Indices of SampledLaw.clock: time of the first sample [s], period [s], fraction of a period of delay, and the
+# difference below which times count as equal [s].
 START, PERIOD, PART, SLACK = range(4)
-# What `control` did.
+# Return values of `control`.
 NOTHING, CHANGED, FAILED = range(3)
-# Torques that are not finite, or an exception of a compiled function; its states before are in `scratch[1]` then.
+# Torques that are not finite, or an exception in a compiled function, whose previous states are then in `scratch[1]`.
 NOT_FINITE, RAISED = 1, 2
 
 
 @by_reference
 class SampledLaw(NamedTuple):
-    """A controller, its state, and what it has done; without one all arrays are empty."""
+    """Controller, its state, and its records; without a controller all arrays are empty."""
 
     clock: NDArray[np.float64]
     counts: NDArray[np.int64]
-    angle: NDArray[np.int64]  # (inputs,) readings, see `control.readings.Affine`
+    angle: NDArray[np.int64]  # (inputs,) index of an angle in each reading, see `control.readings.Affine`
     value: NDArray[np.float64]  # (inputs,)
     rows_q: NDArray[np.float64]  # (inputs, n)
     rows_v: NDArray[np.float64]
     rows_a: NDArray[np.float64]
     turning: NDArray[np.float64]
-    points: NDArray[np.int64]  # (places, 5) reading, then where r, angle and u begin, and size of u: see `Place`
+    points: NDArray[np.int64]  # (places, 5) reading, indices of r, angle and u, size of u: see `Place`
     shapes: NDArray[np.float64]  # (places, numbers) e, x0, N and B
-    resolution: NDArray[np.float64]  # (inputs,) zero without
-    filter_A: NDArray[np.float64]  # (filters, filters) of all filters at once
+    resolution: NDArray[np.float64]  # (inputs,) zero without quantisation
+    filter_A: NDArray[np.float64]  # (filters, filters) matrix of all filters together
     filter_B: NDArray[np.float64]  # (filters, inputs)
     filter_C: NDArray[np.float64]  # (inputs, filters)
     filter_D: NDArray[np.float64]  # (inputs,)
-    filter_start: NDArray[np.float64]  # (filters, inputs) settled at first readings
+    filter_start: NDArray[np.float64]  # (filters, inputs) steady state of the filters for the first readings
     reference: NDArray[np.float64]  # (samples, inputs)
     A: NDArray[np.float64]  # (states, states)
     B: NDArray[np.float64]  # (states, inputs)
@@ -60,28 +61,28 @@ class SampledLaw(NamedTuple):
     D: NDArray[np.float64]  # (outputs, inputs)
     E: NDArray[np.float64]  # (states, outputs)
     holding: NDArray[np.float64]  # (outputs,) h
-    first: NDArray[np.float64]  # (states, inputs) of first errors
-    waiting: NDArray[np.float64]  # (states,) one for those that stay as they are while a torque is limited
+    first: NDArray[np.float64]  # (states, inputs) initial states for the first errors
+    waiting: NDArray[np.float64]  # (states,) one for states that are held while a torque is limited
     projector: NDArray[np.float64]  # (samples, outputs, outputs), or none
     lowest: NDArray[np.float64]  # (outputs,)
     highest: NDArray[np.float64]
     most: NDArray[np.float64]  # (outputs,) largest change from sample to sample
     outputs: NDArray[np.int64]  # (outputs,) number of each motor
-    base: NDArray[np.float64]  # (breaks,) first coefficients of the signals without torques that are given
+    base: NDArray[np.float64]  # (breaks,) first coefficients of the signals without the controller's torques
     filtered: NDArray[np.float64]  # (filters,) states of filters
     x: NDArray[np.float64]  # (states,)
     last: NDArray[np.float64]  # (outputs,) torques of the last sample
-    held: NDArray[np.float64]  # (motors,) those that act
+    held: NDArray[np.float64]  # (motors,) torques that act
     scratch: NDArray[np.float64]  # (2, most of filters, states, inputs and outputs)
-    t: NDArray[np.float64]  # (samples,) times of samples, and from when on their torques acted
-    acted: NDArray[np.float64]
+    t: NDArray[np.float64]  # (samples,) sample times
+    acted: NDArray[np.float64]  # (samples,) times from which on the torques of each sample act
     readings: NDArray[np.float64]  # (samples, inputs)
-    wanted: NDArray[np.float64]  # (samples, outputs)
-    given: NDArray[np.float64]
+    wanted: NDArray[np.float64]  # (samples, outputs) torques before the limits
+    given: NDArray[np.float64]  # (samples, outputs) torques after the limits
 
 
 def no_law() -> SampledLaw:
-    """None, for a run without a controller."""
+    """Return an empty law, for a run without a controller."""
     none, rows, whole = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
     readings = (whole, none, rows, rows, rows, rows, np.zeros((0, 5), np.int64), rows, none)
     filters, law = (rows, rows, rows, none, rows), (rows, rows, rows, rows, rows, none, rows, none, np.zeros((0, 0, 0)))
@@ -90,7 +91,7 @@ def no_law() -> SampledLaw:
 
 
 def _function_called(typingctx, address, k, t, y, x, torques):
-    """Code that calls a function of C by its address, with numbers and pointers to data of vectors; what it returns."""
+    """Generate the call of a C function by its address, with numbers and pointers to vectors; returns its result."""
     signature = types.int64(address, k, t, y, x, torques)
 
     def code(context, builder, given, arguments):
@@ -120,7 +121,7 @@ def multiply_add(A, x, out):
 
 @routine
 def read(law, q, v, a, y):
-    """Readings (inputs,) at a state, quantised."""
+    """Compute the readings (inputs,) at a state, quantised."""
     for i in range(law.value.size):
         total, turned = law.value[i], 0.0
         for j in range(q.size):
@@ -137,7 +138,7 @@ def read(law, q, v, a, y):
 
 @routine
 def place_of(law, p, q):
-    """Place of a point along an axis: see `control.readings.Place`."""
+    """Return the position of a point along an axis: see `control.readings.Place`."""
     offset, angle, first, nf, numbers = law.points[p, 1], law.points[p, 2], law.points[p, 3], law.points[p, 4], 4
     x, y, bent = law.shapes[p, 2], law.shapes[p, 3], 0.0
     for i in range(nf):
@@ -152,7 +153,7 @@ def place_of(law, p, q):
 
 @routine
 def filter_readings(law, k, y):
-    """Readings as filters leave them; these go on to the next sample."""
+    """Filter the readings and advance the filters to the next sample."""
     before, after = law.filtered, law.scratch[1]
     if k == 0:
         fill(before, 0.0)
@@ -169,7 +170,7 @@ def filter_readings(law, k, y):
 
 @routine
 def take_sample(law, k, q, v, a):
-    """Read, and compute the torques of sample k; whether they are finite."""
+    """Take the readings and compute the torques of sample k; return whether they are finite."""
     y, wanted, given = law.readings[k], law.wanted[k], law.given[k]
     read(law, q, v, a, y)
     if law.filter_D.size > 0:
@@ -211,7 +212,7 @@ def take_sample(law, k, q, v, a):
 
 @routine
 def go_on_to_next(law, errors, wanted, given, limited):
-    """States of a linear law at the next sample."""
+    """Update the states of a linear law to the next sample."""
     x, after = law.x, law.scratch[1]
     fill(after, 0.0)
     multiply_add(law.A, x, after)
@@ -227,7 +228,7 @@ def go_on_to_next(law, errors, wanted, given, limited):
 
 @routine
 def next_instant(law):
-    """When it samples, or its torques act, next."""
+    """Return the time of the next sample or of the next torques to act."""
     clock, counts = law.clock, law.counts
     sample = clock[START] + counts[SAMPLED] * clock[PERIOD] if counts[SAMPLED] < law.t.size else inf
     if counts[ACTED] == counts[SAMPLED]:
@@ -237,12 +238,12 @@ def next_instant(law):
 
 @routine
 def control(law, signals, t, q, v, a):
-    """Do what is due at a time: take a sample, and let torques act.
+    """Perform the actions due at a time: take a sample, and apply torques.
 
     Returns
     -------
     int
-        NOTHING, CHANGED where torques are others from now on, or FAILED.
+        NOTHING, CHANGED if the torques change at this time, or FAILED.
     """
     clock, counts = law.clock, law.counts
     now = t + clock[SLACK]

@@ -31,22 +31,22 @@ from paraflex.kernel.run_state import (
 from paraflex.kernel.stage import ROUNDING, WORST_CONTRACTION, largest_part, note_torques, place, residuals
 from paraflex.kernel.step import constraint_weights, input_power
 
-# A sample this part of a step before its end is its end.
+# A sample within this part of a step before its end is at its end.
 SAME_TIME = 1e-9
-# Forces at a sample are solved to this part of the largest, in so many iterations at most.
+# Forces at a sample are solved to this part of the largest force, in at most this many iterations.
 FORCES, MOST = 1e-6, 12
-# Where they change by less than this part curves between stages stay as they are.
+# If they change by less than this part, the interpolated values are kept.
 NO_CHANGE = 1e-5
-# And between samples that are kept, interpolated ones may be off by this part.
+# Error allowed in interpolated forces at samples that are not kept, as a part of the largest force.
 FORCES_BETWEEN = 2e-2
-# Integrals over the first part of a step, of polynomials through powers at its stages.
+# Gauss quadrature over the first part of a step, for polynomials through the powers at its stages.
 GAUSS_X, GAUSS_W = (0.5 * values for values in np.polynomial.legendre.leggauss(4))
 GAUSS_X += 0.5
 
 
 @inlined
 def interpolate(q0, v0, a0, q1, v1, a1, h, x):
-    """Cubic Hermite q and v at fraction x of an interval h, and the derivative of v as a."""
+    """Return cubic Hermite values of q and v at fraction x of an interval h, and the derivative of v as a."""
     y = 1.0 - x
     h00, h10, h01, h11 = (1.0 + 2.0 * x) * y * y, x * y * y, x * x * (3.0 - 2.0 * x), -x * x * y
     d00, d10, d11 = -6.0 * x * y, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
@@ -58,16 +58,17 @@ def interpolate(q0, v0, a0, q1, v1, a1, h, x):
 
 @inlined
 def is_long(system, tableau, controls, h):
-    """Whether a step is long beside all vibrations of flexible bodies, and has stages for a curve through them."""
+    """Return whether a step is long compared with vibrations of flexible bodies and has stages to interpolate."""
     return system.modal.shape[1] > 0 and h >= controls.long_from and tableau.nodes.size > 2
 
 
 @routine
 def place_samples(tableau, t, h, long, march, out):
-    """Interpolate the state, accelerations and multipliers at every sample time in the step; the first of them.
+    """Interpolate state, accelerations and multipliers at every sample time in the step; return the first sample.
 
-    In a step that is long beside vibrations deflections follow loads, and velocities of its stages say little of them:
-    positions are those of a curve through all stages, and velocities its derivative.
+    In a step that is long compared with vibrations, deflections follow the loads, and the velocities of its stages are
+    not accurate: positions are then interpolated through all stages, and velocities are the derivative of that
+    polynomial.
     """
     piece, first = 0, march.counts[SAMPLE]
     i = first
@@ -96,13 +97,14 @@ def place_samples(tableau, t, h, long, march, out):
 def solve_samples(system, signals, controls, t, h, first, march, work, out, aside):
     """Solve the equations of motion at the samples within the step that are not at its end.
 
-    Samples that only serve to find the largest loads stay as they are where the last one solved lets expect them to be
-    near, and in a step short beside vibrations. Each is a stage of its own, with the g and b of the last one and such
-    explicit parts that q and v are those between the stages where the acceleration is. Deflections of flexible bodies
-    are not between stages where forces are: they are solved whatever the last one said.
+    Samples that only serve to find the largest loads keep their interpolated values if these are expected to be
+    accurate, judging by the last sample solved, and in steps short compared with vibrations. Each sample is a stage of
+    its own, with g and b of the last stage and explicit parts such that q and v are the interpolated ones for the
+    interpolated acceleration. Deflections of flexible bodies cannot be interpolated as accurately as forces: with
+    flexible bodies such samples are always solved in long steps.
 
-    Each is solved with the factor of the step, or with one made there where that one does not serve: near a singular
-    position, where rows of the step's factor are held, at once.
+    Each sample is solved with the factor of the step, or with a factor made at the sample if that fails. Near a
+    singular position, where rows of the step's factor are held, the factor is made at once.
     """
     near, g, b = march.counts[NEAR] > 0, march.clock[STAGE_G], march.clock[STAGE_B]
     weights = INDEX_1
@@ -125,7 +127,7 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
 
 @routine
 def solve_anew(system, signals, controls, i, weights, march, work, out, aside):
-    """Solve a sample with a factor made there; whether that leads anywhere."""
+    """Solve a sample with a factor made there; return whether the iteration succeeds."""
     q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
     g, b = march.clock[STAGE_G], march.clock[STAGE_B]
     copy(march.eq, a)
@@ -142,7 +144,7 @@ def solve_anew(system, signals, controls, i, weights, march, work, out, aside):
 
 @routine
 def end_sample(system, i, solved, march, work, out):
-    """Take what was solved if it changes anything, else what was there; whether it does."""
+    """Keep the solved values if they change anything, else restore the interpolated ones; return whether they do."""
     q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
     for r in range(lam.size):
         work.mu[r] = lam[r] - march.guess_lam[r] if solved else 0.0
@@ -159,14 +161,14 @@ def end_sample(system, i, solved, march, work, out):
 
 @inlined
 def explicit_parts(q, v, a, g, b, march):
-    """Explicit parts of a sample into march.qs and march.vs: such that q and v stay where a does."""
+    """Compute explicit parts of a sample into march.qs and march.vs, such that q and v belong to the acceleration a."""
     for j in range(q.size):
         march.qs[j], march.vs[j] = q[j] - b * a[j], v[j] - g * a[j]
 
 
 @routine
 def solve_at(system, signals, t, weights, g, b, contraction, march, work, a, lam, torques):
-    """Newton's iteration at a sample, until forces are right to FORCES of the largest; whether it gets there."""
+    """Solve a sample by Newton's iteration until forces are accurate to FORCES of the largest; return the success."""
     previous = 0.0
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     note_torques(signals, t, torques)
@@ -177,7 +179,7 @@ def solve_at(system, signals, t, weights, g, b, contraction, march, work, a, lam
         solve_system(system, work, work.x, work.mu)
         add(work.x, a)
         add(work.mu, lam)
-        # Of equations of motion: accelerations times the mass are forces.
+        # Accelerations times the mass are the forces of the equations of motion.
         change = max(largest(work.mu), system.total_mass * mass_norm(system, work, work.x))
         size = max(largest(lam), system.total_mass * mass_norm(system, work, a))
         if not isfinite(change):
@@ -194,7 +196,7 @@ def solve_at(system, signals, t, weights, g, b, contraction, march, work, a, lam
 
 @routine
 def write_energies(system, tableau, t, h, first, march, work, out):
-    """Energies and work at the samples of the step from the first on."""
+    """Compute energies and work at the samples of the step from `first` on."""
     for i in range(first, march.counts[SAMPLE]):
         kinetic, strain, weight = stored_energy(system, out.q[i], out.v[i], out.lam[i], work.scratch)
         out.energy[i, 0], out.energy[i, 1] = kinetic, strain
@@ -207,9 +209,10 @@ def write_energies(system, tableau, t, h, first, march, work, out):
 
 @routine
 def work_weight(tableau, s, x):
-    """Weight of the power at stage s in the work done until fraction x of a step, over its length; its derivative by x.
+    """Return the weight of stage s in the work done until fraction x of a step, and its derivative by x.
 
-    The polynomial through the powers at the nodes is integrated; a cubic brings the whole to the scheme's quadrature.
+    Both are relative to the step size. The polynomial through the powers at the nodes is integrated; a cubic corrects
+    the whole to the scheme's quadrature.
     """
     part, value, left = 0.0, 0.0, tableau.A[tableau.c.size - 1, s]
     for k in tableau.nodes:
@@ -223,7 +226,7 @@ def work_weight(tableau, s, x):
 
 @routine
 def step_work(tableau, h, march):
-    """Work done in the step, by the scheme's own quadrature."""
+    """Return the work done in the step, by the scheme's own quadrature."""
     last, work = tableau.c.size - 1, 0.0
     for s in range(last + 1):
         work += h * tableau.A[last, s] * march.power[s]
@@ -232,7 +235,7 @@ def step_work(tableau, h, march):
 
 @routine
 def power_along_curve(system, signals, tableau, t, h, march, work):
-    """Power at the stages of a long step, whose velocities there are those of the curve through all of them."""
+    """Compute the power at the stages of a long step, with velocities of the polynomial through all of them."""
     for i in range(march.power.size):
         time = t + tableau.c[i] * h
         differentiate_nodes(tableau, tableau.c[i], h, march.stage_q, work.v)
@@ -244,7 +247,7 @@ def power_along_curve(system, signals, tableau, t, h, march, work):
 
 @inlined
 def node_value(tableau, k, x):
-    """Value at fraction x of the polynomial that is one at node k and zero at the others."""
+    """Return the value at fraction x of the polynomial that is one at node k and zero at the others."""
     value = 1.0
     for l in tableau.nodes:
         if l != k:
@@ -254,7 +257,7 @@ def node_value(tableau, k, x):
 
 @inlined
 def node_slope(tableau, k, x):
-    """Derivative at fraction x of the polynomial that is one at node k and zero at the others."""
+    """Return the derivative at fraction x of the polynomial that is one at node k and zero at the others."""
     slope = 0.0
     for skipped in tableau.nodes:
         if skipped != k:
@@ -268,7 +271,7 @@ def node_slope(tableau, k, x):
 
 @routine
 def interpolate_nodes(tableau, x, stages, out):
-    """Values at fraction x of the step: the polynomial through those of the stages (stages, k) at the nodes."""
+    """Evaluate the polynomial through the values of stages (stages, k) at the nodes, at fraction x of the step."""
     fill(out, 0.0)
     for k in tableau.nodes:
         weight = node_value(tableau, k, x)
@@ -278,7 +281,7 @@ def interpolate_nodes(tableau, x, stages, out):
 
 @routine
 def differentiate_nodes(tableau, x, h, stages, out):
-    """Derivatives by time of what `interpolate_nodes` finds, in a step of length h."""
+    """Compute the time derivative of the polynomial of `interpolate_nodes`, in a step of length h."""
     fill(out, 0.0)
     for k in tableau.nodes:
         slope = node_slope(tableau, k, x) / h

@@ -1,15 +1,15 @@
-"""Derivatives of a run by its parameters: steps solved to rounding, and the linear equations of each stage.
+"""Forward sensitivities of a run: steps solved to rounding, and the linear equations of each stage.
 
-With the steps of a run as they are, the stages of a scheme are smooth functions of whatever the equations hold. Along
-a parameter s stage i of a step changes by
+With the steps of a run kept, the stages of a scheme are smooth functions of the parameters of the equations. For a
+parameter s stage i of a step changes by
 
     dv_i = dv_n + sum_j A_ij (h da_j + dh a_j),  dq_i = dq_n + sum_j A_ij (h dv_j + dh v_j)
     R_q dq_i + R_v dv_i + R_a da_i + R_lambda dlambda_i + R_s = 0
 
-where R are the residuals of `kernel.stage.equations`. The first four terms are those of `kernel.tangent`, exact. R_s is
-what the residuals change by where the motion does not: they are polynomials of low degree in the numbers of a packed
-system, in signals and weights, so that a central difference over four places is exact but for rounding. Equations are
-solved with the iteration matrix of a run, turned to where each stage stands, until nothing is left but rounding.
+where R are the residuals of `kernel.stage.equations`. The first four terms are exact, from `kernel.tangent`. R_s is the
+change of the residuals for an unchanged motion. The residuals are polynomials of low degree in the numbers of a packed
+system, in signals and weights, so a central difference over four points is exact except for rounding. The equations are
+solved with the iteration matrix of a run, rotated to the pose of each stage, until only rounding remains.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from paraflex.kernel.stage import equations, note_torques
 from paraflex.kernel.step import input_power
 from paraflex.kernel.tangent import note_slopes, residual_tangent
 
-# Places of the difference from the outside in: what is small first.
+# Points of the difference from the outside in, so that small terms are added first.
 OUTSIDE_IN = (0, 3, 1, 2)
 
 
@@ -57,7 +57,10 @@ def make_piece(signals: Signals) -> Signals:
 
 @routine
 def take_pieces(signals, t, moved, pieces):
-    """The piece of every signal at a time, from moved signals, as no point of the difference may see the next piece."""
+    """Copy the piece of every signal at a time from the moved signals.
+
+    With one piece only, no point of the difference can use the next piece.
+    """
     for k in range(signals.start.size - 1):
         at = piece_at(signals, k, t)
         for e in range(4):
@@ -67,7 +70,7 @@ def take_pieces(signals, t, moved, pieces):
 
 @routine
 def find_parametric(moved, signals, controls, t, d_t, length, d_length, q, v, a, lam, torques, sensitivity, work):
-    """R_s of a stage in a step of some length: by four moved systems, signals, times and weights."""
+    """Compute R_s of a stage in a step of some length, from four moved systems, signals, times and weights."""
     fill(sensitivity.f, 0.0)
     fill(sensitivity.rows, 0.0)
     for e in OUTSIDE_IN:
@@ -85,9 +88,10 @@ def find_parametric(moved, signals, controls, t, d_t, length, d_length, q, v, a,
 def respond_to_parameter(
     system, g, b, weights, dependent_part, q, v, a, lam, least, i, torques, sensitivity, direction, space, work
 ):
-    """Solve the linear equations of a stage for sensitivity.a[i] and sensitivity.lam[i]; the last relative correction.
+    """Solve the linear equations of a stage for sensitivity.a[i] and sensitivity.lam[i].
 
-    Its q[i] and v[i] hold what they are without the stage's own a, and then all.
+    On entry q[i] and v[i] of the sensitivity hold the derivatives without the stage's own a, on return the full ones.
+    Returns the last relative correction.
     """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     da, dlam = sensitivity.a[i], sensitivity.lam[i]
@@ -128,7 +132,7 @@ def respond_to_parameter(
 
 @routine
 def power_sensitivity(moved, signals, t, d_t, i, q, v, dv, lam, torques, sensitivity, work):
-    """Derivative of the power at stage i of motors and all other forces, with a velocity v whose derivative is dv."""
+    """Compute the derivative of the power of all forces at stage i, for a velocity v with the derivative dv."""
     total = 0.0
     for e in OUTSIDE_IN:
         step = PLACES[e] * DIFFERENCE_STEP
@@ -150,7 +154,7 @@ def stage_sensitivity(
     system, signals, moved, moved_signals, pieces, controls, t, d_t, length, d_length, g, q, v, a, lam, least, i,
     torques, sensitivity, direction, space, work,
 ):  # fmt: skip
-    """Derivatives of a stage, or a sample, from those without its own a; the last relative correction."""
+    """Compute derivatives of a stage or sample from those without its own a; return the last relative correction."""
     note_friction(system, q, v, work.mu, work.compliance)
     take_pieces(signals, t, moved_signals, pieces)
     find_parametric(moved, pieces, controls, t, d_t, length, d_length, q, v, a, lam, torques, sensitivity, work)
@@ -167,22 +171,23 @@ def sensitivity_steps(
     system, signals, moved, moved_signals, pieces, tableau, controls, count, history, sensitivity, direction, space,
     torques, work, out,
 ):  # fmt: skip
-    """Derivatives of the motion by one parameter over the first `count` steps of a history.
+    """Compute derivatives of the motion by one parameter over the first `count` steps of a history.
 
     Parameters
     ----------
     moved, moved_signals : tuples of 4
-        The packed system and the signals at the PLACES times DIFFERENCE_STEP of the parameter.
+        Packed system and signals with the parameter moved by PLACES times DIFFERENCE_STEP.
     pieces : tuple of 4 Signals
         Scratch, from `make_piece`.
     history : History
-        After `solve_steps_to_rounding`, and its samples `out`.
+        Steps after `solve_steps_to_rounding`, with samples in `out`.
     sensitivity : Sensitivity
-        Where the last steps left it: its q[0] and v[0] and, unless the first step restarts, its a[0] and lam[0].
+        State after the last steps: q[0] and v[0] and, unless the first step restarts, a[0] and lam[0].
     direction : Tangent
+        Scratch.
     """
     last = tableau.c.size - 1
-    # Another parameter left its factor.
+    # Discard the factor, which may belong to another parameter.
     work.step[0] = -1.0
     for k in range(count):
         h, sensitivity.left[k] = history.h[k], 0.0
@@ -244,7 +249,7 @@ def sensitivity_steps(
 
 @routine
 def keep_sample(stage, i, sensitivity):
-    """Take the derivatives of a stage as those of sample i."""
+    """Copy the derivatives of a stage to those of sample i."""
     copy(sensitivity.q[stage], sensitivity.sample_q[i])
     copy(sensitivity.v[stage], sensitivity.sample_v[i])
     copy(sensitivity.a[stage], sensitivity.sample_a[i])
@@ -253,7 +258,7 @@ def keep_sample(stage, i, sensitivity):
 
 @routine
 def start_sensitivity(tableau, i, k, g, history, sensitivity):
-    """q[i] and v[i] of the sensitivity without the stage's own a: the derivative of `step.stage_start`."""
+    """Compute q[i] and v[i] of the sensitivity without the stage's own a: the derivative of `step.stage_start`."""
     h, dh = history.h[k], sensitivity.h[k]
     for j in range(sensitivity.q.shape[1]):
         dv, dq = sensitivity.v[0, j], sensitivity.q[0, j]

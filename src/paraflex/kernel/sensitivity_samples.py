@@ -11,7 +11,7 @@ from paraflex.kernel.arrays import apart, fill
 from paraflex.kernel.compiling import by_reference, inlined, routine
 from paraflex.kernel.samples import differentiate_nodes, interpolate, node_slope, node_value, work_weight
 
-# Central differences of fourth order over this part of a parameter's size, and their places and weights.
+# Step of central differences of fourth order, as a part of a parameter's size, and their points and weights.
 DIFFERENCE_STEP = 1e-3
 PLACES, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 
@@ -20,35 +20,35 @@ PLACES, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, 
 class Sensitivity(NamedTuple):
     """Derivatives of the motion by one parameter: derivatives of the inputs, of the state, and of the samples."""
 
-    t: NDArray[np.float64]  # (steps,) of when steps begin
-    h: NDArray[np.float64]  # and of their lengths
-    gains: NDArray[np.float64]  # (4, 2) Baumgarte's alpha and beta at the places of the difference
-    q: NDArray[np.float64]  # (stages + 1, n) of the step at hand, the first where the last one ended, and of a sample
+    t: NDArray[np.float64]  # (steps,) derivatives of the start times of steps
+    h: NDArray[np.float64]  # (steps,) derivatives of the step sizes
+    gains: NDArray[np.float64]  # (4, 2) Baumgarte's alpha and beta at the points of the difference
+    q: NDArray[np.float64]  # (stages + 1, n) at the stages of the current step, the first its start, and at a sample
     v: NDArray[np.float64]
     a: NDArray[np.float64]
     lam: NDArray[np.float64]  # (stages + 1, m)
     power: NDArray[np.float64]  # (stages,)
     f: NDArray[np.float64]  # (n,) R_s of the equations of motion
-    rows: NDArray[np.float64]  # (m,) and of the rows
+    rows: NDArray[np.float64]  # (m,) R_s of the constraint rows
     moved_q: NDArray[np.float64]  # scratch
     moved_v: NDArray[np.float64]
     moved_lam: NDArray[np.float64]
-    work: NDArray[np.float64]  # (2,) work until now and its derivative
-    taken: NDArray[np.int64]  # (1,) samples until now
-    left: NDArray[np.float64]  # (steps,) as in `History`
-    times: NDArray[np.float64]  # (times,) of the samples
-    sample_times: NDArray[np.float64]  # and their derivatives
+    work: NDArray[np.float64]  # (2,) work so far and its derivative
+    taken: NDArray[np.int64]  # (1,) number of samples so far
+    left: NDArray[np.float64]  # (steps,) largest last relative correction, as in `History`
+    times: NDArray[np.float64]  # (times,) sample times
+    sample_times: NDArray[np.float64]  # (times,) derivatives of the sample times
     sample_q: NDArray[np.float64]  # (times, n)
     sample_v: NDArray[np.float64]
     sample_a: NDArray[np.float64]
     sample_lam: NDArray[np.float64]  # (times, m)
-    sample_work: NDArray[np.float64]  # (times,) without that of weight
+    sample_work: NDArray[np.float64]  # (times,) without the work of weight
 
 
 def make_sensitivity(
     steps: int, stages: int, n: int, m: int, times: NDArray[np.float64], sample_times: NDArray[np.float64]
 ) -> Sensitivity:
-    """Allocate the derivatives by one parameter; zero."""
+    """Allocate the derivatives by one parameter, set to zero."""
     k = times.size
     return Sensitivity(
         t=apart(steps),
@@ -79,7 +79,7 @@ def make_sensitivity(
 
 @routine
 def work_sensitivity(tableau, k, history, sensitivity):
-    """Work of the motors in step k, and its derivative."""
+    """Return the work of the motors in step k, and its derivative."""
     last, work, d_work = tableau.c.size - 1, 0.0, 0.0
     for s in range(last + 1):
         work += history.h[k] * tableau.A[last, s] * history.power[k, s]
@@ -89,7 +89,10 @@ def work_sensitivity(tableau, k, history, sensitivity):
 
 @routine
 def velocity_along_curve(tableau, k, x, d_x, history, sensitivity, v, dv):
-    """Velocity at fraction x of long step k, by `differentiate_nodes`, and its derivative, into v and dv."""
+    """Compute the velocity at fraction x of long step k, by `differentiate_nodes`, and its derivative.
+
+    They are written to v and dv.
+    """
     h = history.h[k]
     differentiate_nodes(tableau, x, h, history.q[k], v)
     differentiate_nodes(tableau, x, h, sensitivity.q, dv)
@@ -105,7 +108,7 @@ def velocity_along_curve(tableau, k, x, d_x, history, sensitivity, v, dv):
 
 @routine
 def node_sensitivity(tableau, fraction, d_fraction, stages, derivatives, out):
-    """Derivative of values of stages at a fraction of a step that moves itself, as by `interpolate_nodes`."""
+    """Differentiate `interpolate_nodes` by a parameter that changes the stages and the fraction of the step."""
     fill(out, 0.0)
     for s in tableau.nodes:
         weight, slope = node_value(tableau, s, fraction), node_slope(tableau, s, fraction)
@@ -115,7 +118,10 @@ def node_sensitivity(tableau, fraction, d_fraction, stages, derivatives, out):
 
 @routine
 def sensitivity_at_sample(tableau, k, i, long, history, sensitivity):
-    """Derivatives at sample i, within step k, of the curves there; their accelerations into sensitivity.moved_v."""
+    """Compute derivatives of the interpolated values at sample i, within step k.
+
+    The interpolated accelerations are left in sensitivity.moved_v.
+    """
     t, h = history.t[k], history.h[k]
     time, d_time = sensitivity.times[i], sensitivity.sample_times[i] - sensitivity.t[k]
     piece = 0
@@ -157,7 +163,7 @@ def sensitivity_at_sample(tableau, k, i, long, history, sensitivity):
 
 @inlined
 def curve(history, k, s0, s1, j, width, z):
-    """Coordinate j, its velocity and acceleration between two stages of step k."""
+    """Interpolate coordinate j, its velocity and acceleration between two stages of step k."""
     return interpolate(
         history.q[k, s0, j], history.v[k, s0, j], history.a[k, s0, j],
         history.q[k, s1, j], history.v[k, s1, j], history.a[k, s1, j], width, z,

@@ -1,4 +1,4 @@
-"""Functions of time as piecewise quintics, evaluated exactly with their derivatives."""
+"""Time profiles as piecewise quintics, evaluated exactly with their derivatives."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from paraflex.kernel.compiling import inlined, kernel
 
 @inlined
 def piece_at(s, k, t):
-    """The piece of signal k with breaks[piece] <= t, by bisection; the first or last outside its range."""
+    """Return the piece of signal k with breaks[piece] <= t, by bisection; the first or last piece outside the range."""
     low, high = s.start[k], s.start[k + 1] - 2
     while low < high:
         middle = (low + high + 1) // 2
@@ -20,7 +20,7 @@ def piece_at(s, k, t):
 
 @kernel
 def evaluate_signal(s, k, t):
-    """Value, rate and acceleration of signal k at time t; outside its range by the pieces at its ends."""
+    """Return value, rate and acceleration of signal k at time t; outside its range the end pieces are extrapolated."""
     piece = piece_at(s, k, t)
     c = s.coefficients[piece]
     x = t - s.breaks[piece]

@@ -1,14 +1,15 @@
-"""The implicit stage solver: equations of motion and constraints, solved for accelerations and multipliers.
+"""Implicit stage solver: equations of motion and constraints, solved for accelerations and multipliers.
 
 With q = q* + b a and v = v* + g a the unknowns of a stage are a and lambda,
 
     M a + h + K q + Phi_q^T lambda - F = 0
     w_a Phi'' + w_v Phi' + w_q Phi = 0
 
-Weights (1, 2 alpha, beta^2) make the second line Baumgarte's (Eqs. 56-57, index 1), (0, 1, 0) that of index 2 and
-(0, 0, 1) that of index 3. DIRK schemes have g = d h and b = g^2, the Newmark family other numbers; one solver serves
-all. The iteration matrix is [M + b K, Phi_q^T; Phi_q, 0]: gyroscopic terms are dropped, and the constraint row is
-divided by w_a + w_v g + w_q b, which makes it symmetric and keeps it well conditioned however small the step.
+With the weights (1, 2 alpha, beta^2) the second line is Baumgarte's (Eqs. 56-57, index 1), with (0, 1, 0) it is that of
+index 2, with (0, 0, 1) that of index 3. DIRK schemes have g = d h and b = g^2, the Newmark family has other values; one
+solver serves all. The iteration matrix is [M + b K, Phi_q^T; Phi_q, 0]: gyroscopic terms are dropped, and the
+constraint row is divided by w_a + w_v g + w_q b, which makes the matrix symmetric and well conditioned for any step
+size.
 """
 
 from __future__ import annotations
@@ -38,26 +39,26 @@ from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.sums import hand_on
 
 MAX_ITERATIONS, NEAR_ITERATIONS = 8, 24
-# SLOW: it still contracts after so many iterations.
+# SLOW: the iteration still contracts after the largest number of iterations.
 CONVERGED, DIVERGED, SINGULAR, SLOW = range(4)
-# The slowest contraction worth going on with, assumed of a new factor until one is measured.
+# The slowest contraction with which the iteration goes on; assumed for a new factor until one is measured.
 WORST_CONTRACTION = 0.5
-# After a guess that was right but for a direction that the norm hardly sees, the second change may be larger than the
-# first by so much.
+# After a guess that was right except in a direction with little weight in the norm, the second change may exceed the
+# first by this factor.
 SECOND_CONTRACTION = 20.0
-# Forces below this part of the largest, N and N m alike, are controlled as if they had it.
+# Forces below this part of the largest (N and N m alike) are controlled as if they were that large.
 SMALL_FORCE = 1e-2
-# A factor ages: the contraction assumed of it grows by this much with every stage that does not measure it. It is not
-# taken to be better than this: motion that sets in makes it worse at once.
+# The contraction assumed for an old factor grows by this much with every stage that does not measure it. It is not
+# assumed better than this bound: motion that sets in makes it worse at once.
 AGEING, BEST_CONTRACTION = 1.05, 0.02
-# Changes that fall no more are rounding where they are smaller than this part of the accelerations, or where they
-# move nothing further than this part of the mechanism's size: there are no more digits to be had.
+# Changes that no longer decrease are rounding if they are smaller than this part of the accelerations, or if they
+# displace nothing by more than this part of the mechanism's size.
 ROUNDING, FINEST = 1e-8, 4e-15
 
 
 @unoptimised
 def equations(system, signals, t, weights, q, v, a, lam, torques, work):
-    """Residuals of the equations of motion (work.f) and of the constraints (work.rows) at one instant.
+    """Compute the residuals of the equations of motion (work.f) and of the constraints (work.rows) at one time.
 
     The latter are w_a Phi'' + w_v Phi' + w_q Phi for weights (w_a, w_v, w_q).
     """
@@ -67,14 +68,14 @@ def equations(system, signals, t, weights, q, v, a, lam, torques, work):
 
 @inlined
 def note_torques(signals, t, torques):
-    """Torques of the motors, and of loads what is given in time, at a time."""
+    """Evaluate the motor torques, and the time-dependent components of loads, at a time."""
     for k in range(torques.size):
         torques[k] = evaluate_signal(signals, k, t)[0]
 
 
 @routine
 def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
-    """Residuals as by `equations`, with given torques."""
+    """Compute the residuals of `equations` with given torques."""
     start_rows(system, signals, t, weights, work.rows)
     start_compliant_rows(system, lam, work.rows)
     for i in range(system.bodies.size):
@@ -93,33 +94,34 @@ def solve_stage(
     system, signals, t, g, b, weights, qs, vs, a, lam, shift, torques, newton_tolerance, time_scale, contraction,
     dependent_part, renew, held, lag, peaks, force_tolerance, work,
 ):  # fmt: skip
-    """Newton iteration for one stage; a and lam are starting guesses and then the solution.
+    """Solve one stage by Newton's iteration; a and lam are starting guesses and then the solution.
 
     Parameters
     ----------
     qs, vs : (n,) arrays
-        The explicit parts q*, v*.
+        Explicit parts q*, v*.
     shift : (n,) array
-        Of stabilised index 2 (Gear, Gupta and Leimkuhler): what q takes besides, such that Phi = 0 as well; a guess
-        and then the solution. Empty for all else.
+        Additional change of q in stabilised index 2 (Gear, Gupta and Leimkuhler), such that Phi = 0 as well; a guess
+        and then the solution. Empty for all other treatments.
     newton_tolerance : float
-        Largest error left in q, in the mass norm; in v it is newton_tolerance / time_scale.
+        Largest remaining error of q, in the mass norm; in v it is newton_tolerance / time_scale.
     contraction : float
         Contraction measured in earlier stages with this factor.
     dependent_part : float
-        See `factor_schur`.
+        Relative pivot below which a row is dependent, see `factor_schur`.
     renew : bool
-        Whether every iteration factors the matrix where it stands, as near a singular position.
+        Whether every iteration factors the matrix at its current position, as near a singular position.
     peaks, force_tolerance : (m,) array, float
-        Largest error left in each multiplier, as a part of these; zero where positions alone count. Where constraints
-        leave nothing free accelerations tell nothing of multipliers.
+        Scale of each multiplier, and largest remaining error of the multipliers as a part of these; zero if only
+        positions are controlled. If the constraints leave no degree of freedom, accelerations do not reflect errors of
+        multipliers.
     held, lag : float
-        There what rows say is trusted as far as these tell: see `hold_rows`.
+        Limits of trust in rows near a singular position, see `hold_rows`.
 
     Returns
     -------
     status, iterations, contraction
-        work.q and work.v hold the stage's q and v.
+        Status, number of iterations and contraction; work.q and work.v hold the stage's q and v.
     """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     previous = 0.0
@@ -154,7 +156,7 @@ def solve_stage(
             return DIVERGED, iteration, contraction
         if iteration > 1:
             contraction = change / previous
-            # From a good guess the second change may be larger than the first; from then on each has to be smaller.
+            # After a good guess the second change may be larger than the first; later changes have to decrease.
             if change > newton_tolerance and contraction > (
                 SECOND_CONTRACTION if iteration == 2 else WORST_CONTRACTION
             ):
@@ -172,7 +174,7 @@ def solve_stage(
 
 @inlined
 def largest_part(mu, peaks):
-    """The largest of multipliers relative to peaks, of which small ones count as a part of the largest."""
+    """Return the largest multiplier relative to peaks, where small peaks count as a part of the largest."""
     part, least = 0.0, SMALL_FORCE * largest(peaks)
     for r in range(mu.size):
         part = max(part, abs(mu[r]) / max(peaks[r], least))
@@ -181,7 +183,7 @@ def largest_part(mu, peaks):
 
 @inlined
 def place(qs, vs, g, b, a, shift, work):
-    """Positions and velocities of a stage into work.q and work.v."""
+    """Compute positions and velocities of a stage into work.q and work.v."""
     for j in range(a.size):
         work.q[j] = qs[j] + b * a[j]
         work.v[j] = vs[j] + g * a[j]

@@ -1,8 +1,8 @@
 """One step of a scheme given as data: its stages and its error.
 
-A diagonally implicit scheme with explicit first stage and stiffly accurate last one: stage i stands at
-q_i = q_n + h sum_j A_ij v_j and v_i = v_n + h sum_j A_ij a_j, its own v_i and a_i among them, and the last stage is
-the new step's first. The Newmark family takes its one stage from `kernel.newmark`.
+The scheme is diagonally implicit with an explicit first stage, and stiffly accurate: stage i has
+q_i = q_n + h sum_j A_ij v_j and v_i = v_n + h sum_j A_ij a_j, which include its own v_i and a_i, and the last stage is
+the first of the next step. The Newmark family takes its only stage from `kernel.newmark`.
 """
 
 from __future__ import annotations
@@ -68,28 +68,28 @@ from paraflex.kernel.run_state import (
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.stage import CONVERGED, SINGULAR, SLOW, WORST_CONTRACTION, place, solve_stage
 
-# A new factor costs about as much as this many iterations: it pays once the old one has cost so many more.
-# Of second-order geometry it costs more.
+# A new factor costs about as much as this many iterations, so it pays once the old one has cost as many more. In
+# second-order geometry it costs more.
 FACTOR_COST, BENT_FACTOR_COST = 2, 3
-# So many steps get a new factor each after one that cost that much at once.
+# Number of steps that get a new factor each, after a factor that cost that much in its second step.
 IMPATIENCE = 20
-# So many times a stage is gone on with: with slopes of friction where it has come to, or because it contracts and the
-# step is fixed.
+# Largest number of times that a stage is continued: with friction slopes at its current rates, or since it contracts
+# and the step size is fixed.
 ROUNDS = 6
-# How long a velocity error that Newton leaves is taken to last, as a fraction of the cycle: it must count for more than
-# its share of one step, since it is of one sign while a factor is in use.
+# Assumed duration of a velocity error that Newton's iteration leaves, as a fraction of the cycle: it must count for
+# more than one step, since it has the same sign while a factor is in use.
 NEWTON_MEMORY = 0.02
-# The part of the error allowed in forces that Newton's iteration may leave, where they are controlled.
+# Part of the error allowed in forces that Newton's iteration may leave, if forces are controlled.
 FORCE_FRACTION = 0.03
-# Baumgarte's coefficients are this over the step at most.
+# Largest Baumgarte coefficients, times the step size.
 LARGEST_GAIN = 0.3
-# Stages closer than this part of a step stand at one time: a guess is extrapolated from different ones.
+# Stages closer than this part of a step count as one time: a guess is extrapolated from different times.
 SAME_TIME = 1e-6
 
 
 @routine
 def input_power(system, signals, t, q, v, lam, torques, work):
-    """Power of the motors, of prescribed motion and of loads, less that of dampers, friction and damping."""
+    """Return the power of the motors, of prescribed motion and of loads, less that of dampers, friction and damping."""
     total = load_power(system, q, v, torques) + axis_power(system, q, v, torques) - line_energy(system, q, v)[1]
     total -= dissipated_power(system, q, v, lam, work.mu) + modal_damping_power(system, v)
     for k in range(system.motor_sides.size):
@@ -104,11 +104,11 @@ def input_power(system, signals, t, q, v, lam, torques, work):
 
 @routine
 def predict(i, t, h, march):
-    """Starting guess for stage i at time t: the accelerations of the last three stages, extrapolated."""
+    """Extrapolate the accelerations of the last three stages, as starting guess for stage i at time t."""
     stages = march.stage_v.shape[0]
     a, times, rows = march.stage_a[1, i], march.guess_t, march.guess_s
     found = 0
-    # This step's stages, the latest first, then the last step's.
+    # Search this step's stages, the latest first, then those of the last step.
     for k in range(i + stages):
         step, j = (1, i - 1 - k) if k < i else (0, stages - 1 - (k - i))
         distinct = found < 3
@@ -131,7 +131,7 @@ def predict(i, t, h, march):
 
 @routine
 def renew_factor(system, b, march, work):
-    """Factor the bodies for stages of this b at the present deformation."""
+    """Factor the bodies for stages with this b at the current deformation."""
     note_all_axial_forces(system, march.q, march.v, march.stage_a[1, 0], march.stage_lam[0], work, work.geometric)
     factor_bodies(system, b, march.q, work)
     march.counts[FACTORS] += 1
@@ -140,9 +140,9 @@ def renew_factor(system, b, march, work):
 
 @routine
 def note_excess(system, iterations, fresh, march):
-    """Count the cost of a step beyond that of the first one of its factor, and request a new factor when it is large.
+    """Count the cost of a step beyond that of the first step of its factor, and request a new factor if it is large.
 
-    Where already the second step of a factor did, the next ones get a new factor each.
+    If it is large in the second step of a factor, the next steps get a new factor each.
     """
     cost = FACTOR_COST if system.bending is None else BENT_FACTOR_COST
     if fresh:
@@ -162,7 +162,7 @@ def note_excess(system, iterations, fresh, march):
 
 @routine
 def stage_start(tableau, i, t, h, march):
-    """Explicit parts of stage i into march.qs and march.vs; its time, g and b."""
+    """Compute the explicit parts of stage i into march.qs and march.vs; return its time, g and b."""
     g = tableau.A[i, i] * h
     for j in range(march.q.size):
         march.vs[j] = march.v[j]
@@ -179,9 +179,10 @@ def stage_start(tableau, i, t, h, march):
 
 @routine
 def baumgarte_gains(controls, alpha, beta, h):
-    """Baumgarte's coefficients in a step: in long ones no larger than lets violations decay within it.
+    """Return Baumgarte's coefficients for a step: in long steps no larger than needed for decay within the step.
 
-    Larger ones make of violations that Newton's iteration leaves more than the accelerations of slow motions.
+    Larger coefficients would turn the residual that Newton's iteration leaves in the constraints into more than the
+    accelerations of slow motions.
     """
     if controls.gain > 0.0:
         return controls.gain / h, controls.gain / h
@@ -190,7 +191,7 @@ def baumgarte_gains(controls, alpha, beta, h):
 
 @routine
 def constraint_weights(controls, h):
-    """Weights of Phi'', Phi' and Phi in the stage equations, and the `gains` of `filtered_error`."""
+    """Return the weights of Phi'', Phi' and Phi in the stage equations, and the `gains` of `filtered_error`."""
     if controls.treatment == POSITION:
         return (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     if controls.treatment == GGL:
@@ -203,12 +204,12 @@ def constraint_weights(controls, h):
 
 @routine
 def attempt(system, signals, tableau, controls, t, h, march, work, slow):
-    """One step from t: all stages and the error estimate, relative to the allowed error.
+    """Attempt one step from t: all stages and the error estimate, relative to the allowed error.
 
     Returns
     -------
     cause, error
-        cause is PAUSED where the stages were solved.
+        Cause of the return, PAUSED if the stages were solved, and relative error.
     """
     stages, one_stage = tableau.c.size, tableau.newmark.size > 0
     weights, gains = constraint_weights(controls, h)
@@ -218,7 +219,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
     fresh = march.clock[FACTOR_B] != b
     if fresh:
         if elastic_measure_changes(system, b, march):
-            # The rate at which rows come near to dependence is that between matrices of one b, the last step's.
+            # The rate of change of the root is computed from matrices with the same b, that of the last step.
             orient(system, march.q, work, controls.dependent_part)
             note_root(system, march, work)
         renew_factor(system, b, march, work)
@@ -264,7 +265,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
                 march.counts[NEAR], perhaps_near, rounds = 0, False, 0
                 continue
             note_position(march.stage_t[1, i], t, h, march)
-            # Constraints do not say what the accelerations are here, but those before do.
+            # The constraints do not determine the accelerations here, so they are extrapolated.
             predict(i, x, h, march)
             place(march.qs, march.vs, g, b, march.stage_a[1, i], march.shift, work)
         elif status != CONVERGED:
@@ -278,7 +279,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             if fresh and (rounds == ROUNDS or not goes_on):
                 return NO_CONVERGENCE, 0.0
             rounds = rounds + 1 if goes_on else 0
-            # An old factor may be to blame: once more with a new one before the step is cut.
+            # The cause may be an old factor: try again with a new one before the step is reduced.
             if not fresh:
                 renew_factor(system, b, march, work)
                 fresh = True

@@ -1,8 +1,9 @@
-"""Sums over the flexible coordinates of a body, all of them in one pass, and their transposes.
+"""Sums over the flexible coordinates of a body, computed in one pass, and their transposes.
 
-Column k of `PackedSystem.columns` says what each coordinate of the body contributes to sum k: S2 u and so on, then N u
-and the slope N2' u of every marker on it. A force that works on sum k works on coordinate j with columns[j, k] times
-it: all forces on a body are gathered as *shares* of the columns and handed on in a second pass.
+Column k of `PackedSystem.columns` has the contributions of the body's coordinates to sum k: first S2 u and the like,
+then N u and the slope N2' u of every marker on the body. A force conjugate to sum k acts on coordinate j with the
+factor columns[j, k]: all forces on a body are first collected as *shares*, one per column, and then distributed to the
+coordinates in a second pass.
 """
 
 from __future__ import annotations
@@ -12,14 +13,17 @@ from math import cos, sin
 from paraflex.kernel.compiling import inlined
 from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
 
-# The first columns of a body; those of its markers follow, x, y and slope each.
+# The first columns of a body; its markers follow with three columns each: x, y and slope.
 S2X_SUM, S2Y_SUM, I1_SUM, GJ_SUM = range(4)
 FIRST_MARKER = 4
 
 
 @inlined
 def column_sums(matrix, first, width, n, e, q, v, a, out):
-    """Sums of n coordinates from e on by the columns of a matrix (n, width) that begins at `first`: of q, v and a."""
+    """Compute weighted sums of n coordinates from e on, for q, v and a, into out.
+
+    The weights are the columns of an (n, width) matrix that begins at `first`.
+    """
     for block in range(0, width, LANES):
         of_q, of_v, of_a, at = zeros(), zeros(), zeros(), first + block
         for j in range(e, e + n):
@@ -35,7 +39,7 @@ def column_sums(matrix, first, width, n, e, q, v, a, out):
 
 @inlined
 def row_product(matrix, at, width, vector):
-    """The product of a row of a matrix, `width` entries from `at` on, and a vector."""
+    """Return the product of a matrix row, `width` entries from `at` on, and a vector."""
     total = zeros()
     for block in range(0, width, LANES):
         total = add_product(total, load(matrix, at + block), load(vector, block))
@@ -44,7 +48,7 @@ def row_product(matrix, at, width, vector):
 
 @inlined
 def body_sums(system, i, q, v, a, scratch):
-    """Every sum of body i, of u, u' and u'', into scratch; cosine and sine of its angle as well."""
+    """Compute all sums of body i for u, u' and u'' into scratch, with the cosine and sine of its angle."""
     body = system.bodies[i]
     e = body.offset + 3
     scratch.turn[0], scratch.turn[1] = cos(q[e - 1]), sin(q[e - 1])
@@ -53,14 +57,14 @@ def body_sums(system, i, q, v, a, scratch):
 
 @inlined
 def clear_shares(system, i, scratch):
-    """Set the generalised forces on all sums of body i to zero."""
+    """Set the shares, the generalised forces on all sums of body i, to zero."""
     for block in range(0, system.bodies[i].width, LANES):
         store(scratch.shares, block, zeros())
 
 
 @inlined
 def body_products(system, i, q, v, scratch):
-    """G2 u, G2 u' and I2 u of body i into scratch."""
+    """Compute G2 u, G2 u' and I2 u of body i into scratch."""
     body = system.bodies[i]
     e = body.offset + 3
     for block in range(0, body.stride, LANES):
@@ -79,7 +83,7 @@ def body_products(system, i, q, v, scratch):
 
 @inlined
 def hand_on(system, i, scratch, f):
-    """Add to f the forces on each flexible coordinate that follow from the shares."""
+    """Add to f the forces on the flexible coordinates of body i that follow from the shares."""
     body = system.bodies[i]
     e, at = body.offset + 3, body.columns
     for j in range(body.nf):

@@ -1,8 +1,9 @@
-"""Exact derivative of the residuals of `kernel.stage.equations` along a direction, term by term, by hand.
+"""Exact derivative of the residuals of `kernel.stage.equations` along a direction, term by term, derived by hand.
 
 Along (dq, dv, da, dlambda) the residual F of the equations of motion changes by F_q dq + F_v dv + M da + J^T dlambda,
-and the rows Phi'' + 2 alpha Phi' + beta^2 Phi by G_q dq + G_v dv + J da. Everything is a product rule over what the
-residuals are made of: points of bodies, forces at them, axes, lines. `d` in a name means: the change of what follows.
+and the rows Phi'' + 2 alpha Phi' + beta^2 Phi by G_q dq + G_v dv + J da. The product rule is applied to the parts of
+the residuals: points of bodies, forces at them, axes, lines. The prefix `d` of a name denotes a change along the
+direction.
 """
 
 from __future__ import annotations
@@ -25,20 +26,20 @@ from paraflex.kernel.tangent_points import end_tangent, force_tangent, marker_ta
 
 @by_reference
 class Tangent(NamedTuple):
-    """A direction and the changes along it."""
+    """Direction, and the changes along it."""
 
-    q: NDArray[np.float64]  # (n,) the direction
+    q: NDArray[np.float64]  # (n,) direction
     v: NDArray[np.float64]
     a: NDArray[np.float64]
     lam: NDArray[np.float64]  # (m,)
     f: NDArray[np.float64]  # (n,) change of the residual of the equations of motion
-    rows: NDArray[np.float64]  # (m,) and of the rows
+    rows: NDArray[np.float64]  # (m,) change of the residual of the rows
     friction: NDArray[np.float64]  # (m,) slope of the rows of friction against the rate, at the last `note_slopes`
     points: NDArray[np.float64] | None  # (8, max mass points of a body) scratch of second-order geometry
 
 
 def make_tangent(system: PackedSystem) -> Tangent:
-    """Allocate a direction, zero, and the changes along it."""
+    """Allocate a direction, set to zero, and the changes along it."""
     n, m = int(sum(3 + body["nf"] for body in system.bodies)), system.rows.size
     points = None if system.bending is None else np.zeros((8, int(system.bodies["points"].max(initial=0))))
     q, v, a, f = (np.zeros(n) for _ in range(4))
@@ -88,7 +89,7 @@ def lines_tangent(system, q, v, direction):
         bx, by, vbx, vby, _, _, rbx, rby = end_motion(system, line.b, line.bx, line.by, q, v, v)
         dx, dy = bx - ax, by - ay
         length = sqrt(dx * dx + dy * dy)
-        # Without length there is no direction, and `line_state` has no force.
+        # A line of zero length has no direction, and no force in `line_state`.
         if length == 0.0:
             continue
         d_ax, d_ay, d_vax, d_vay, _, _, d_rax, d_ray = end_tangent(system, line.a, q, v, v, direction)
@@ -114,9 +115,9 @@ def lines_tangent(system, q, v, direction):
 
 @kernel
 def note_slopes(system, q, v, rates, compliance, direction):
-    """Slopes of the rows of friction against the rate, into direction.friction; `rates` is scratch (m,).
+    """Compute the slopes of the rows of friction by the rate into direction.friction; `rates` is scratch (m,).
 
-    `compliance` is what their residuals are multiplied by: see `joints.finish_friction`.
+    `compliance` is the factor of their residuals: see `joints.finish_friction`.
     """
     if not joint_rates(system, q, v, rates):
         return
@@ -140,21 +141,21 @@ def finish_rows(system, compliance, direction):
 
 @kernel
 def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, last, direction):
-    """Change of the residuals along a direction, direction.f and direction.rows.
+    """Compute the change of the residuals along a direction, into direction.f and direction.rows.
 
     Parameters
     ----------
     weights : tuple of 3 float
-        Of Phi'', Phi' and Phi in the rows of constraints: (1, 2 alpha, beta^2) for those of `equations`.
+        Weights of Phi'', Phi' and Phi in the rows of constraints, such as (1, 2 alpha, beta^2).
     torques : (acting,) array
-        As `equations` left them.
+        Torques left by `equations`.
     compliance : (m,) array
-        That of the workspace the residuals were found with.
+        Compliance in the workspace with which the residuals were computed.
     first, last : int
-        Bodies from first to before last; the direction is zero in the coordinates of all others, and in
-        direction.lam unless these are all bodies.
+        Range of bodies, from first to before last. The direction must be zero in the coordinates of all other bodies,
+        and in direction.lam unless the range has all bodies.
     direction : Tangent
-        Its direction is read, direction.f and direction.rows are written; `note_slopes` has been called at (q, v).
+        Direction, which is read; direction.f and direction.rows are written. `note_slopes` has been called at (q, v).
     """
     fill(direction.f, 0.0)
     fill(direction.rows, 0.0)
@@ -169,9 +170,10 @@ def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, 
 
 @kernel
 def reaction_tangent(system, weights, q, v, a, lam, idle, first, last, direction):
-    """Change of Phi_q^T lambda, into direction.f, and of the rows, into direction.rows, without any other force.
+    """Compute the change of Phi_q^T lambda into direction.f, and of the rows into direction.rows, without other forces.
 
-    Along dlambda alone direction.f is Phi_q^T dlambda. `idle` (motors,) is zero; else as for `residual_tangent`.
+    Along dlambda alone direction.f is Phi_q^T dlambda. `idle` (motors,) is zero; other arguments as for
+    `residual_tangent`.
     """
     fill(direction.f, 0.0)
     fill(direction.rows, 0.0)

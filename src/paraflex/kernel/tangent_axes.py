@@ -12,9 +12,10 @@ from paraflex.kernel.tangent_points import end_tangent, force_tangent
 
 @inlined
 def component_tangent(ex, ey, at, change, w, dw, turn, d_w, d_dw):
-    """Changes of the results of `axes.component`: `at` is d with its derivatives, `change` theirs; e turns by turn.
+    """Return the changes of the results of `axes.component`.
 
-    e changes by turn E e, so that e . x changes by turn e x x + e . dx, and e x x by e x dx - turn e . x.
+    `at` is d with its derivatives, `change` their changes, and `turn` is the rotation of e. e changes by turn E e, so
+    that e . x changes by turn e x x + e . dx, and e x x by e x dx - turn e . x.
     """
     dx, dy, ux, uy, bx, by = at
     d_dx, d_dy, d_ux, d_uy, d_bx, d_by = change
@@ -33,7 +34,7 @@ def component_tangent(ex, ey, at, change, w, dw, turn, d_w, d_dw):
 
 @routine
 def add_track_tangent(system, axis, x, d_x, force, d_force, direction):
-    """Subtract from direction.f the change of force W(x) along a track."""
+    """Subtract the change of force W(x) along a track from direction.f."""
     owner, at, z = track_piece(system, axis, x)
     body = system.bodies[owner]
     for j in range(body.nf):
@@ -43,9 +44,9 @@ def add_track_tangent(system, axis, x, d_x, force, d_force, direction):
 
 @routine
 def axis_tangent(system, k, q, v, a, direction):
-    """Changes for axis k: of value, rate and acceleration; e, its change; the lever, its change; x, its change.
+    """Return the changes for axis k: of value, rate and acceleration; e, its change; lever, its change; x, its change.
 
-    Then R s of both ends and its changes, four numbers each. On a track as in `axes.axis_motion`: e and lever are
+    R s of both ends and its changes follow, four numbers each. On a track, as in `axes.axis_motion`, e and lever are
     those of the normal to the deflected beam.
     """
     axis = system.axes[k]
@@ -57,7 +58,7 @@ def axis_tangent(system, k, q, v, a, direction):
     if axis.a >= 0:
         turn, d_w, d_dw = marker_angles(system, system.markers[axis.a], direction.q, direction.v, direction.a)
     if axis.between:
-        # Where n . d is zero the second derivative is stationary in w, and has no part of dw.
+        # As n . d is zero, the second derivative is stationary in w and does not depend on dw.
         turn, d_w, d_dw = line_turn(at[0], at[1], change[0], change[1]), 0.0, 0.0
     ex, ey = cos(theta), sin(theta)
     d_ex, d_ey = -turn * ey, turn * ex
@@ -88,7 +89,10 @@ def axis_tangent(system, k, q, v, a, direction):
 
 @routine
 def axes_tangent(system, weights, q, v, a, lam, torques, direction):
-    """Add the changes of the rows of all axes to direction.rows, of their forces, motors among them, to direction.f."""
+    """Add the changes of the rows of all axes to direction.rows, and those of their forces to direction.f.
+
+    The forces include those of motors.
+    """
     for k in range(system.axes.size):
         axis = system.axes[k]
         value, rate, acceleration, ex, ey, d_ex, d_ey, lever, d_lever, x, d_x, ends, d_ends = axis_tangent(

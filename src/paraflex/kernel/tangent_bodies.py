@@ -1,4 +1,4 @@
-"""Changes of the terms of one body along a direction, of both geometries: see `kernel.tangent`."""
+"""Changes of the terms of one body along a direction, for both geometries: see `kernel.tangent`."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.packed import DAMPING, GJ, I1, OMEGA2, S2X, S2Y
 from paraflex.kernel.tangent_points import rotated_tangent, turned_axes
 
-# Rows of Tangent.points: slopes at the Gauss points, their two derivatives, the axial force carried there; and changes
-# of these.
+# Rows of Tangent.points: slopes at the Gauss points, their two derivatives, the axial force there; and changes of
+# these.
 W0, W1, W2, AXIAL_FORCE, DW0, DW1, DW2, DAXIAL_FORCE = range(8)
 
 
 @inlined
 def plane_sums(shapes, x, y, stride, n, e, u, d_u):
-    """Sums of n coordinates from e on, of u and of d_u, by shapes from x and from y on, `stride` apart.
+    """Sum n coordinates from e on, of u and of d_u, weighted by shapes from x and from y on, `stride` apart.
 
     Returns
     -------
     (x, y), (d_x, d_y) : floats
+        Sums of u and of d_u.
     """
     along, across, d_along, d_across = 0.0, 0.0, 0.0, 0.0
     for j in range(n):
@@ -31,7 +32,10 @@ def plane_sums(shapes, x, y, stride, n, e, u, d_u):
 
 @inlined
 def frame_tangent(system, i, q, a, direction):
-    """Axes of body i, their turn, and in them its acceleration less gravity and the change of that."""
+    """Return the axes of body i, its acceleration less gravity in the body frame, and the change of that acceleration.
+
+    The axes are those of `turned_axes`.
+    """
     o = system.bodies[i].offset
     c, s, turn = turned_axes(system, i, q, direction)
     gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
@@ -43,7 +47,10 @@ def frame_tangent(system, i, q, a, direction):
 
 @inlined
 def body_tangent(system, i, q, v, a, direction):
-    """Change of M q'' + h + D u' + K u of body i, less its weight, into direction.f: see `bodies.body_equations`."""
+    """Compute the change of M q'' + h + D u' + K u of body i, less its weight, into direction.f.
+
+    The terms are those of `bodies.body_terms`.
+    """
     body = system.bodies[i]
     o, n, k = body.offset, body.nf, body.flex
     e, x, y, width = o + 3, body.columns + S2X, body.columns + S2Y, body.width
@@ -102,7 +109,7 @@ def body_tangent(system, i, q, v, a, direction):
 
 @routine
 def second_order_slopes(system, i, q, v, a, direction, points):
-    """Slopes at the Gauss points of body i, their derivatives, and the changes of these, into points."""
+    """Compute slopes at the Gauss points of body i, their derivatives, and the changes of these, into points."""
     body = system.bodies[i]
     e = body.offset + 3
     for j in range(body.slopes):
@@ -120,7 +127,10 @@ def second_order_slopes(system, i, q, v, a, direction, points):
 
 @routine
 def second_order_tangent(system, i, q, v, a, direction, points):
-    """Change of M q'' + h + D u' + K u of body i, less its weight, into direction.f: see `second_order_equations`."""
+    """Compute the change of M q'' + h + D u' + K u of body i, less its weight, into direction.f.
+
+    The terms are those of `second_order_equations`.
+    """
     body = system.bodies[i]
     o, n, pitch = body.offset, body.nf, body.pitch
     e, stride = o + 3, 3 * pitch
@@ -184,7 +194,10 @@ def second_order_tangent(system, i, q, v, a, direction, points):
 
 @inlined
 def body_terms_tangent(system, i, q, v, a, direction, points):
-    """Change of the terms of body i into direction.f; `points` is direction.points, None for linear geometry."""
+    """Compute the change of the terms of body i into direction.f.
+
+    `points` is direction.points, None for linear geometry.
+    """
     if points is None:
         body_tangent(system, i, q, v, a, direction)
     elif system.bodies[i].slopes > 0:

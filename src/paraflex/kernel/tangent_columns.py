@@ -1,4 +1,4 @@
-"""Columns of the tangent matrices of the equations of motion, of bodies that do not touch one another at once."""
+"""Columns of the tangent matrices of the equations of motion, computed together for bodies that are not connected."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.compiling import kernel
 from paraflex.kernel.tangent import residual_tangent
 
-# Which part of the motion changes: the accelerations, the velocities or the coordinates.
+# Part of the motion that changes: accelerations, velocities or coordinates.
 ACCELERATION, VELOCITY, COORDINATE = range(3)
 
 
 @kernel
 def tangent_columns(system, weights, part, colours, q, v, a, lam, torques, compliance, direction, forces, rows):
-    """Changes of the residuals by the coordinates of bodies, into forces (columns, n) and rows (columns, m).
+    """Compute changes of the residuals by the coordinates of bodies, into forces (columns, n) and rows (columns, m).
 
     Parameters
     ----------
     part : int
-        ACCELERATION, VELOCITY or COORDINATE: what changes, in steps of one.
+        Part of the motion that changes, in steps of one: ACCELERATION, VELOCITY or COORDINATE.
     colours : (bodies,) array of int
-        Bodies of one colour are moved together. The columns are those of the first coordinate of all bodies of the
-        first colour, of their second, and so on.
+        Colours of bodies; bodies of one colour are moved together. The columns are those of the first coordinate of all
+        bodies of the first colour, of their second, and so on.
     weights, q, v, a, lam, torques, compliance, direction
-        See `residual_tangent`; direction.friction holds the slopes of the rows of friction.
+        Arguments of `residual_tangent`; direction.friction holds the slopes of the rows of friction.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from paraflex.kernel.packed import NX, NY
 
 @inlined
 def shortening_tangent(system, bending, marker, q, v, a, direction):
-    """Changes of the results of `joints.marker_shortening`."""
+    """Return the changes of the results of `joints.marker_shortening`."""
     f0, f1, f2 = 0.0, 0.0, 0.0
     if bending is None:
         return f0, f1, f2
@@ -33,21 +33,21 @@ def shortening_tangent(system, bending, marker, q, v, a, direction):
 
 @inlined
 def turned_axes(system, i, q, direction):
-    """Cosine and sine of a body's angle, and the change of the angle."""
+    """Return cosine and sine of a body's angle, and the change of the angle."""
     angle = system.bodies[i].offset + 2
     return cos(q[angle]), sin(q[angle]), direction.q[angle]
 
 
 @inlined
 def rotated_tangent(axes, x, y, d_x, d_y):
-    """Change of R (x, y), of a vector in the body frame that changes by (d_x, d_y), with `turned_axes`."""
+    """Return the change of R (x, y) for a body-frame vector that changes by (d_x, d_y), with `turned_axes`."""
     c, s, turn = axes
     return c * d_x - s * d_y - turn * (s * x + c * y), s * d_x + c * d_y + turn * (c * x - s * y)
 
 
 @routine
 def marker_tangent(system, marker, q, v, a, direction):
-    """Changes of the results of `joints.marker_motion`: a marker's position, velocity, acceleration and R s."""
+    """Return the changes of the results of `joints.marker_motion`: position, velocity, acceleration and R s."""
     o, axes = system.bodies[marker.body].offset, turned_axes(system, marker.body, q, direction)
     w, dw, d_w, d_dw = v[o + 2], a[o + 2], direction.v[o + 2], direction.a[o + 2]
     shapes, shortening = marker_shapes(system, marker, q, v, a)
@@ -71,7 +71,7 @@ def marker_tangent(system, marker, q, v, a, direction):
 
 @routine
 def force_tangent(system, marker, q, force, d_force, lever, d_lever, direction):
-    """Add to direction.f the change of the generalised force of a force (x, y) at a marker, whose R s is the lever."""
+    """Add the change of the generalised force of a force (x, y) at a marker to direction.f; the lever is its R s."""
     body = system.bodies[marker.body]
     o, e, k, n = body.offset, body.offset + 3, marker.shape, body.nf
     c, s, turn = turned_axes(system, marker.body, q, direction)
@@ -104,7 +104,7 @@ def shorten_tangent(system, bending, marker, q, force, d_force, direction):
 
 @inlined
 def end_tangent(system, marker, q, v, a, direction):
-    """Changes of the results of `marker_motion` for one end of an axis or a line: zero on the ground."""
+    """Return the changes of the results of `marker_motion` for one end of an axis or a line, zero on the ground."""
     if marker < 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return marker_tangent(system, system.markers[marker], q, v, a, direction)

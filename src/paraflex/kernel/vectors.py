@@ -1,8 +1,8 @@
 """Vectors of eight numbers, for loops that compilers do not vectorise.
 
-Loops over the handful of flexible coordinates of a body are too short for it: they end before the vector units have
-begun. So arrays that such loops run over are laid out in groups of `LANES`, padded with zeros, and taken by these
-functions, which become single instructions (of whatever width the machine has). Arrays are of one dimension.
+Loops over the few flexible coordinates of a body are too short for automatic vectorisation: they end before the vector
+units are in use. Arrays for such loops are therefore one-dimensional, laid out in groups of `LANES` and padded with
+zeros, and are processed by these functions, which become single instructions of the width that the machine has.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numba.extending import intrinsic, models, register_jitable, register_model
 from paraflex.kernel.compiling import FAST_MATH
 
 LANES = 8
-# Called without its first argument, which no type checker knows.
+# Numba supplies the first argument of an intrinsic; type checkers do not know that.
 operation: Any = intrinsic
 _VECTOR, _INDEX = ir.VectorType(ir.DoubleType(), LANES), ir.IntType(32)
 _FLAGS = tuple(sorted(FAST_MATH))
@@ -25,12 +25,12 @@ _FLAGS = tuple(sorted(FAST_MATH))
 
 @register_jitable
 def padded(count: int) -> int:
-    """The next multiple of LANES."""
+    """Return the smallest multiple of LANES that is not less than a count."""
     return -(-count // LANES) * LANES
 
 
 class _Vector(types.Type):
-    """The type of a vector, for Numba."""
+    """Numba type of a vector."""
 
     def __init__(self) -> None:
         super().__init__(name=f"Vector{LANES}")
@@ -62,7 +62,7 @@ def _add_product(builder, total, a, b):
 
 @operation
 def zeros(typingctx):
-    """A vector of zeros."""
+    """Return a vector of zeros."""
 
     def generate(context, builder, signature, arguments):
         return ir.Constant(_VECTOR, [0.0] * LANES)
@@ -72,7 +72,7 @@ def zeros(typingctx):
 
 @operation
 def load(typingctx, array, index):
-    """The vector array[index : index + LANES]."""
+    """Return the vector array[index : index + LANES]."""
 
     def generate(context, builder, signature, arguments):
         return builder.load(_pointer(context, builder, signature.args[0], *arguments), align=8)
@@ -82,7 +82,7 @@ def load(typingctx, array, index):
 
 @operation
 def store(typingctx, array, index, vector):
-    """Put a vector into array[index : index + LANES]."""
+    """Write a vector to array[index : index + LANES]."""
 
     def generate(context, builder, signature, arguments):
         builder.store(arguments[2], _pointer(context, builder, signature.args[0], *arguments[:2]), align=8)
@@ -93,7 +93,7 @@ def store(typingctx, array, index, vector):
 
 @operation
 def add_scaled(typingctx, total, vector, scale):
-    """Total + vector * scale, of a number."""
+    """Return total + vector * scale, with a scalar scale."""
 
     def generate(context, builder, signature, arguments):
         total, vector, scale = arguments
@@ -104,7 +104,7 @@ def add_scaled(typingctx, total, vector, scale):
 
 @operation
 def add_product(typingctx, total, a, b):
-    """Total + a * b, entry by entry."""
+    """Return total + a * b, entry by entry."""
 
     def generate(context, builder, signature, arguments):
         return _add_product(builder, *arguments)
@@ -114,7 +114,7 @@ def add_product(typingctx, total, a, b):
 
 @operation
 def summed(typingctx, vector):
-    """The sum of a vector's entries."""
+    """Return the sum of a vector's entries."""
 
     def generate(context, builder, signature, arguments):
         kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), _VECTOR])

@@ -1,4 +1,4 @@
-"""Linear models of mechanisms with named inputs and sensors: poles, zeros, frequency responses."""
+"""Linear models of mechanisms with named inputs and outputs: poles, zeros and frequency responses."""
 
 from paraflex.linear.along import PosesAlong as PosesAlong, poses_along as poses_along
 from paraflex.linear.discrete import SampledModel as SampledModel

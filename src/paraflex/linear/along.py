@@ -1,4 +1,4 @@
-"""Linear models at rest in poses along a motion, in one choice of minimal coordinates."""
+"""Linear models at rest at poses along a motion, in common minimal coordinates."""
 
 from __future__ import annotations
 
@@ -25,18 +25,19 @@ from paraflex.tracking import TrackingRun, TrackingTask, undeformed_at
 
 @dataclass(frozen=True)
 class PosesAlong:
-    """Linear models at rest in poses along a motion.
+    """Linear models at rest at poses along a motion.
 
     Attributes
     ----------
     places : (k,) array
-        How far along: length of the end-effector's path from the start [m], or time where there is none [s].
+        Positions of the poses: arc length of the end-effector's path [m], or without end-effector the time [s], both
+        from the start.
     unit : str
-        "m" or "s".
+        Unit of the positions, "m" or "s".
     models : tuple of LinearModel
-        At the places, all with the same states.
+        Linear models at the poses, all with the same states.
     elsewhere : LinearModel, optional
-        In a pose of its own, with the same states.
+        Linear model at a separate pose, with the same states.
     """
 
     places: Array
@@ -57,24 +58,25 @@ def poses_along(
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
 ) -> PosesAlong:
-    """Linear models at rest in poses evenly along a planned motion or a run, all in the same coordinates.
+    """Linearise at rest at evenly spaced poses along a planned motion or a run, all in the same coordinates.
 
     Parameters
     ----------
     source : TrackingTask, TrackingRun or MotionRun
+        Planned motion or run.
     count : int
-        Of poses; they are at samples of the motion.
+        Number of poses, at least 2; they are at samples of the motion.
     mode, forces, prescribed, coordinates
-        See `linearise`.
+        Inputs and states, see `linearise`.
     pose : State, optional
-        One more pose, for `elsewhere`.
+        Additional pose, for `PosesAlong.elsewhere`.
 
     Raises
     ------
     InputError
-        See `linearise`; or fewer than two poses, or more than samples that lie apart.
+        There are fewer than two poses or more poses than distinct samples; or see `linearise`.
     SingularPositionError
-        No coordinates describe the motion in all poses.
+        No coordinates describe the motion at all poses.
     """
     motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
     far, unit = _lengths(source)
@@ -87,7 +89,7 @@ def poses_along(
 
 
 def _lengths(source: TrackingTask | TrackingRun | MotionRun) -> tuple[Array, str]:
-    """How far along its motion the mechanism is at all samples, and the unit of that."""
+    """Return the positions of all samples along the motion, and their unit: arc length [m] or time [s]."""
     if isinstance(source, TrackingTask):
         system, q, t = source.motion.system, source.motion.q, source.motion.t
     else:
@@ -107,7 +109,7 @@ def _coordinates(source: TrackingTask | TrackingRun | MotionRun, sample: int) ->
 
 
 def _evenly(far: Array, count: int) -> list[int]:
-    """So many samples, evenly along the way from the first to the last."""
+    """Return `count` samples, evenly spaced in position from the first to the last."""
     if count < 2:
         raise InputError("too few poses", field="count", value=count, remedy="give at least 2")
     samples = np.abs(far[:, None] - np.linspace(0.0, far[-1], count)).argmin(axis=0)

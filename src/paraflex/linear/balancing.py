@@ -1,4 +1,4 @@
-"""Balanced truncation (Moore 1981) of the stable part of a linear system; the other part is kept as it is."""
+"""Balanced truncation (Moore 1981) of the stable part of a linear system; the remaining part is retained."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 
-# Rounding of the Gramians hides Hankel singular values below this part of the largest.
+# Hankel singular values below this fraction of the largest are lost in the rounding of the Gramians.
 _RESOLVED = float(np.sqrt(np.finfo(float).eps))
-# Poles whose real part is above this part of a low frequency, negative, are not stable.
+# Poles with a real part above minus this fraction of a low frequency are not stable.
 _STABLE = 1e-6
 
 
 class Balanced(NamedTuple):
-    """States x = right z and z = left x of fewer coordinates.
+    """Projection of a balanced truncation: x = right z and z = left x.
 
     Attributes
     ----------
     left, right : (r, n) and (n, r) arrays
+        Left and right projection matrices.
     hankel : (stable,) array
         Hankel singular values of the stable part, descending, in units of outputs over inputs.
     bound : float
-        The largest gain of the error over all frequencies is not above: twice the sum of the values left out (Enns,
-        Glover 1984), those that rounding hides as large as it hides.
+        Upper bound of the error's largest gain over all frequencies: twice the sum of the truncated values (Enns,
+        Glover 1984), with values lost in rounding replaced by the limit of their resolution.
     """
 
     left: Array
@@ -38,20 +39,21 @@ class Balanced(NamedTuple):
 
 
 def balanced(system: StateSpace, count: int, low: float) -> Balanced:
-    """Keep the states of the stable part that inputs move and outputs see most.
+    """Truncate the least controllable and observable states of the stable part.
 
     Parameters
     ----------
     system : StateSpace
+        Linear system.
     count : int
-        Of all states kept, those of the part that is not stable among them.
+        Number of states to retain, including those of the part that is not stable.
     low : float
-        A low angular frequency [rad/s].
+        Typical low angular frequency [rad/s].
 
     Raises
     ------
     InputError
-        Fewer states than those that are not stable.
+        The number is less than that of the states that are not stable, or the system has no stable part.
     """
     free, others = _uncoupled(system.A, low)
     whole = np.eye(len(system.A))
@@ -66,7 +68,7 @@ def balanced(system: StateSpace, count: int, low: float) -> Balanced:
             field="states", value=count,
             remedy="give links damping ([damping], or damping = { ratios = [0.01] }), or choose craig-bampton",
         )  # fmt: skip
-    # x = right [z1; z2] uncouples the two parts.
+    # x = right [z1; z2] decouples the two parts.
     coupling = scipy.linalg.solve_sylvester(
         schur[:neutral, :neutral], -schur[neutral:, neutral:], -schur[:neutral, neutral:]
     )
@@ -87,9 +89,9 @@ def balanced(system: StateSpace, count: int, low: float) -> Balanced:
 
 
 def _uncoupled(A: Array, low: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """States of motions that are not damped and that no other state moves or is moved by; and all others.
+    """Return the states of undamped motions that are not coupled to other states, and all other states.
 
-    So rigid motions stay what they are: rounding of the transformations that follow would tell at low frequencies,
+    Rigid motions are thus retained without a transformation, whose rounding errors would be visible at low frequencies,
     where their gains are large.
     """
     label = scipy.sparse.csgraph.connected_components(scipy.sparse.csr_matrix(A), connection="weak")[1]
@@ -101,6 +103,6 @@ def _uncoupled(A: Array, low: float) -> tuple[NDArray[np.int64], NDArray[np.int6
 
 
 def _root(gramian: Array) -> Array:
-    """A matrix L with L L^T the Gramian, which rounding may leave slightly indefinite."""
+    """Return a matrix L with L L^T the Gramian, which may be slightly indefinite by rounding."""
     values, vectors = scipy.linalg.eigh(0.5 * (gramian + gramian.T))
     return vectors * np.sqrt(np.maximum(values, 0.0))

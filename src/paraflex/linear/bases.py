@@ -1,7 +1,8 @@
-"""Bases of few coordinates for symmetric second-order equations, mass y'' + stiffness y = f.
+"""Reduced bases of symmetric second-order equations, mass y'' + stiffness y = f.
 
-Static shapes of an interface and vibrations with the interface held (Craig and Bampton 1968), static shapes and what
-the lowest modes with a free interface are beside them (Rubin 1975, Craig and Chang 1977), or these modes alone.
+A basis consists of the static shapes of an interface and vibrations with the interface held (Craig and Bampton 1968),
+of static shapes and the remainder of the lowest modes with a free interface (Rubin 1975, Craig and Chang 1977), or of
+these modes alone.
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ from paraflex.linear.independent import DEPENDENT, successive, unit_rows
 
 
 class Basis(NamedTuple):
-    """Coordinates y = shapes z, and the flexibility of the motions of which some are kept and the others left out.
+    """Reduced basis, y = shapes z, with the flexibility of the truncated motions.
 
     Attributes
     ----------
     shapes : (f, k) array
+        Basis vectors in columns.
     flexibility : (f, f) array
-        Static response to forces in motions with the interface held, or in modes that are left out.
+        Static response to forces of the motions with the interface held, or of the omitted modes.
     """
 
     shapes: Array
@@ -32,9 +34,10 @@ class Basis(NamedTuple):
 
 
 def kernel(rows: Array, scale: Array) -> Array:
-    """Basis (f, free) of what rows (h, f) do not see, in coordinates of given sizes (f,): the others follow from some.
+    """Return a basis (f, free) of the null space of rows (h, f), with typical sizes (f,) of the coordinates.
 
-    Rows that are coordinates themselves take out these, and leave the others as they are.
+    The basis is given by independent coordinates, from which the others follow. If the rows are unit vectors, it has
+    the unit vectors of the other coordinates.
     """
     f = rows.shape[1]
     if not rows.size:
@@ -50,49 +53,49 @@ def kernel(rows: Array, scale: Array) -> Array:
 
 
 def independent_rows(rows: Array, scale: Array) -> list[int]:
-    """Numbers of rows (h, f) none of which follows from those before it."""
+    """Return the indices of the rows (h, f) that are independent of previous rows."""
     return successive(unit_rows(rows * scale), np.zeros((rows.shape[1], 0)))[0]
 
 
 def craig_bampton(mass: Array, stiffness: Array, rows: Array, count: int, typical: float) -> Basis:
-    """Static shapes of an interface, then the lowest vibrations with it held.
+    """Return the static shapes of an interface, then the lowest vibrations with the interface held.
 
     Parameters
     ----------
     mass, stiffness : (f, f) arrays
-        Symmetric.
+        Symmetric mass and stiffness matrices.
     rows : (h, f) array
-        Independent; the coordinates of the interface are rows y.
+        Independent rows; the interface coordinates are rows y.
     count : int
-        Of vibrations.
+        Number of vibrations.
     typical : float
-        Square of a low frequency [rad^2/s^2].
+        Square of a typical low frequency [rad^2/s^2].
 
     Returns
     -------
     Basis
-        The first h coordinates are those of the interface.
+        Craig-Bampton basis, whose first h coordinates are those of the interface.
     """
     part = _interface(mass, stiffness, rows, typical)
     return Basis(np.hstack([part.static, part.held[:, :count]]), part.flexibility)
 
 
 def rubin(mass: Array, stiffness: Array, rows: Array, count: int, typical: float) -> Basis:
-    """Static shapes of an interface, then shapes with it held with which the lowest modes of all are exact.
+    """Return the static shapes of an interface, then shapes with it held that make the lowest free modes exact.
 
-    With the interface held, inertia forces of a mode bend the mechanism as this mode does beside the static shapes.
-    Arguments and coordinates are those of `craig_bampton`. Modes are those with the interface free, rigid ones among
-    them: that these bend what accelerates makes responses at low frequencies exact to second order.
+    The part of a mode that is not in the static shapes is the response, with the interface held, to the inertia forces
+    of the mode. Arguments and coordinates are those of `craig_bampton`. The modes are those with a free interface and
+    include rigid ones, whose inertia forces make responses at low frequencies exact to second order.
     """
     part = _interface(mass, stiffness, rows, typical)
     squares, modes = undamped_modes(mass, stiffness, typical)
     free, few = part.squares == 0.0, slice(min(count, squares.size))
     held = np.where(free, np.inf, part.squares)
     lowest = np.min(np.abs(held), initial=np.inf)
-    # In vibrations with the interface held, of size one where it is not rounding.
+    # Components in vibrations with the interface held, of size one where they are not rounding.
     bent = (part.held.T @ mass @ modes[:, few]) / held[:, None] * np.maximum(np.abs(squares[few]), lowest)
     bent[:, np.linalg.norm(bent, axis=0) < DEPENDENT] = 0.0
-    # Motions that are free with the interface held come first, other vibrations where modes bring too few shapes.
+    # Free motions with the interface held come first; other vibrations follow if the modes give too few shapes.
     wanted = np.hstack([np.diag(1.0 * free), bent, np.eye(free.size)])
     found = successive(unit_rows(wanted.T), np.zeros((free.size, 0)))[1][:, :count]
     turn = scipy.linalg.eigh(found.T @ (part.squares[:, None] * found))[1]
@@ -100,9 +103,10 @@ def rubin(mass: Array, stiffness: Array, rows: Array, count: int, typical: float
 
 
 def carried(mass: Array, stiffness: Array, rows: Array, shapes: Array, typical: float, *, renewed: bool) -> Basis:
-    """Shapes (f, k) of another pose, whose first coordinates become those of an interface in this one.
+    """Adapt shapes (f, k) of another pose, so that their first coordinates are those of the interface at this pose.
 
-    Arguments are those of `craig_bampton`. The flexibility is that of this pose; so are static shapes, if renewed.
+    Other arguments are those of `craig_bampton`. The flexibility is that of this pose, and with `renewed` the static
+    shapes are as well.
     """
     part = _interface(mass, stiffness, rows, typical)
     h = len(rows)
@@ -111,20 +115,20 @@ def carried(mass: Array, stiffness: Array, rows: Array, shapes: Array, typical: 
 
 
 def interpolated(shapes: Sequence[Array], mass: Array, fixed: int, part: float) -> Array:
-    """Shapes (f, k) between those of several poses, on straight lines from each to the next.
+    """Interpolate linearly between the shapes (f, k) of successive poses.
 
     Parameters
     ----------
     shapes : sequence of (f, k) arrays
-        Of poses one after the other.
+        Shapes at successive poses.
     mass : (f, f) array
-        Metric in which they are compared.
+        Mass matrix, the metric in which shapes are compared.
     fixed : int
-        So many of their first columns stand for the same at every pose. The others span vibrations: they are turned
-        among themselves until they are nearest to those before (orthogonal Procrustes problem, Schoenemann 1966), so
-        that neither signs nor crossings of frequencies matter.
+        Number of first columns with the same meaning at every pose. The other columns span vibrations, and are rotated
+        to be nearest to those of the previous pose (orthogonal Procrustes problem, Schoenemann 1966), so that neither
+        signs nor crossings of frequencies matter.
     part : float
-        From 0, the first pose, to len(shapes) - 1, the last.
+        Position between the poses, from 0, the first, to len(shapes) - 1, the last.
     """
     aligned = [shapes[0]]
     for one in shapes[1:]:
@@ -135,7 +139,7 @@ def interpolated(shapes: Sequence[Array], mass: Array, fixed: int, part: float) 
 
 
 class _Interface(NamedTuple):
-    """Static shapes (f, h) of an interface, and vibrations (f, f - h) with it held: squares, shapes, flexibility."""
+    """Static shapes (f, h) of an interface; squared frequencies, shapes (f, f - h) and flexibility with it held."""
 
     static: Array
     squares: Array
@@ -154,12 +158,12 @@ def _interface(mass: Array, stiffness: Array, rows: Array, typical: float) -> _I
 
 
 def lowest_modes(mass: Array, stiffness: Array, count: int, typical: float) -> Basis:
-    """The lowest modes, and the flexibility of all others."""
+    """Return the lowest modes and the flexibility of all others."""
     squares, shapes = undamped_modes(mass, stiffness, typical)
     return Basis(shapes[:, :count], _flexibility(squares[count:], shapes[:, count:]))
 
 
 def _flexibility(squares: Array, shapes: Array) -> Array:
-    """Static response of modes (f, k) of unit mass to forces, without motions that are free."""
+    """Return the static flexibility of modes (f, k) of unit mass, without free motions."""
     elastic = squares != 0.0
     return (shapes[:, elastic] / squares[elastic]) @ shapes[:, elastic].T

@@ -1,4 +1,4 @@
-"""Poles along a motion as branches: each pole with the one whose motion it resembles most a moment later."""
+"""Branches of poles along a motion, tracked by the similarity of their shapes."""
 
 from __future__ import annotations
 
@@ -11,35 +11,36 @@ from numpy.typing import NDArray
 from paraflex.linear.model import LinearModel
 
 Complex = NDArray[np.complex128]
-# Poles that a branch may go on with, as a multiple of the branches: others come between them on the way.
+# Number of candidate poles relative to that of branches: other poles may move between those of the branches.
 _CANDIDATES = 3
-# Assurance criterion and distance, as a part of the largest pole, of two poles that are one.
+# Modal assurance criterion and distance, relative to the largest pole, of two poles that are regarded as one.
 _SAME, _NEAR = 0.999, 1e-6
 
 
 def pole_branches(models: Sequence[LinearModel], held: Sequence[str] = (), count: int = 8) -> Complex:
-    """Poles (moments, branches) in the upper half plane or on the real axis, the lowest at the first moment.
+    """Track the lowest poles in the closed upper half plane along a motion: (moments, branches) [rad/s].
 
-    A branch goes on with the pole of the next moment whose motion has the largest modal assurance criterion with its
-    own, in the metric of the mass (Allemang 2003, https://www.sandv.com/downloads/0308alle.pdf): branches may cross.
+    A branch continues with the pole of the next moment whose shape has the largest modal assurance criterion with its
+    own, in the metric of the mass (Allemang 2003, https://www.sandv.com/downloads/0308alle.pdf). Branches may cross.
+    Values are NaN from the moment on at which there are fewer poles than branches.
 
     Parameters
     ----------
     models : sequence of LinearModel
-        Of one mechanism at moments of a motion.
+        Linear models of a mechanism at successive moments of a motion.
     held : sequence of str
-        Motors that are held.
+        Names of the motors held; none by default.
     count : int
-        Most branches.
+        Largest number of branches, 8 by default.
     """
     found: list[tuple[Complex, Complex]] = []
     for model in models:
         moving = model.motions(held)
-        # The lowest poles that are not below the real axis.
+        # Lowest poles with a non-negative imaginary part.
         kept = np.flatnonzero(moving.poles.imag >= 0.0)[: _CANDIDATES * count]
         found.append((moving.poles[kept], moving.pole_shapes[:, kept]))
     poles, shapes = found[0]
-    # Without the second of those that coincide in one motion: free ones are double.
+    # Without the second of two equal poles with the same shape: poles of free motions are double.
     same = _alike(models[0], shapes, shapes) > _SAME
     same &= np.abs(poles[:, None] - poles) <= _NEAR * np.abs(poles).max()
     chosen = np.flatnonzero(~np.any(np.tril(same, -1), axis=1))[:count]
@@ -56,7 +57,7 @@ def pole_branches(models: Sequence[LinearModel], held: Sequence[str] = (), count
 
 
 def _alike(model: LinearModel, first: Complex, second: Complex) -> NDArray[np.float64]:
-    """Modal assurance criterion (first, second) of shapes (n, k)."""
+    """Compute the modal assurance criterion (first, second) of shapes (n, k)."""
     mass = model.minimal.tangents.whole.mass
     product = np.abs(first.conj().T @ (mass @ second)) ** 2
     sizes = [np.sum(each.conj() * (mass @ each), axis=0).real for each in (first, second)]

@@ -1,9 +1,9 @@
-"""Minimal coordinates of linear models: joints with motors by name, then elastic coordinates of bodies.
+"""Minimal coordinates of linear models: coordinates of motors' joints, then elastic coordinates of bodies.
 
-The constraints leave f free directions at a pose. Their coordinates y = T q are the angles and travels of the joints
-that have motors, as far as these are independent (of flexible links mostly all), then as many flexible coordinates of
-bodies as are missing, and places and angles of bodies where these do not suffice: see `independent`. Instead of the
-joints the end-effector's place and angle may come first.
+The constraints leave f degrees of freedom at a pose. The minimal coordinates y = T q are the angles and travels of the
+joints with motors, as far as these are independent (with flexible links usually all), then flexible coordinates of
+bodies, and positions and angles of bodies where these do not suffice: see `independent`. Position and angle of the
+end-effector may take the place of the joints.
 """
 
 from __future__ import annotations
@@ -31,39 +31,39 @@ from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
 from paraflex.mechanism.cut import Cut
 
-# A matrix of so many entries BLAS factors in one thread.
+# Largest matrix for dense factorisation: BLAS uses a single thread for it.
 _FEW_ENTRIES = 8192
-# Places and angles of bodies count as much less than flexible coordinates: they are chosen last.
+# Weight of positions and angles of bodies relative to flexible coordinates: they become states last.
 _LAST = 1e-5
-# A pin between the end-effector and the ground frame's origin, whose rows are the end-effector's coordinates.
+# Fictitious pin between the end-effector and the origin, whose rows are the end-effector's coordinates.
 _TASK, _ORIGIN = "the end-effector", "origin of named coordinates"
 
 
 class Variable(NamedTuple):
-    """A state, an input or an output: its name and its unit."""
+    """Name and unit of a state, an input or an output."""
 
     name: str
     unit: str
 
 
 def named_axes(states: Sequence[Variable], inputs: Sequence[Variable], outputs: Sequence[Variable]) -> dict[str, Any]:
-    """Names and units of the dimensions state, state_of, input and output, for labelled arrays of matrices."""
+    """Return names and units of the dimensions state, state_of, input and output, for labelled arrays of matrices."""
     named = {"state": states, "state_of": states, "input": inputs, "output": outputs}
     names = {key: [one.name for one in values] for key, values in named.items()}
     return names | {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
 
 
 class Chosen(NamedTuple):
-    """Minimal coordinates at a pose.
+    """Choice of minimal coordinates at a pose.
 
     Attributes
     ----------
     constraints : array of int
-        Independent rows among the constraints.
+        Indices of the independent constraints.
     joints : array of int
-        Rows of the coordinates of the end-effector and of joints that are states, among `Coordinates.measured`.
+        Indices in `Coordinates.measured` of the coordinates of the end-effector and of joints that are states.
     bodies : array of int
-        Coordinates of bodies that are states.
+        Indices of the coordinates of bodies that are states.
     """
 
     constraints: NDArray[np.int64]
@@ -77,14 +77,16 @@ class Chosen(NamedTuple):
 
 
 class PointTangents(NamedTuple):
-    """Tangent matrices at a point of a motion, constraints and coordinates of joints apart: see `Tangents`.
+    """Tangent matrices at an operating point, separately for constraints and joint coordinates: see `Tangents`.
 
     Attributes
     ----------
     whole : Tangents
+        Tangent matrices of the equations of motion.
     constraints, joints : RowTangents
+        Tangents of the constraints and of the coordinates of `Coordinates.measured`.
     compliant : array of int
-        Rows of springs, dampers and friction, as the system numbers them.
+        Indices in the system of the rows of springs, dampers and friction.
     motors : (motors, n) sparse matrix
         Derivatives of the coordinates on which the motors act.
     """
@@ -97,17 +99,18 @@ class PointTangents(NamedTuple):
 
 
 class RowTangents(NamedTuple):
-    """Derivatives of some rows Phi of constraints, or of coordinates y of joints, each (rows, n) and sparse.
-
-    Entries of all are in the same places.
+    """Derivatives of constraint rows Phi, or of joint coordinates y, each (rows, n) and sparse with the same pattern.
 
     Attributes
     ----------
-    jacobian : of Phi by q
-    rate : of Phi' by q
-    second_place, second_rate : of Phi'' by q and by v
+    jacobian : (rows, n) sparse matrix
+        Derivatives of Phi with respect to q.
+    rate : (rows, n) sparse matrix
+        Derivatives of Phi' with respect to q.
+    second_place, second_rate : (rows, n) sparse matrices
+        Derivatives of Phi'' with respect to q and to v.
     number : (rows,) array of int
-        As the system numbers its rows; -1 where it has none.
+        Indices of the rows in the system; -1 for rows that it does not have.
     """
 
     jacobian: csr_matrix
@@ -117,27 +120,28 @@ class RowTangents(NamedTuple):
     number: NDArray[np.int64]
 
     def taken(self, rows: NDArray[np.int64]) -> RowTangents:
-        """Some of the rows."""
+        """Return the tangents of some of the rows."""
         return RowTangents(*rows_of(rows, *self[:4]), number=self.number[rows])
 
     def with_rows(self, others: RowTangents) -> RowTangents:
-        """These rows and then others."""
+        """Return the tangents of these rows followed by others."""
         parts = (csr_matrix(scipy.sparse.vstack(pair)) for pair in zip(self[:4], others[:4], strict=True))
         return RowTangents(*parts, number=np.concatenate([self.number, others.number]))
 
 
 @dataclass(frozen=True)
 class Coordinates:
-    """A mechanism's coordinates for linear models: what does not depend on the pose.
+    """Candidate coordinates of a mechanism for linear models, independent of the pose.
 
     Attributes
     ----------
     system : System
+        System of the mechanism.
     joints : tuple of str
-        Joints of the motors, and those of `driven` last, in their order; their coordinates become states where they
-        are independent.
+        Joints of the motors, followed by those of `driven`, in order; their coordinates become states if they are
+        independent.
     driven : tuple of str
-        Prescribed motions that are inputs: their joints' coordinates are states.
+        Prescribed motions that are inputs; the coordinates of their joints are states.
     task : tuple of str
         Coordinates "x", "y" and "angle" of the end-effector that become states in place of those of motors' joints.
     """
@@ -158,17 +162,17 @@ class Coordinates:
 
     @property
     def _candidates(self) -> tuple[str, ...]:
-        """Joints whose coordinates may become states: beside the end-effector's those that are driven."""
+        """Joints whose coordinates may become states: with the end-effector's coordinates only the driven ones."""
         return self.joints[len(self.joints) - len(self.driven) :] if self.task else self.joints
 
     def values(self, chosen: Chosen, q: Array, v: Array) -> Array:
-        """Minimal coordinates and then their rates (k, 2f) of coordinates (k, n) and velocities (k, n)."""
+        """Return minimal coordinates, then their rates (k, 2f), from coordinates q and velocities v (k, n)."""
         found = [self._measured(k, q, v) for k in chosen.joints.tolist()]
         found += [(q[:, k], v[:, k]) for k in chosen.bodies.tolist()]
         return np.concatenate([np.stack(part, axis=1) for part in zip(*found, strict=True)], axis=1)
 
     def _measured(self, k: int, q: Array, v: Array) -> tuple[Array, Array]:
-        """A coordinate of `measured` and its rate."""
+        """Return a coordinate of `measured` and its rate."""
         if k >= len(self.task):
             coordinate = joint_coordinate(self.system, self._candidates[k - len(self.task)], q, v)
             return coordinate.value, coordinate.rate
@@ -188,14 +192,14 @@ class Coordinates:
 
     @cached_property
     def tangency(self) -> Tangency:
-        """Of the system with a row for every coordinate of `measured`, which holds nothing."""
+        """Tangent matrices of the system extended by a row for every coordinate of `measured`, without a constraint."""
         angle = [_TASK] if "angle" in self.task else []
         pins = {_TASK: self._effector} if self.task else {}
         return Tangency(with_coordinates(self.system, (*self.joints, *angle), pins))
 
     @cached_property
     def _rows(self) -> tuple[dict[str, int], NDArray[np.int64]]:
-        """Rows of the system with more rows: those of coordinates by joint; and the numbers of all in the system."""
+        """Coordinate rows of the extended system by joint, and the indices of all its rows in the original system."""
         extended = self.tangency.system
         mechanism, names = extended.mechanism, {name: k for k, name in enumerate(extended.rows)}
         rows = {one.joint: names[f"{one.name} {coordinate_kind(mechanism.joint(one.joint))}"]
@@ -207,7 +211,7 @@ class Coordinates:
         return np.array([self._rows[0][joint] for joint in joints], dtype=int)
 
     def inertia(self, time: float, q: Array, joints: Sequence[str]) -> Inertia:
-        """Mass and rows at coordinates (n,)."""
+        """Return mass matrix, constraint rows and joint rows at coordinates q (n,)."""
         mass, jacobian = self.tangency.inertia(time, q)
         number = self._rows[1]
         own = np.nonzero(number >= 0)[0]
@@ -215,7 +219,7 @@ class Coordinates:
         return Inertia(mass, *rows_of(constraints, jacobian), *rows_of(rows, jacobian))
 
     def at(self, point: MotionPoint) -> PointTangents:
-        """The tangent matrices at a point of a motion."""
+        """Compute the tangent matrices at an operating point."""
         (rows_at, number), names = self._rows, self.tangency.system.rows
         task = [rows_at[_TASK] if axis == "angle" else names.index(f"{_TASK} {axis}") for axis in self.task]
         coordinates = np.concatenate([np.array(task, dtype=int), self._rows_of(self._candidates)])
@@ -228,7 +232,7 @@ class Coordinates:
             parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
             return RowTangents(*rows_of(at, *parts), number=number[wanted])
 
-        # Of the end-effector's pin no row holds, whether it is a coordinate or not.
+        # No row of the fictitious pin is a constraint, whether it is a coordinate or not.
         pin = [k for k, name in enumerate(names) if name.startswith(_TASK)]
         holding = whole.rows[~np.isin(whole.rows, [*self._rows_of(self.joints), *coordinates, *pin])]
         motors = self._rows_of([motor.joint for motor in self.system.mechanism.motors])
@@ -236,15 +240,15 @@ class Coordinates:
         return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant], acting)
 
     def choose(self, tangents: PointTangents, without: Collection[int] = ()) -> Chosen:
-        """Choose minimal coordinates at a pose, without some of `measured`.
+        """Choose minimal coordinates at a pose, with the exception of those of `measured` in `without`.
 
         Raises
         ------
         InputError
-            The end-effector's coordinates are to be states, but do not describe the motion.
+            The end-effector's coordinates shall be states but do not describe the motion.
         """
         constraints, joints = (unit_in(part.jacobian, self.scale) for part in (tangents.constraints, tangents.joints))
-        # Those that are driven must be states.
+        # Driven coordinates must be states.
         free, driven = np.split(np.arange(len(self.measured)), [len(self.measured) - len(self.driven)])
         free = np.array([k for k in free.tolist() if k not in without], dtype=int)
         weights = np.full(self.system.n, _LAST)
@@ -261,7 +265,7 @@ class Coordinates:
         return chosen
 
     def _check_task(self, chosen: Chosen) -> None:
-        """Refuse coordinates of the end-effector that follow from others, or leave rigid bodies free."""
+        """Raise an `InputError` if end-effector coordinates depend on others or leave rigid bodies free."""
         rigid = [body.name for body in self.system.bodies
                  if np.isin(chosen.bodies, np.arange(body.offset, body.offset + 3)).any()]  # fmt: skip
         follow = [axis for k, axis in enumerate(self.task) if k not in chosen.joints]
@@ -278,7 +282,7 @@ class Coordinates:
 
     @cached_property
     def scale(self) -> Array:
-        """What one of each coordinate (n,) is measured in: sizes of the mechanism, rad; less of stiff coordinates."""
+        """Scale of each coordinate (n,): size of the mechanism or rad, and less for stiff flexible coordinates."""
         scale = self.system.units.copy()
         lowest = min((np.min(body.modes.omega[body.modes.omega > 0.0], initial=np.inf) for body in self.system.bodies),
                      default=np.inf)  # fmt: skip
@@ -288,7 +292,7 @@ class Coordinates:
         return scale
 
     def names(self, chosen: Chosen) -> tuple[Variable, ...]:
-        """The states that are coordinates; their rates follow in the same order."""
+        """Return the states that are coordinates; their rates are states in the same order."""
         quantities = [self.measured[k] for k in chosen.joints.tolist()]
         offsets = np.array([body.offset for body in self.system.bodies])
         for k, which in zip(chosen.bodies, np.searchsorted(offsets, chosen.bodies, side="right") - 1, strict=True):
@@ -300,7 +304,7 @@ class Coordinates:
 
 
 class FirstCoordinates(Enum):
-    """Which coordinates are the first states: those of the motors' joints, or those of the end-effector."""
+    """Coordinates that are the first states: those of the motors' joints or those of the end-effector."""
 
     MOTORS = "motors"
     TASK = "task"
@@ -309,12 +313,12 @@ class FirstCoordinates(Enum):
 def coordinates_of(
     system: System, driven: tuple[str, ...] = (), first: FirstCoordinates = FirstCoordinates.MOTORS
 ) -> Coordinates:
-    """Coordinates with the joints of all motors, or of the end-effector, and those that are driven.
+    """Return the candidate coordinates: those of all motors' joints or of the end-effector, and driven ones.
 
     Raises
     ------
     InputError
-        A driven motion or an end-effector that the mechanism does not have.
+        The mechanism does not have a driven motion, or has no end-effector where one is needed.
     """
     mechanism: Mechanism = system.mechanism
     known = {one.name: one.joint for one in mechanism.prescribed}
@@ -335,9 +339,10 @@ def coordinates_of(
 
 
 def with_coordinates(system: System, joints: Iterable[str], pins: Mapping[str, PointRef]) -> System:
-    """The system with rows that hold nothing: coordinates of joints, and places of points by pins to the origin.
+    """Return the system extended by rows of joint coordinates, and of point positions as pins to the origin.
 
-    Pins are joints by name, whose angles may be among the coordinates; prescribed joints have their rows already.
+    The rows serve for derivatives only and are not constraints. The pins are joints by name, whose angles may be among
+    the coordinates; prescribed joints have their rows already.
     """
     mechanism, origin = system.mechanism, PointRef(GROUND, _ORIGIN)
     driven = {one.joint for one in mechanism.prescribed}
@@ -352,7 +357,7 @@ def with_coordinates(system: System, joints: Iterable[str], pins: Mapping[str, P
 
 
 def unit_in(rows: csr_matrix, scale: Array) -> csr_matrix:
-    """Rows of size one in units (n,) of the coordinates, those of zeros as they are."""
+    """Normalise rows to unit norm in units (n,) of the coordinates; rows of zeros are unchanged."""
     scaled = csr_matrix(rows @ scipy.sparse.diags(scale))
     size = np.sqrt(np.asarray(scaled.multiply(scaled).sum(axis=1)).ravel())
     return csr_matrix(scipy.sparse.diags(1.0 / np.where(size > 0.0, size, 1.0)) @ scaled)

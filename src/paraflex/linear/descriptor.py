@@ -1,13 +1,13 @@
-"""The equations of small motions at one s without elimination: as sparse as the mechanism.
+"""Linearised equations at a value of s in descriptor form: without elimination, as sparse as the mechanism.
 
-With dq = q, dv = s q + c and da = s^2 q + d, where c and d are what the rates of the motion itself add,
+With dq = q, dv = s q + c and da = s^2 q + d, where c and d are due to the velocities of the nominal motion,
 
     [s^2 M + s D + K, H^T] [q; lambda] = [S u - D c - M d; u_d + s x_1 + x_2]
     [H, 0]
     G c + G' q = [0; -x_1],    G d + G''_q q + G''_v (s q + c) = [0; -s x_1 - x_2]
 
-G = [Phi_q; T] and H the rows of the constraints and of coordinates that are driven, these times s^2. (x_1, x_2) is
-added to the derivatives of the states: s x = A x + B u + (x_1, x_2). At rest G' and G'' are zero, and c and d known.
+G is [Phi_q; T], and H has the rows of the constraints and of the driven coordinates, the latter times s^2. (x_1, x_2)
+is added to the derivatives of the states: s x = A x + B u + (x_1, x_2). At rest G' and G'' are zero, and c and d known.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from paraflex.dynamics.sparse import Factor
 from paraflex.linear.minimal import Minimal
 
 Complex = NDArray[np.complex128]
-# Of the starting vector of the search for poles.
+# Seed of the starting vector of Arnoldi's method.
 _SEED = 0
 
 
 class SmallMotion(NamedTuple):
-    """Amplitudes of a small motion: of coordinates and their derivatives (n, k), and of multipliers (m, k)."""
+    """Amplitudes of a small motion: coordinates and their derivatives (n, k), and multipliers (m, k)."""
 
     q: Numbers
     v: Numbers
@@ -40,14 +40,14 @@ class SmallMotion(NamedTuple):
 
 
 class Descriptor:
-    """The equations at one s, factored; real where s is.
+    """Factorised descriptor equations at a value of s, real for a real s.
 
     Parameters
     ----------
     minimal : Minimal
-        Whose matrices they have, none of them dense.
+        Linearised equations, of which only sparse matrices are used.
     s : complex or float
-        [rad/s]
+        Laplace variable [rad/s].
     """
 
     def __init__(self, minimal: Minimal, s: complex) -> None:
@@ -73,7 +73,7 @@ class Descriptor:
 
     @cached_property
     def _of_motion(self) -> tuple[csr_matrix, csr_matrix, csr_matrix, csr_matrix]:
-        """G, G', G''_q and G''_v."""
+        """Matrices G, G', G''_q and G''_v."""
         minimal = self.minimal
         bodies = minimal.chosen.bodies
         parts = [scipy.sparse.vstack(pair) for pair in zip(minimal.constraints[:4], minimal.joints[:4], strict=True)]
@@ -84,17 +84,17 @@ class Descriptor:
 
     @cached_property
     def _inputs(self) -> csr_matrix:
-        """Forces and accelerations of driven coordinates (n + held, inputs) by the inputs."""
+        """Forces and accelerations of driven coordinates (n + held, inputs) per unit input."""
         minimal, held = self.minimal, self.minimal.held_rows.number.size
         driven = scipy.sparse.eye(held, minimal.driven, minimal.driven - held)
         return csr_matrix(scipy.sparse.block_diag([minimal.forces, driven]))
 
     def response(self, inputs: NDArray[np.int64]) -> SmallMotion:
-        """Amplitudes under some of the inputs, each of size one."""
+        """Compute the amplitudes of the motion for unit amplitudes of the given inputs."""
         return self._solved(self._inputs[:, inputs].toarray(), np.zeros((2, self.minimal.chosen.freedoms, inputs.size)))
 
     def states(self, added: Array) -> Array:
-        """States (2f,) where this (2f,) is added to their derivatives, of a real s."""
+        """Solve for the states (2f,) with `added` (2f,) added to their derivatives, for a real s."""
         minimal = self.minimal
         x = np.reshape(added, (2, -1, 1))
         joints = minimal.chosen.joints.size
@@ -106,7 +106,7 @@ class Descriptor:
         return np.concatenate([y, self.s * y - x[0]]).ravel()
 
     def _solved(self, right: Numbers, added: Array) -> SmallMotion:
-        """The motion from the right-hand side of the first two equations and what is added to the states."""
+        """Solve for the motion, with the right-hand side of the first two equations and additions to x'."""
         minimal, s, n = self.minimal, self.s, self.minimal.system.n
         whole, of_rates = minimal.tangents.whole, np.stack([added[0], s * added[0] + added[1]])
         if not np.any(added):
@@ -129,7 +129,7 @@ class Descriptor:
 
 
 def response_at(minimal: Minimal, rows: SensorRows, inputs: NDArray[np.int64], s: complex) -> Complex:
-    """Response (outputs, inputs) of sensors' rows to some of the inputs."""
+    """Compute the response (outputs, inputs) of sensors to the given inputs at s."""
     found = Descriptor(minimal, complex(s)).response(inputs)
     out = rows.q @ found.q + rows.v @ found.v + rows.a @ found.a + rows.multipliers @ found.multipliers
     own = np.nonzero(inputs < minimal.motors.size)[0]
@@ -138,7 +138,7 @@ def response_at(minimal: Minimal, rows: SensorRows, inputs: NDArray[np.int64], s
 
 
 def poles_near(minimal: Minimal, distance: float, count: int) -> Complex:
-    """So many poles nearest to a place on the positive real axis [rad/s], by Arnoldi's method on the inverse."""
+    """Compute the `count` poles nearest to a point on the positive real axis [rad/s], by inverse Arnoldi iteration."""
     at = Descriptor(minimal, distance)
     n = 2 * minimal.chosen.freedoms
     inverse = scipy.sparse.linalg.LinearOperator((n, n), matvec=lambda x: at.states(x.ravel()), dtype=np.dtype(float))

@@ -1,8 +1,8 @@
-"""Sampled models of motions: transition matrices over each period of A(t) and B(t), by exponentials.
+"""Discrete-time models along motions: transition matrices of A(t) and B(t) over each sampling period.
 
-Each step is the fourth-order method without commutators of Blanes and Moan (2006), Fourth- and sixth-order
-commutator-free Magnus integrators for linear and non-linear dynamical systems, of (x, u, u'): two exponentials, of
-averages of the matrices in the step, so that it is exact where these are constant, however fast vibrations are.
+Each step applies the fourth-order commutator-free method of Blanes and Moan (2006), Fourth- and sixth-order
+commutator-free Magnus integrators for linear and non-linear dynamical systems, to (x, u, u'). It consists of two
+exponentials of averages of the matrices in the step, so it is exact for constant matrices, however fast vibrations are.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from paraflex.mechanism.quantities import known
 if TYPE_CHECKING:
     import xarray as xr
 
-# Gauss points of a step, and the weights of the matrices there in the later exponential; reversed in the earlier one.
+# Gauss points of a step, and weights of the matrices there in the second exponential; reversed in the first one.
 _PLACES = (0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0)
 _WEIGHTS = (0.25 - math.sqrt(3.0) / 6.0, 0.25 + math.sqrt(3.0) / 6.0)
-# Steps of twice the length, with splines of every second sample, have 16 times the error, as both are of fourth order.
+# Richardson: steps of twice the size with splines of every second sample have 16 times the error (fourth order).
 _RICHARDSON = 15.0
-# A period longer than the spacing of samples by less than this part is not divided.
+# Relative excess of a period over the spacing of samples up to which it is not divided.
 _SAME = 1e-6
 
 
 class InputHold(Enum):
-    """Inputs between samples: constant, or straight lines."""
+    """Hold of the inputs between samples: zero-order (constant) or first-order (linear)."""
 
     ZERO = "zero"
     FIRST = "first"
 
 
 class Predicted(NamedTuple):
-    """A perturbation as a linear model predicts it: times (k,), states (k, 2f) and outputs (k, outputs)."""
+    """Predicted perturbation: times (k,) [s], states (k, 2f) and outputs (k, outputs)."""
 
     times: Array
     states: Array
@@ -52,7 +52,7 @@ class Predicted(NamedTuple):
 
 
 class Transitions(NamedTuple):
-    """Of each period: changes of x with x and with u at its start and at its end, and an estimate of their error."""
+    """Transition matrix, input matrices for u at the start and at the end, and estimated error of each period."""
 
     Phi: Array
     Gamma: Array
@@ -62,23 +62,25 @@ class Transitions(NamedTuple):
 
 @dataclass(frozen=True)
 class SampledModel:
-    """Small changes along a motion at samples: x_k+1 = Phi_k x_k + Gamma_k u_k + Gamma_next_k u_k+1, z = C x + D u.
+    """Discrete-time model along a motion: x_k+1 = Phi_k x_k + Gamma_k u_k + Gamma_next_k u_k+1, z = C x + D u.
 
     Attributes
     ----------
     states, inputs, outputs : tuple of Variable
-        Names and units.
+        Names and units of states, inputs and outputs.
     times : (k,) array
-        [s]
+        Sample times [s].
     hold : InputHold
-        Inputs between samples.
+        Hold of the inputs between samples.
     Phi : (k - 1, 2f, 2f) array
+        Transition matrix of each period.
     Gamma, Gamma_next : (k - 1, 2f, inputs) arrays
-        The latter is zero where inputs are held constant.
+        Input matrices of each period, for the inputs at its start and end; the latter is zero for a zero-order hold.
     C, D : (k, outputs, 2f) and (k, outputs, inputs) arrays
+        Output and feed-through matrices at the samples.
     error : (k - 1,) array
-        Estimated error of each period's matrices, of exponentials and of splines between the samples of A and B: the
-        change of a perturbation, as a fraction of it (root of its energy).
+        Estimated relative error of each period's matrices (norm of a perturbation: root of its energy), of the
+        exponentials and of the splines between the samples of A and B.
     """
 
     states: tuple[Variable, ...]
@@ -97,19 +99,19 @@ class SampledModel:
     def predict(
         self, x0: Mapping[str, float] | Array | None = None, du: Mapping[str, float | Array] | Array | None = None
     ) -> Predicted:
-        """What a small change of the start and of the inputs leads to.
+        """Predict the response to small changes of the initial state and of the inputs.
 
         Parameters
         ----------
         x0 : (2f,) array or mapping of str to float, optional
-            Change of the states at the first sample; of some by name.
+            Change of the states at the first sample, of all or by name; zero by default.
         du : (k, inputs) array or mapping of str to float or (k,) array, optional
-            Changes of the inputs at the samples; of some by name.
+            Changes of the inputs at the samples, of all or by name; zero by default.
 
         Raises
         ------
         InputError
-            An unknown name, or other numbers of values than states, inputs or samples.
+            A name is unknown, or the number of values is not that of states, inputs or samples.
         """
         x = _by_name(x0, self.states, "x0", ())
         u = _by_name(du, self.inputs, "du", self.times.shape)
@@ -121,7 +123,7 @@ class SampledModel:
         return Predicted(self.times, states, outputs)
 
     def to_xarray(self) -> xr.Dataset:
-        """All matrices by time and by names of states, inputs and outputs, with units."""
+        """Return all matrices as a dataset labelled by time and by names of states, inputs and outputs, with units."""
         import xarray as xr
 
         data = {
@@ -134,7 +136,7 @@ class SampledModel:
 
 
 def _by_name(given: Any, variables: Sequence[Variable], field: str, shape: tuple[int, ...]) -> Array:
-    """Values (*shape, variables), given so or some of them by name; zero by default."""
+    """Return values (*shape, variables), given as an array or by name; zero by default."""
     out = np.zeros((*shape, len(variables)))
     names = [one.name for one in variables]
     if isinstance(given, Mapping):
@@ -158,17 +160,18 @@ def _fitting(value: Any, field: str, shape: tuple[int, ...]) -> Array:
 
 
 def transitions(times: Array, A: Array, B: Array, ends: Array, hold: InputHold) -> Transitions:
-    """Transition matrices between given times of x' = A x + B u.
+    """Compute the transition matrices of x' = A x + B u between given times.
 
     Parameters
     ----------
     times : (k,) array
-        Of the matrices, at least four [s].
+        Times of the matrices, at least four [s].
     A, B : (k, n, n) and (k, n, m) arrays
-        In states of one size, as the error is a part of their root sum of squares.
+        Matrices at these times, for states of equal scale: the error is relative to their Euclidean norm.
     ends : (p + 1,) array
         Ends of the periods [s].
     hold : InputHold
+        Hold of the inputs in each period.
     """
     unit = float(np.mean(np.diff(ends)))
     parts = max(1, math.ceil(unit * (times.size - 1) / (times[-1] - times[0]) - _SAME))
@@ -186,7 +189,7 @@ def transitions(times: Array, A: Array, B: Array, ends: Array, hold: InputHold) 
 
 
 class _Held:
-    """(x, u, unit u')' = M(t) (x, u, unit u'), M of splines."""
+    """Augmented system (x, u, unit u')' = M(t) (x, u, unit u'), with M(t) interpolated by splines."""
 
     def __init__(self, times: Array, A: Array, B: Array, unit: float) -> None:
         self._A, self._B = (make_interp_spline(times, each, k=min(3, times.size - 1)) for each in (A, B))
@@ -199,7 +202,7 @@ class _Held:
         return np.vstack([np.hstack([self._A(t), B, np.zeros_like(B)]), self._inputs, self._last])
 
     def step(self, start: float, end: float) -> Array:
-        """Its transition matrix over a step."""
+        """Return the transition matrix over a step from `start` to `end` [s]."""
         h = end - start
         first, last = (self._at(start + place * h) for place in _PLACES)
         earlier, later = (h * (_WEIGHTS[k] * first + _WEIGHTS[1 - k] * last) for k in (1, 0))
@@ -207,7 +210,7 @@ class _Held:
 
 
 def _composed(steps: Array, parts: int) -> Array:
-    """Transition matrices over so many steps each."""
+    """Return the transition matrices over `parts` steps each."""
     whole = steps[::parts]
     for part in range(1, parts):
         whole = steps[part::parts] @ whole
@@ -215,9 +218,9 @@ def _composed(steps: Array, parts: int) -> Array:
 
 
 def _errors(coarse: _Held, grid: Array, steps: Array, parts: int, n: int) -> Array:
-    """Estimated errors of periods of so many steps, from steps of twice the length with every second sample.
+    """Estimate the errors of periods of `parts` steps from steps of twice the size with every second sample.
 
-    Two periods of one step each are compared at once; for the last of an odd number with the one before it.
+    Periods of one step are compared in pairs; the last of an odd number is paired with the previous one.
     """
     span, count = max(parts, 2), len(steps)
     error = np.zeros(count // parts)

@@ -1,8 +1,9 @@
-"""Independent rows of sparse matrices, and the columns that follow from the others.
+"""Independent rows of sparse matrices, and the columns that they determine.
 
-Of few coordinates by QR factorisations with pivots, of many by Gaussian elimination: next is the column with the fewest
-entries (Markowitz 1957), in the shortest row where its entry is not small. The branches of a tree are so taken off from
-their ends, and loops one by one, so that chains and rows of loops cost what their entries cost.
+Small matrices are treated by QR factorisation with column pivoting, large ones by Gaussian elimination. The next pivot
+is in the column with the fewest entries (Markowitz 1957), in the shortest row where its entry is not small. Branches of
+a tree are thus eliminated from their ends and loops one by one, so the cost for chains and rows of loops is
+proportional to the number of entries.
 """
 
 from __future__ import annotations
@@ -20,25 +21,25 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array
 
 Numbers = NDArray[np.int64]
-# A row of size one of which no more than this is independent of others follows from them.
+# A row of unit norm is dependent if its part independent of other rows is not larger than this.
 DEPENDENT = 1e-8
-# A pivot is at least this part of the largest entry of its row.
+# Smallest pivot relative to the largest entry of its row.
 _PIVOT = 0.1
-# Rows of which less than this is left wait until no others are left: their elimination makes others grow.
+# Rows with smaller remainders are deferred until no others are left: their elimination amplifies other rows.
 _WAITING = (1e-2, 1e-4, 1e-6, DEPENDENT)
-# What is left of an entry that cancels, as a part of it.
+# Relative remainder of an entry that is regarded as cancelled.
 _CANCELLED = 1e-14
 
 
 class Independent(NamedTuple):
-    """Rows that are independent, and the columns that they determine.
+    """Independent rows and the columns that they determine.
 
     Attributes
     ----------
     groups : tuple of arrays of int
-        Rows of each group, ascending.
+        Indices of the independent rows of each group, ascending.
     columns : array of int
-        As many, ascending: with these the rows form a regular matrix.
+        Indices of as many columns, ascending, in which the rows form a regular matrix.
     """
 
     groups: tuple[Numbers, ...]
@@ -46,14 +47,14 @@ class Independent(NamedTuple):
 
 
 def independent_dense(groups: Sequence[csr_matrix], weights: Array) -> Independent:
-    """Independent rows by QR factorisations; of the first group any, of the others each that does not follow before.
+    """Select independent rows by QR factorisation: any of the first group, then in order those of the other groups.
 
     Parameters
     ----------
     groups : sequence of (rows, n) sparse matrices
-        Rows of size one.
+        Groups of rows of unit norm.
     weights : (n,) array
-        The larger, the later a column is taken.
+        Weights of the columns; a column of larger weight is selected later.
     """
     first, *others = (group.toarray() for group in groups)
     kept, basis = np.zeros(0, dtype=int), np.zeros((weights.size, 0))
@@ -73,7 +74,15 @@ def independent_dense(groups: Sequence[csr_matrix], weights: Array) -> Independe
 
 
 def successive(rows: Array, basis: Array) -> tuple[list[int], Array]:
-    """Rows (h, n) of size one that follow neither from a basis (n, k) nor from those before; the basis with them."""
+    """Select the rows (h, n) of unit norm that are independent of a basis (n, k) and of previous rows.
+
+    Returns
+    -------
+    list of int
+        Indices of the independent rows.
+    (n, k + independent) array
+        Orthonormal basis extended by them.
+    """
     kept: list[int] = []
     for k, row in enumerate(rows):
         left = row - basis @ (basis.T @ row)
@@ -85,18 +94,18 @@ def successive(rows: Array, basis: Array) -> tuple[list[int], Array]:
 
 
 def unit_rows(rows: Array) -> Array:
-    """Rows of size one, those of zeros as they are."""
+    """Normalise rows to unit norm; rows of zeros are unchanged."""
     return rows / sizes(rows, 1)
 
 
 def sizes(matrix: NDArray[Any], axis: int) -> Array:
-    """Sizes of a matrix' rows (rows, 1), along axis 1, or of its columns (1, columns); one for those of zeros."""
+    """Return the norms of a matrix' rows (rows, 1), with axis 1, or columns (1, columns), with axis 0; 1 if zero."""
     size = np.linalg.norm(matrix, axis=axis, keepdims=True)
     return np.where(size > 0.0, size, 1.0)
 
 
 def independent_sparse(groups: Sequence[csr_matrix], weights: Array) -> Independent:
-    """The same by elimination; of rows of one group that follow from one another any are kept."""
+    """Select independent rows as `independent_dense` does, by elimination and without an order within a group."""
     work = _Elimination(scipy.sparse.csr_matrix(scipy.sparse.vstack(groups)), weights)
     found, first = [], 0
     for group in groups:
@@ -106,7 +115,7 @@ def independent_sparse(groups: Sequence[csr_matrix], weights: Array) -> Independ
 
 
 class _Elimination:
-    """Rows as dictionaries of their entries, and for each column the rows that have one."""
+    """Sparse Gaussian elimination, with rows as dictionaries of entries and the set of rows of each column."""
 
     def __init__(self, matrix: csr_matrix, weights: Array) -> None:
         matrix.eliminate_zeros()
@@ -124,7 +133,7 @@ class _Elimination:
                 self.columns.setdefault(column, set()).add(k)
 
     def eliminate(self, rows: Iterable[int]) -> list[int]:
-        """Take some rows as pivots: those that are independent of all that were taken."""
+        """Eliminate by those of the given rows that are independent of all previous ones, and return them."""
         waiting, kept = set(rows), list[int]()
         for least in _WAITING:
             while before := len(waiting):
@@ -139,7 +148,7 @@ class _Elimination:
         return kept
 
     def _sweep(self, waiting: set[int], least: float) -> list[int]:
-        """Take rows of which at least so much is left, by columns with few entries first."""
+        """Eliminate by rows with at least the given remainder, columns with few entries first, and return them."""
         kept = []
         while self.heap:
             count, column = heapq.heappop(self.heap)
@@ -155,7 +164,7 @@ class _Elimination:
         return kept
 
     def _size(self, row: int) -> tuple[float, float]:
-        """The largest entry of a row, as it is and over the weight."""
+        """Return the largest magnitude of a row's entries, without weights and divided by the weights."""
         if row not in self.largest:
             entries, weights = self.rows[row], self.weights
             size = max(map(abs, entries.values()), default=0.0)
@@ -163,7 +172,7 @@ class _Elimination:
         return self.largest[row]
 
     def _take(self, row: int, column: int) -> None:
-        """Eliminate a column from all other rows by a row."""
+        """Eliminate a column from all other rows by means of a pivot row."""
         pivot = self.rows[row]
         for j in pivot:
             self.columns[j].discard(row)
@@ -176,7 +185,7 @@ class _Elimination:
             heapq.heappush(self.heap, (len(self.columns[j]), j))
 
     def _subtract(self, other: int, factor: float, pivot: dict[int, float]) -> None:
-        """Subtract a multiple of a pivot's row from another row."""
+        """Subtract a multiple of the pivot row from another row."""
         entries = self.rows[other]
         self.largest.pop(other, None)
         for j, value in pivot.items():

@@ -1,4 +1,4 @@
-"""Linear models of mechanisms about poses, planned motions and runs."""
+"""Linearisation of mechanisms at poses, along planned motions and along runs."""
 
 from __future__ import annotations
 
@@ -38,23 +38,24 @@ from paraflex.mechanism.measured import measured_sensors
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
 
-# A time is that of a sample if it is this near, as a part of the distance of samples.
+# Largest distance of a time from the nearest sample, relative to the largest spacing of samples.
 _NEAR = 0.5
 
 
 @dataclass(frozen=True)
 class Ports:
-    """What goes into a linear model and what comes out.
+    """Inputs and outputs of a linear model.
 
     Attributes
     ----------
     mode : ActuationMode
-        Its motors are inputs.
+        Actuation mode, whose motors are inputs.
     forces : tuple of PointRef
         Points with forces along x and y as inputs.
     prescribed : tuple of str
         Prescribed motions whose accelerations are inputs.
     sensors : tuple of Sensor
+        Sensors that are outputs.
     """
 
     mode: ActuationMode
@@ -77,43 +78,50 @@ def linearise(
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
 ) -> LinearModel:
-    """A linear model of small changes of a motion, with motors of a mode as inputs and sensors as outputs.
+    """Linearise a mechanism at an operating point, with motors as inputs and sensors as outputs.
 
-    Of a mechanism (or a model) it is about a pose at rest, of a planned motion (`pf.plan`) about that motion, of a run
-    about the run, with velocities, accelerations, constraint forces and torques kept. Outputs are an encoder at every
-    motor's joint, the end-effector's coordinates and the mechanism's sensors, by name.
+    The operating point is a pose at rest of a mechanism (or a model), a sample of a planned motion (`pf.plan`), or a
+    sample of a run, with its velocities, accelerations, constraint forces and torques. The outputs are an encoder at
+    every motor's joint, the end-effector's coordinates x and y, and the mechanism's sensors, by name.
 
     Parameters
     ----------
     source : Mechanism, Model, TrackingTask, TrackingRun or MotionRun
+        Mechanism, planned motion or run to linearise.
     mode : str or ActuationMode, optional
-        All motors by default; of a run its own. The other motors turn freely.
+        Actuation mode; by default that of a run, else all motors. The other motors are passive.
     at : float, optional
-        Time of the planned motion or run [s]: the nearest sample. Its start by default.
+        Time of the planned motion or run, of which the nearest sample is used [s]; by default its start.
     assembly : str, optional
-        Of a mechanism: the first by default.
+        Assembly of a mechanism; by default the first.
     start : Start or State, optional
-        Of a mechanism: the pose; by default the model's, or that of the assembly.
+        Pose of a mechanism; by default that of the model or of the assembly.
     balanced : bool
-        Of a mechanism: about the static equilibrium nearest the pose, the joints of the mode's motors as they are.
+        True linearises a mechanism at the static equilibrium nearest to the pose, with the joints of the mode's motors
+        held. False by default.
     forces : sequence of str
-        Points ("link1.C") at which forces along x and y are inputs as well.
+        Points ("link1.C") at which forces along x and y are additional inputs; none by default.
     prescribed : sequence of str
-        Prescribed motions whose accelerations are inputs as well; all by default where there is neither a motor nor a
-        force. Others keep to their laws.
+        Prescribed motions whose accelerations are additional inputs; by default all if there is neither a motor nor a
+        force. Other prescribed motions follow their profiles.
     coordinates : str
-        First states: "motors", the coordinates of the motors' joints, or "task", those of the end-effector.
+        First states: "motors", the coordinates of the motors' joints (default), or "task", those of the end-effector.
+
+    Returns
+    -------
+    LinearModel
+        Linear model at the operating point.
 
     Raises
     ------
     InputError
-        An unknown mode, point or motion, nothing that could be an input, a time that the motion does not have, a time
-        for a mechanism or a pose for a motion, a mechanism without any freedom, or coordinates of the end-effector that
-        do not describe its motion.
+        A mode, point or prescribed motion is unknown, there are no inputs, the time is outside the motion, a time is
+        given for a mechanism or a pose for a motion, the mechanism has no degree of freedom, or the coordinates of the
+        end-effector do not describe its motion.
     AssemblyError
         The loops do not close, or there is no equilibrium.
     SingularPositionError
-        A singular position, at which no coordinates describe the motion.
+        The position is singular, so that no coordinates describe the motion.
     """
     return linear_model(
         *sought_motion(
@@ -124,7 +132,7 @@ def linearise(
 
 
 class Sought(NamedTuple):
-    """What a linear model is made from, but for the choice of its coordinates: see `linear_model`."""
+    """Arguments of `linear_model` without the choice of coordinates: operating point, inputs and outputs."""
 
     coordinates: Coordinates
     point: MotionPoint
@@ -145,7 +153,7 @@ def sought_motion(
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
 ) -> Sought:
-    """The point of a motion that is linearised about: see `linearise`."""
+    """Return the operating point, inputs and outputs of a linear model: see `linearise`."""
     moves = isinstance(source, TrackingTask | TrackingRun | MotionRun)
     others = {"assembly": assembly, "start": start, "balanced": balanced or None} if moves else {"at": at}
     for name, value in others.items():
@@ -181,7 +189,7 @@ def linear_model(
     *,
     chosen: Chosen | None = None,
 ) -> LinearModel:
-    """The model about a point of a motion, in coordinates chosen there or before."""
+    """Linearise at an operating point, in the given minimal coordinates or, by default, in those chosen there."""
     system = coordinates.system
     mechanism, tangents = system.mechanism, coordinates.at(point)
     chosen = coordinates.choose(tangents) if chosen is None else chosen
@@ -216,7 +224,7 @@ def charted(
     source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
     prescribed: Sequence[str], coordinates: FirstCoordinates | str,
 ) -> tuple[Moving, Ports, Coordinates]:  # fmt: skip
-    """A motion, what goes into linear models along it and comes out, and the coordinates that they choose from."""
+    """Return a motion, the inputs and outputs of linear models along it, and their candidate coordinates."""
     task = source.task if isinstance(source, TrackingRun) else source
     mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism
     ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
@@ -226,7 +234,7 @@ def charted(
 
 
 def mode_of(source: object, mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
-    """A mode, by default that of a run, else all motors."""
+    """Return an actuation mode, by default that of a run, else the mode of all motors."""
     if mode is None and isinstance(source, TrackingRun):
         mode = source.mode
     if mode is None:
@@ -235,7 +243,7 @@ def mode_of(source: object, mechanism: Mechanism, mode: str | ActuationMode | No
 
 
 def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], prescribed: Sequence[str]) -> Ports:
-    """Inputs and outputs from the names of points and of prescribed motions."""
+    """Return the inputs and outputs for the names of points and of prescribed motions."""
     if not (mode.motors or forces or prescribed):
         prescribed = [one.name for one in mechanism.prescribed]
         if not prescribed:
@@ -246,12 +254,12 @@ def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], p
     points = tuple(PointRef.parse(text, "forces") for text in forces)
     for point in points:
         known_point(mechanism, point, "forces")
-    # Of beams in several frames the sensors are on the parts.
+    # Sensors on a beam in several frames belong to its parts.
     return Ports(mode, points, tuple(prescribed), measured_sensors(in_frames(mechanism)))
 
 
 class Moving(NamedTuple):
-    """A planned motion or a run: what it is, its system, the times (k,) of its samples, and their points by number."""
+    """Planned motion or run: description, system, sample times (k,) [s], and the operating point of each sample."""
 
     about: str
     system: System
@@ -260,21 +268,21 @@ class Moving(NamedTuple):
 
 
 def moving(source: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode) -> Moving:
-    """What linear models along a planned motion or a run are made from."""
+    """Return the operating points along a planned motion or a run."""
     if isinstance(source, TrackingTask):
         return Moving("a planned motion", source.system, source.motion.t, partial(planned_point, source, mode))
     system = source.system if isinstance(source, MotionRun) else source.task.system
-    # The state at an event is a sample more than a run along a path has torques for.
+    # A run along a path that ends at an event has one more state than torques.
     return Moving("a run", system, source.solution.t[: len(source.applied)], partial(run_point, source))
 
 
 def nearest_sample(times: Array, at: float) -> int:
-    """Number of the sample nearest to a time [s].
+    """Return the number of the sample nearest to a time [s].
 
     Raises
     ------
     InputError
-        It is outside the motion.
+        The time is outside the motion.
     """
     sample = int(np.argmin(np.abs(times - at)))
     apart = float(np.max(np.diff(times), initial=0.0))
@@ -287,7 +295,10 @@ def nearest_sample(times: Array, at: float) -> int:
 
 
 def _forces(system: System, q: Array, motors: csr_matrix, points: Sequence[PointRef]) -> csr_matrix:
-    """Generalised forces (n, inputs) of unit torques of motors, by rows (motors, n), and along x and y at points."""
+    """Return the generalised forces (n, inputs) of unit motor torques and of unit forces along x and y at points.
+
+    `motors` (motors, n) are the derivatives of the motors' coordinates.
+    """
     places = [csr_matrix(marker_place(system, system.marker(point), q[None])[1][0]) for point in points]
     return csr_matrix(scipy.sparse.vstack([motors, *places]).T)
 

@@ -1,6 +1,6 @@
-"""The equations of small motions in minimal coordinates y = T q: see `coordinates`.
+"""Linearised equations of motion in minimal coordinates y = T q: see `coordinates`.
 
-About a point of a motion, dq = Z dy and dv = Z dy' + Z' dy with
+At an operating point, dq = Z dy and dv = Z dy' + Z' dy with
 
     [Phi_q; T] Z = [0; 1],    [Phi_q; T] Z' = -[Phi_q'; T'] Z
 
@@ -8,7 +8,7 @@ and accelerations and multipliers follow from
 
     [M, Phi_q^T; Phi_q, 0] [da; dlambda] = [S du - D dv - K dq; -Phi''_q dq - Phi''_v dv]
 
-with dy'' = T da + y''_q dq + y''_v dv. Coordinates that are driven have rows among Phi'' too, their dy'' given.
+with dy'' = T da + y''_q dq + y''_v dv. Driven coordinates have rows in Phi'' as well; their dy'' are inputs.
 """
 
 from __future__ import annotations
@@ -29,22 +29,23 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import Moment, SingularPositionError
 from paraflex.linear.coordinates import Chosen, PointTangents, RowTangents
 
-# Coordinates with a larger condition number do not describe the motion any more.
+# Coordinates with a larger condition number are singular.
 _SINGULAR = 1e13
 
 
 class Changes(NamedTuple):
-    """Changes of the motion, a column for each state of x = (y, y') and then for each input.
+    """Derivatives of the motion, with one column per state of x = (y, y'), then one per input.
 
     Attributes
     ----------
     q, v : (n, states) arrays
-        Inputs do not change these.
+        Derivatives of coordinates and velocities, which do not depend on inputs.
     a : (n, states + inputs) array
+        Derivatives of accelerations.
     multipliers : (m, states + inputs) array
-        Zero in redundant rows.
+        Derivatives of multipliers; zero in redundant rows.
     second : (f, states + inputs) array
-        Of the accelerations y''.
+        Derivatives of the minimal accelerations y''.
     """
 
     q: Array
@@ -56,22 +57,26 @@ class Changes(NamedTuple):
 
 @dataclass(frozen=True)
 class Minimal:
-    """Small motions about a point of a motion in chosen coordinates.
+    """Linearised equations of motion at an operating point in chosen minimal coordinates.
 
     Attributes
     ----------
     system : System
+        System of the mechanism.
     point : MotionPoint
+        Operating point.
     tangents : PointTangents
+        Tangent matrices at the operating point.
     chosen : Chosen
+        Minimal coordinates.
     scale : (n,) array
-        What one of each coordinate is measured in.
+        Unit of each coordinate, for scaling.
     forces : (n, inputs) sparse matrix
         Generalised forces S of the inputs that are torques and forces.
     motors : (motors,) array of int
-        Numbers of the motors that are the first of the inputs.
+        Indices of the motors that are the first inputs.
     driven : int
-        How many of the last of the chosen joints are driven: their accelerations are the last inputs.
+        Number of driven joints, which are the last of the chosen joints; their accelerations are the last inputs.
     """
 
     system: System
@@ -85,23 +90,23 @@ class Minimal:
 
     @cached_property
     def constraints(self) -> RowTangents:
-        """The independent constraints."""
+        """Tangents of the independent constraints."""
         return self.tangents.constraints.taken(self.chosen.constraints)
 
     @cached_property
     def joints(self) -> RowTangents:
-        """Those joints' coordinates that are states."""
+        """Tangents of the joint coordinates that are states."""
         return self.tangents.joints.taken(self.chosen.joints)
 
     @cached_property
     def _matrix(self) -> csr_matrix:
-        """The rows [Phi_q; T] at the coordinates that are no states."""
+        """Columns of [Phi_q; T] for the coordinates that are not states."""
         whole = csr_matrix(scipy.sparse.vstack([self.constraints.jacobian, self.joints.jacobian]))
         return csr_matrix(whole[:, self._dependent])
 
     @cached_property
     def _factor(self) -> Factor:
-        """Factor of `_matrix`."""
+        """Factorisation of `_matrix`."""
         cause = "the coordinates chosen for the linear model do not describe its motion"
         factor = self._factored(self._matrix, self.scale[self._dependent], cause)
         if not factor.condition < _SINGULAR:
@@ -109,7 +114,7 @@ class Minimal:
         return factor
 
     def _factored(self, matrix: csr_matrix, units: Array, cause: str) -> Factor:
-        """A factored matrix that is singular in singular positions only."""
+        """Factorise a matrix that is singular at singular positions only."""
         try:
             return Factor(matrix, units)
         except np.linalg.LinAlgError as error:
@@ -122,7 +127,7 @@ class Minimal:
 
     @property
     def condition(self) -> float:
-        """Condition number of the coordinates, infinite where they do not describe the motion."""
+        """Condition number of the minimal coordinates; infinite if they do not describe the motion."""
         try:
             return self._factor.condition
         except SingularPositionError:
@@ -130,11 +135,11 @@ class Minimal:
 
     @property
     def orientation(self) -> float:
-        """Sign of the determinant of `_matrix`: another one lies beyond a pose where the coordinates are singular."""
+        """Sign of the determinant of `_matrix`, which changes at a pose where the coordinates are singular."""
         return self._factor.sign
 
     def most_dependent(self) -> int | None:
-        """Which of `chosen.joints` has the largest part in rows that nearly depend on one another; None without any."""
+        """Return the index in `chosen.joints` with the largest part in nearly dependent rows; None without joints."""
         rows = self._matrix.toarray() * self.scale[self._dependent]
         part = np.abs(scipy.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))[0][:, -1])
         part = part[self.constraints.number.size :]
@@ -145,7 +150,7 @@ class Minimal:
         return np.setdiff1d(np.arange(self.system.n), self.chosen.bodies)
 
     def coordinates(self, constraints: Array, y: Array) -> Array:
-        """Changes of all coordinates (n, k), from those of the constraints Phi (c, k) and of y (f, k)."""
+        """Compute changes of all coordinates (n, k) from those of the constraints Phi (c, k) and of y (f, k)."""
         joints = self.chosen.joints.size
         out = np.zeros((self.system.n, y.shape[1]))
         out[self.chosen.bodies] = y[joints:]
@@ -155,13 +160,13 @@ class Minimal:
 
     @cached_property
     def directions(self) -> Array:
-        """Z (n, f): how all coordinates change with each y. Dense."""
+        """Derivatives Z (n, f) of all coordinates with respect to y, dense."""
         f = self.chosen.freedoms
         return self.coordinates(np.zeros((self.chosen.constraints.size, f)), np.eye(f))
 
     @cached_property
     def changes(self) -> Changes:
-        """Changes of the motion with states and inputs. Dense."""
+        """Derivatives of the motion with respect to states and inputs, dense."""
         Z, whole = self.directions, self.tangents.whole
         turned = np.zeros_like(Z)
         if np.any(self.point.v):
@@ -185,12 +190,12 @@ class Minimal:
 
     @cached_property
     def held_rows(self) -> RowTangents:
-        """Rows whose second derivatives are given: constraints, and coordinates that are driven."""
+        """Tangents of the rows with given second derivatives: constraints and driven coordinates."""
         driven = self.joints.taken(np.arange(self.chosen.joints.size - self.driven, self.chosen.joints.size))
         return self.constraints.with_rows(driven)
 
     def _held(self, q: Array, v: Array, columns: int) -> Array:
-        """Phi_q da as states and inputs want it."""
+        """Return the derivatives of Phi_q a that the held rows require, with respect to states and inputs."""
         rows = self.held_rows
         out = np.zeros((rows.number.size, columns))
         out[:, : q.shape[1]] = -(rows.second_place @ q + rows.second_rate @ v)
@@ -199,7 +204,7 @@ class Minimal:
         return out
 
     def _accelerations(self, forces: Array, held: Array) -> tuple[Array, Array]:
-        """Accelerations and multipliers from forces and from the second derivatives of held rows."""
+        """Solve for accelerations and multipliers from forces and the second derivatives of held rows."""
         rows, n = self.held_rows.jacobian, self.system.n
         mass = self.tangents.whole.mass
         column = 1.0 / np.sqrt(mass.diagonal())

@@ -1,4 +1,4 @@
-"""Linear models of mechanisms: poles, zeros, frequency responses, and the same for other programs."""
+"""Linear models of mechanisms: state space, poles, zeros and frequency responses."""
 
 from __future__ import annotations
 
@@ -28,35 +28,37 @@ from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_i
 from paraflex.linear.zeros import StateSpace, Vibrating, by_size, vibrating_zeros, zeros
 
 Complex = NDArray[np.complex128]
-# Stiffness is symmetric at rest but for this part of it.
+# Admissible relative asymmetry of a stiffness matrix that is regarded as symmetric.
 _SYMMETRIC = 1e-7
-# With more degrees of freedom sparse matrices are faster than dense ones.
+# Sparse matrices are faster than dense ones with more degrees of freedom.
 _DENSE_FREEDOMS = 200
 
 
 @dataclass(frozen=True)
 class LinearModel(NamedModel):
-    """Small changes of a mechanism's motion: x' = A x + B u, y = C x + D u.
+    """Linear state-space model of a mechanism: x' = A x + B u, y = C x + D u.
 
-    States are minimal coordinates and then their rates: angles and travels of the joints with motors, elastic
-    coordinates of bodies (of unit modal mass in their body), coordinates that are driven. No pole belongs to a
-    constraint. All are changes from the point of the motion the model is about.
+    The states are minimal coordinates and then their rates: angles and travels of the joints with motors, elastic
+    coordinates of bodies (of unit modal mass in their body), and driven coordinates. There are no poles of constraints.
+    All variables are deviations from the operating point.
 
     Attributes
     ----------
     mechanism, mode : str
+        Names of the mechanism and of the actuation mode.
     about : str
-        What the model is about: "a pose at rest", "static equilibrium", "a planned motion", "a run".
+        Operating point: "a pose at rest", "static equilibrium", "a planned motion" or "a run".
     unbalanced : float
-        Of a pose at rest: what the mechanism would start with if let go [m/s^2]; forces that do not change hold it.
+        Initial acceleration of the mechanism if released from a pose at rest [m/s^2]; the model contains constant
+        forces that hold it.
     states, inputs, outputs : tuple of Variable
-        Names and units.
+        Names and units of states, inputs and outputs.
     minimal : Minimal
-        The equations that it was made from.
+        Linearised equations in minimal coordinates.
     rows : SensorRows
-        How the outputs depend on the motion.
+        Derivatives of the sensor readings with respect to the motion.
     wanted : (inputs, outputs) tuple of arrays of int
-        Which inputs of `minimal` and which of `rows` these are.
+        Indices of the model's inputs in `minimal` and of its outputs in `rows`.
     """
 
     mechanism: str
@@ -75,17 +77,17 @@ class LinearModel(NamedModel):
 
     @property
     def title(self) -> str:
-        """Which mechanism it is of, in which mode, and what it is about."""
+        """Mechanism, actuation mode and operating point of the model, as a text."""
         return f"{self.mechanism}, mode {self.mode}, about {self.about}"
 
     @property
     def time(self) -> float:
-        """Time of the point of the motion [s]."""
+        """Time of the operating point [s]."""
         return self.minimal.point.time
 
     @property
     def at_rest(self) -> bool:
-        """Whether it is about a pose at rest."""
+        """Whether the operating point is a pose at rest."""
         return self.minimal.point.at_rest
 
     @cached_property
@@ -107,12 +109,12 @@ class LinearModel(NamedModel):
 
     @cached_property
     def D(self) -> Array:
-        """Feed-through (outputs, inputs): of accelerations, strains and forces."""
+        """Feed-through matrix (outputs, inputs), of accelerations, strains and forces."""
         return self._outputs[1]
 
     @property
     def state_space(self) -> StateSpace:
-        """A, B, C and D."""
+        """State-space matrices A, B, C and D."""
         return StateSpace(self.A, self.B, self.C, self.D)
 
     @cached_property
@@ -126,7 +128,7 @@ class LinearModel(NamedModel):
 
     @property
     def place_outputs(self) -> Array:
-        """What outputs (outputs, f) are of the coordinates y, but for accelerations, constraint forces and torques."""
+        """Output matrix (outputs, f) of the coordinates y, without accelerations, constraint forces and torques."""
         changes, f = self.minimal.changes, len(self.states) // 2
         rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
         return rows.q @ changes.q[:, :f] + rows.v @ changes.v[:, :f]
@@ -135,7 +137,7 @@ class LinearModel(NamedModel):
 
     @cached_property
     def _reduced(self) -> tuple[Array, Array, Array]:
-        """Mass, damping and stiffness (f, f) in the minimal coordinates; of a motion without terms of its rates."""
+        """Mass, damping and stiffness (f, f) in minimal coordinates, without terms of the rates of a motion."""
         Z, whole, minimal = self.minimal.directions, self.minimal.tangents.whole, self.minimal
         parts = Z.T @ (whole.mass @ Z), Z.T @ (whole.damping @ Z), Z.T @ (whole.stiffness @ Z)
         last = minimal.chosen.joints.size
@@ -143,43 +145,43 @@ class LinearModel(NamedModel):
 
     @cached_property
     def _typical(self) -> float:
-        """Square of a low frequency [rad^2/s^2], by which frequencies are measured."""
+        """Square of a typical low frequency, the scale of frequencies [rad^2/s^2]."""
         whole = self.minimal.tangents.whole
         return typical_square(stiffness_diagonal(self.minimal.system), whole.stiffness, whole.mass)
 
     @property
     def low_frequency(self) -> float:
-        """A low frequency, by which others are measured [rad/s]."""
+        """Typical low frequency, the scale of frequencies [rad/s]."""
         return float(np.sqrt(self._typical))
 
     @cached_property
     def _modes(self) -> tuple[Array, Array]:
-        """Squares of the undamped frequencies (f,), ascending, and shapes (f, f) of unit mass, in the coordinates y."""
+        """Squares of the undamped frequencies (f,), ascending, and mode shapes of unit mass (f, f) in coordinates y."""
         return self._undamped(np.eye(len(self.states) // 2))
 
     def _undamped(self, basis: Array) -> tuple[Array, Array]:
-        """Squares and shapes of the undamped modes in the motions y of a basis (f, free)."""
+        """Compute squared frequencies and shapes of the undamped modes in the subspace of a basis (f, free)."""
         mass, _, stiffness = (basis.T @ part @ basis for part in self._reduced)
         return undamped_modes(mass, 0.5 * (stiffness + stiffness.T), self._typical)
 
     @cached_property
     def _is_vibrating(self) -> bool:
-        """Whether it is a mechanism at rest whose stiffness derives from a potential."""
+        """Whether the operating point is at rest and the stiffness symmetric, hence derived from a potential."""
         stiffness = self._reduced[2]
         size = np.linalg.norm(stiffness)
         return self.at_rest and bool(np.linalg.norm(stiffness - stiffness.T) <= _SYMMETRIC * size)
 
     @cached_property
     def _modal_damping(self) -> Array:
-        """Damping (f, f) of the undamped modes."""
+        """Damping matrix (f, f) in the undamped modes."""
         return modal_damping(self._reduced[1], self._modes[1])
 
     @cached_property
     def modal_states(self) -> tuple[Array, Array]:
-        """States in undamped modes of unit mass from states, and the reverse, (2f, 2f) each.
+        """Transformation of states to undamped modes of unit mass, and its inverse, (2f, 2f) each.
 
-        Displacements are multiplied by their frequencies. The sum of squares is twice the energy;
-        what is free has a low frequency in place of zero.
+        Modal displacements are multiplied by their frequencies, with a low frequency in place of zero for rigid
+        motions. The sum of squares of the transformed states is twice the energy.
         """
         shapes, omega = self._modes[1], self._modal_sizes
         inverse = shapes.T @ self._reduced[0]
@@ -188,12 +190,12 @@ class LinearModel(NamedModel):
 
     @property
     def _modal_sizes(self) -> Array:
-        """By what displacements of undamped modes (f,) are multiplied in `modal_states` [rad/s]."""
+        """Scale factors (f,) of the modal displacements in `modal_states` [rad/s]."""
         return np.sqrt(np.maximum(self._modes[0], 0.0) + self._typical)
 
     @cached_property
     def scaled(self) -> StateSpace:
-        """The model in modes of its mass and stiffness, whose displacements are multiplied by their frequencies."""
+        """State-space matrices in the scaled modal states of `modal_states`."""
         there, back = self.modal_states
         if self._is_vibrating:
             omega, f = self._modal_sizes, self._modes[0].size
@@ -205,40 +207,40 @@ class LinearModel(NamedModel):
 
     @cached_property
     def frequencies(self) -> Array:
-        """Undamped natural frequencies (f,), inputs zero [rad/s]; zero for motions that are free or grow."""
+        """Undamped natural frequencies (f,) with zero inputs [rad/s]; zero for free and unstable motions."""
         return np.sqrt(np.maximum(self._modes[0], 0.0))
 
     @cached_property
     def shapes(self) -> Array:
-        """Changes of all coordinates of the system (n, f) in the undamped modes, of unit modal mass."""
+        """Undamped mode shapes of unit modal mass (n, f) in all coordinates of the system."""
         return self.minimal.directions @ self._modes[1]
 
     @checked_arguments()
     def held_frequencies(self, motors: Sequence[str] | None = None) -> Array:
-        """Undamped natural frequencies with motors held [rad/s].
+        """Compute the undamped natural frequencies with motors held [rad/s].
 
         Parameters
         ----------
         motors : sequence of str, optional
-            By default all that are inputs.
+            Names of the motors held; by default all that are inputs.
 
         Raises
         ------
         InputError
-            A motor that the mechanism does not have.
+            The mechanism does not have a motor.
         """
         return np.sqrt(np.maximum(self._undamped(self._held(motors))[0], 0.0))
 
     @checked_arguments()
     def held_compliance(self, point: str, motors: Sequence[str] | None = None) -> Array:
-        """Displacement (2, 2) of a point along x and y under unit forces there along x and y, motors held [m/N].
+        """Compute the compliance (2, 2) of a point along x and y with motors held [m/N].
 
         Parameters
         ----------
         point : str
-            One of the `forces` of the model.
+            Point whose forces are inputs of the model, see `forces` of `linearise`.
         motors : sequence of str, optional
-            That are held: by default all that are inputs.
+            Names of the motors held; by default all that are inputs.
         """
         forces = self.select([f"{point}.{axis}" for axis in ("x", "y")])._force_rows
         basis = self._held(motors)
@@ -246,17 +248,17 @@ class LinearModel(NamedModel):
         return np.asarray(moved.T @ scipy.linalg.solve(basis.T @ self._reduced[2] @ basis, moved))
 
     def _held(self, motors: Sequence[str] | None) -> Array:
-        """Basis (f, free) of the motions with motors held, by default all that are inputs."""
+        """Return a basis (f, free) of the motions with motors held, by default all that are inputs."""
         return kernel(self.joint_rows(self.motor_joints(motors)), 1.0 / np.sqrt(np.diag(self._reduced[0])))
 
     @checked_arguments()
     def motor_joints(self, motors: Sequence[str] | None = None) -> list[str]:
-        """Joints of motors, by default of all that are inputs.
+        """Return the joints of motors, by default of all that are inputs.
 
         Raises
         ------
         InputError
-            A motor that the mechanism does not have.
+            The mechanism does not have a motor.
         """
         joints = {motor.name: motor.joint for motor in self.minimal.system.mechanism.motors}
         names = [one.name for one in self.inputs if one.name in joints] if motors is None else motors
@@ -267,42 +269,43 @@ class LinearModel(NamedModel):
 
     @checked_arguments()
     def joint_rows(self, joints: Sequence[str]) -> Array:
-        """Changes of joints' coordinates (h, f) with the coordinates y."""
+        """Return the derivatives (h, f) of joint coordinates with respect to the coordinates y."""
         q, Z = self.minimal.point.q[None], self.minimal.directions
         rows = [joint_coordinate(self.minimal.system, joint, q).rows[0] @ Z for joint in joints]
         return np.array(rows).reshape(-1, Z.shape[1])
 
     @checked_arguments()
     def poles(self, count: int | None = None) -> Complex:
-        """Poles (2f,), by magnitude [rad/s].
+        """Compute the poles (2f,), sorted by magnitude [rad/s].
 
         Parameters
         ----------
         count : int, optional
-            Only so many of the slowest: with more than 200 degrees of freedom these are found without A.
+            Number of slowest poles to return, by default all. With a number and more than 200 degrees of freedom the
+            poles are computed from sparse matrices, without A.
         """
         return self._slow_poles(count) if count is not None and self._is_large else self.motions().poles[:count]
 
     @checked_arguments()
     def motions(self, held: Sequence[str] = ()) -> Motions:
-        """Undamped modes and poles, with their shapes in all coordinates of the system.
+        """Compute undamped modes and poles, with their shapes in all coordinates of the system.
 
         Parameters
         ----------
         held : sequence of str
-            Motors that are held; of motors that move only as others do, one is enough.
+            Names of the motors held, by default none; one of several kinematically coupled motors is enough.
 
         Raises
         ------
         InputError
-            A motor that the mechanism does not have.
+            The mechanism does not have a motor.
         """
         basis = self._held(held)
         return motions(self.second_order.within(basis), self.minimal.directions @ basis)
 
     @cached_property
     def second_order(self) -> SecondOrder:
-        """The equations with inputs zero; of a motion with the terms of its rates."""
+        """Second-order equations with zero inputs, including the terms of the rates of a motion."""
         mass, damping, stiffness = self._reduced
         if not self._is_vibrating:
             f = mass.shape[0]
@@ -311,11 +314,11 @@ class LinearModel(NamedModel):
 
     @property
     def frozen(self) -> SecondOrder:
-        """The equations of which `frequencies` are: of a motion without the terms of its rates."""
+        """Second-order equations of `frequencies`, without the terms of the rates of a motion."""
         return SecondOrder(*self._reduced, self._typical, self._is_vibrating)
 
     def _slow_poles(self, count: int) -> Complex:
-        """The slowest poles by sparse matrices."""
+        """Compute the slowest poles from sparse matrices."""
         whole, driven = self.minimal.tangents.whole, self.minimal.driven
         slow = slowest(
             csr_matrix(0.5 * (whole.stiffness + whole.stiffness.T)), whole.mass, self.minimal.held_rows.jacobian,
@@ -332,12 +335,13 @@ class LinearModel(NamedModel):
         return found[:count]
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
-        """Transmission zeros between some inputs and some outputs, by default all, by magnitude [rad/s].
+        """Compute the transmission zeros between inputs and outputs, by default all, sorted by magnitude [rad/s].
 
-        Of any number of each: more inputs than outputs, or fewer, mostly have none. At rest, and of outputs that are
-        places, angles or derivatives of these, they are found from the second-order equations, else from
-        the state space, and up to a tenth of the fastest pole. Where the response has a smaller rank than inputs or
-        outputs, as of motors at geared joints, they are the s at which it loses more; a response that is zero has none.
+        A model with different numbers of inputs and outputs usually has no zeros. At rest, and for outputs that are
+        positions, angles or derivatives of these, zeros are computed from the second-order equations; otherwise from
+        the state space, up to a tenth of the fastest pole. If the rank of the response is less than the number of
+        inputs or outputs at every s, as for motors at geared joints, zeros are the s at which the rank is smaller
+        still; a response of zero has none.
         """
         chosen = self.select(inputs, outputs)
         shift = 0.7 * self.low_frequency
@@ -351,12 +355,12 @@ class LinearModel(NamedModel):
 
     @property
     def _force_rows(self) -> Array:
-        """Forces of the inputs in the directions of the coordinates y (f, inputs)."""
+        """Generalised forces (f, inputs) of the inputs in the coordinates y."""
         return self._reduced[0] @ self.B[len(self.states) // 2 :]
 
     @property
     def _displacements(self) -> Array | None:
-        """What outputs (outputs, f) are of y, or derivatives of that; None where one is more than that."""
+        """Output matrix (outputs, f) of y, or of one derivative of y per output; None if an output is more general."""
         rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
         parts = [np.asarray(part @ self.minimal.directions) for part in (rows.q, rows.v, rows.a)]
         mixed = np.sum([np.any(part, axis=1) for part in parts], axis=0) != 1
@@ -366,19 +370,19 @@ class LinearModel(NamedModel):
 
     @checked_arguments()
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
-        """Response C (s - A)^-1 B + D (k, outputs, inputs).
+        """Compute the frequency response C (s - A)^-1 B + D (k, outputs, inputs).
 
-        With more than 200 degrees of freedom from sparse equations at each frequency, without A.
+        With more than 200 degrees of freedom it is computed from sparse equations at each frequency, without A.
 
         Parameters
         ----------
         frequencies : (k,) array
-            Angular frequencies omega, for s = i omega [rad/s]; complex numbers are taken as s.
+            Angular frequencies omega of s = i omega [rad/s]; complex numbers are values of s.
 
         Raises
         ------
         InputError
-            A pole, where the response is infinite.
+            A value of s is a pole, where the response is infinite.
         """
         points = places_in_s(frequencies)
         out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
@@ -398,14 +402,14 @@ class LinearModel(NamedModel):
 
     @property
     def _is_large(self) -> bool:
-        """Whether sparse matrices are faster."""
+        """Whether the model is so large that sparse matrices are faster."""
         return len(self.states) > 2 * _DENSE_FREEDOMS
 
-    # --- The same in other forms --------------------------------------------------------------------------------------
+    # --- Other forms of the model -------------------------------------------------------------------------------------
 
     @checked_arguments()
     def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
-        """The model with some inputs and outputs, in the order given; all by default."""
+        """Return the model with the named inputs and outputs, in the order given; by default all."""
         chosen = [numbers_of(named, have, what) for named, have, what in
                   ((inputs, self.inputs, "input"), (outputs, self.outputs, "output"))]  # fmt: skip
         return replace(

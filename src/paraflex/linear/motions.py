@@ -1,4 +1,4 @@
-"""Free motions of linear models: undamped modes and poles, some of the motors held."""
+"""Free motions of linear models: undamped modes and poles, optionally with motors held."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from paraflex.arrays import Array
 from paraflex.dynamics.linearise import undamped_modes
 
 Complex = NDArray[np.complex128]
-# Damping of a modal coordinate below this part of the largest is rounding.
+# Modal damping below this fraction of the largest is rounding.
 _ROUNDING = 1e-13
 
 
 class Motions(NamedTuple):
-    """Free motions about a point of a motion, inputs zero.
+    """Free motions at an operating point, with zero inputs.
 
     Attributes
     ----------
     frequencies : (k,) array
-        Of the undamped modes, ascending [rad/s]; zero for motions that are free or grow.
+        Frequencies of the undamped modes, ascending [rad/s]; zero for free and unstable motions.
     shapes : (n, k) array
-        Changes of all coordinates of the system in them, of unit modal mass.
+        Undamped mode shapes of unit modal mass, in all coordinates of the system.
     poles : (2k,) array
-        By magnitude [rad/s].
+        Poles, sorted by magnitude [rad/s].
     pole_shapes : (n, 2k) array
-        Changes of all coordinates in the motion of each pole.
+        Shape of each pole, in all coordinates of the system.
     """
 
     frequencies: Array
@@ -38,9 +38,9 @@ class Motions(NamedTuple):
 
 
 class SecondOrder(NamedTuple):
-    """mass y'' + damping y' + stiffness y = 0 in coordinates y, each (f, f), and a low frequency squared.
+    """Equations mass y'' + damping y' + stiffness y = 0 with (f, f) matrices, and a typical low frequency squared.
 
-    `vibrating` says that the stiffness is symmetric: undamped poles are then exact square roots.
+    If `vibrating`, the stiffness is symmetric, and undamped poles are exact square roots.
     """
 
     mass: Array
@@ -50,7 +50,7 @@ class SecondOrder(NamedTuple):
     vibrating: bool
 
     def within(self, basis: Array) -> SecondOrder:
-        """The same in coordinates z of a subspace (f, k), y = basis z."""
+        """Project the equations on a subspace with coordinates z, y = basis z, with a basis (f, k)."""
         mass, damping, stiffness = (basis.T @ part @ basis for part in self[:3])
         return SecondOrder(mass, damping, stiffness, self.typical, self.vibrating)
 
@@ -58,10 +58,10 @@ class SecondOrder(NamedTuple):
 def driven_equations(
     mass: Array, damping: Array, stiffness: Array, driven: NDArray[np.int64]
 ) -> tuple[Array, Array, Array]:
-    """Equations (f, f) in which some coordinates go on as they are driven, whatever the others do.
+    """Return the equations (f, f) of a system whose driven coordinates move independently of the others.
 
-    With y = psi y_d + x, psi the static shapes of the driven coordinates, x obeys M x'' + D x' + K x = -D psi y_d'
-    where y_d'' = 0; the two do not otherwise depend on each other, so that mass and stiffness stay symmetric.
+    With y = psi y_d + x and the static shapes psi of the driven coordinates, x obeys M x'' + D x' + K x = -D psi y_d'
+    for y_d'' = 0. There is no other coupling, so mass and stiffness remain symmetric.
     """
     f = mass.shape[0]
     others = np.setdiff1d(np.arange(f), driven)
@@ -80,19 +80,20 @@ def driven_equations(
 
 
 def modal_damping(damping: Array, shapes: Array) -> Array:
-    """Damping (k, k) between modes of unit mass (f, k), zero where it is rounding."""
+    """Return the modal damping matrix (k, k) of mode shapes (f, k), with entries of rounding size set to zero."""
     found = shapes.T @ damping @ shapes
     return np.where(np.abs(found) > _ROUNDING * np.max(np.abs(found), initial=0.0), found, 0.0)
 
 
 def motions(equations: SecondOrder, directions: Array) -> Motions:
-    """Free motions of second-order equations.
+    """Compute the free motions of second-order equations.
 
     Parameters
     ----------
     equations : SecondOrder
+        Equations of k coordinates.
     directions : (n, k) array
-        Changes of all coordinates of the system with those of the equations.
+        Derivatives of all coordinates of the system with respect to those of the equations.
     """
     squares, shapes = undamped_modes(
         equations.mass, 0.5 * (equations.stiffness + equations.stiffness.T), equations.typical
@@ -104,7 +105,7 @@ def motions(equations: SecondOrder, directions: Array) -> Motions:
         root = np.sqrt(-squares.astype(complex))
         poles, vectors = np.concatenate([root, -root]), np.hstack([np.eye(k), np.eye(k)]).astype(complex)
     else:
-        # Free motions without damping have double poles, which an eigenvalue solver would take apart.
+        # Undamped free motions have double poles at zero, which an eigenvalue solver would separate.
         free = (squares == 0.0) & ~np.any(damping, axis=1) & equations.vibrating
         omega = np.sqrt(np.maximum(squares, 0.0) + equations.typical)
         poles, vectors = _first_order(omega, stiffness, damping, np.flatnonzero(~free))
@@ -117,9 +118,9 @@ def motions(equations: SecondOrder, directions: Array) -> Motions:
 
 
 def _first_order(omega: Array, stiffness: Array, damping: Array, kept: NDArray[np.intp]) -> tuple[Complex, Complex]:
-    """Poles (2 kept,) of eta'' + damping eta' + stiffness eta = 0, and eta (k, 2 kept) in their motions.
+    """Compute the poles (2 kept,) of eta'' + damping eta' + stiffness eta = 0 and their shapes eta (k, 2 kept).
 
-    States are omega eta, of sizes alike, and eta'.
+    The states are omega eta and eta', which are of equal scale.
     """
     m, within = kept.size, np.ix_(kept, kept)
     scaled = np.hstack([-stiffness[within] / omega[kept], -damping[within]])

@@ -1,4 +1,4 @@
-"""What linear models with named variables share: choosing by name, and the forms of SciPy, python-control, xarray."""
+"""Base class of linear models with named variables: selection by name, export to SciPy, python-control and xarray."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 
 class NamedModel:
-    """The forms of SciPy, python-control and xarray of a linear model with named states, inputs and outputs."""
+    """Linear model with named states, inputs and outputs: export to SciPy, python-control and xarray."""
 
     def to_scipy(self: Any) -> scipy.signal.StateSpace:
-        """The model as SciPy's."""
+        """Return the model as a `scipy.signal.StateSpace`."""
         return scipy.signal.StateSpace(*self.state_space)
 
     def to_control(self: Any) -> Any:
-        """The model as python-control's; dots and spaces in names become underscores, as it takes none.
+        """Return the model as a state-space system of python-control, with dots and spaces in names as underscores.
 
         Raises
         ------
@@ -46,7 +46,7 @@ class NamedModel:
         return control.ss(*self.state_space, name=plain_name(self._attributes["mechanism"]), **plain)
 
     def to_xarray(self: Any) -> xr.Dataset:
-        """A, B, C and D by names of states, inputs and outputs, with units."""
+        """Return A, B, C and D as a dataset labelled by the names of states, inputs and outputs, with units."""
         import xarray as xr
 
         dimensions = {
@@ -57,7 +57,7 @@ class NamedModel:
 
 
 def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> NDArray[np.complex128]:
-    """Points s = i omega of angular frequencies, which are finite [rad/s]; complex numbers are points s themselves."""
+    """Return s = i omega of finite angular frequencies [rad/s]; complex numbers are values of s already."""
     given = np.atleast_1d(numbers_in(frequencies, field, "biufc"))
     finite(given.ravel().tolist(), field)
     return np.asarray(given if np.iscomplexobj(given) else 1j * given, dtype=complex)
@@ -65,11 +65,12 @@ def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> NDArray[n
 
 @contextmanager
 def not_at_poles(s: complex) -> Iterator[None]:
-    """Name a point s where a response is infinite.
+    """Convert the error of a singular matrix at a value of s into an `InputError`.
 
     Raises
     ------
     InputError
+        The response is infinite at s, because s is a pole.
     """
     try:
         yield
@@ -81,17 +82,17 @@ def not_at_poles(s: complex) -> Iterator[None]:
 
 
 def plain_name(name: str) -> str:
-    """A name without dots and spaces, for programs that take none."""
+    """Replace all characters of a name except letters, digits and underscores by underscores."""
     return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
 
 
 def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str) -> NDArray[np.int64]:
-    """Numbers of variables by name, all by default.
+    """Return the indices of variables by name, by default of all.
 
     Raises
     ------
     InputError
-        A name that is not among them.
+        A name is unknown.
     """
     known = [one.name for one in have]
     if names is None:

@@ -1,4 +1,4 @@
-"""Points of motions that linear models are about: poses at rest, planned motions, runs."""
+"""Operating points of linear models: poses at rest, planned motions and runs."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ from paraflex.tracking import TrackingRun, TrackingTask, undeformed_at
 
 
 def resting_point(coordinates: Coordinates, state: State, mode: ActuationMode) -> tuple[MotionPoint, float]:
-    """A pose at rest, held by the motors of a mode and by forces that do not change.
+    """Return the operating point of a pose at rest, held by the motors of a mode and by constant forces.
 
     Returns
     -------
     MotionPoint
+        Operating point.
     float
-        What the mechanism would start with without the latter [m/s^2]: see `Vibration.acceleration`.
+        Initial acceleration of the mechanism without the constant forces [m/s^2]: see `Vibration.acceleration`.
     """
     system = coordinates.system
     active = [(k, motor.joint) for k, motor in enumerate(system.mechanism.motors) if motor.name in mode.motors]
@@ -38,10 +39,10 @@ def resting_point(coordinates: Coordinates, state: State, mode: ActuationMode) -
 
 
 def planned_point(task: TrackingTask, mode: ActuationMode, sample: int) -> MotionPoint:
-    """A planned motion at a sample: links undeformed, with its velocities, accelerations and torques.
+    """Return the operating point of a planned motion at a sample, with its velocities, accelerations and torques.
 
-    Constraint forces are those of the rigid motion. Links do not deflect along it, so that the equations of their
-    deflections have a residual there, which the linear model leaves out.
+    Links are undeformed, and constraint forces are those of the rigid motion. The equations of the deflections
+    therefore have a residual, which the linear model neglects.
     """
     system, rigid = task.system, task.motion
     q, v, a = undeformed_at(system, rigid, sample)
@@ -61,7 +62,7 @@ def planned_point(task: TrackingTask, mode: ActuationMode, sample: int) -> Motio
 
 
 def run_point(run: TrackingRun | MotionRun, sample: int) -> MotionPoint:
-    """A run at a sample."""
+    """Return the operating point of a run at a sample."""
     system = run.system if isinstance(run, MotionRun) else run.task.system
     solution, time = run.solution, float(run.solution.t[sample])
     torques = _acting(system, time, dict(enumerate(run.applied[sample])))
@@ -71,7 +72,7 @@ def run_point(run: TrackingRun | MotionRun, sample: int) -> MotionPoint:
 
 
 def _acting(system: System, time: float, efforts: dict[int, float]) -> Array:
-    """What acts (acting,) at a time: efforts of motors by number, and loads."""
+    """Return the actions (acting,) at a time: efforts of motors, given by index, and loads."""
     acting = acting_loads(system.mechanism, np.array([time]))[0]
     for k, effort in efforts.items():
         acting[k] = effort

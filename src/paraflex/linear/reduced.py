@@ -1,4 +1,4 @@
-"""Linear models of few states, as `reduction` makes them."""
+"""Reduced-order linear models, the results of `reduction`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Complex = NDArray[np.complex128]
 
 
 class ReductionMethod(Enum):
-    """How states are left out."""
+    """Method of model order reduction."""
 
     CRAIG_BAMPTON = "craig-bampton"
     RUBIN = "rubin"
@@ -35,24 +35,27 @@ class ReductionMethod(Enum):
 
 @dataclass(frozen=True)
 class ReducedModel(NamedModel):
-    """A linear model of few states: x' = A x + B u, y = C x + D u.
+    """Reduced-order linear model: x' = A x + B u, y = C x + D u.
 
     Attributes
     ----------
     full : LinearModel
-        That it stands for.
+        Full-order model.
     method : ReductionMethod
+        Method of reduction.
     states : tuple of Variable
-        Coordinates of the motors' joints, amplitudes of modes, and rates of these; or amplitudes of balanced states.
+        Names and units of the states: coordinates of motors' joints, modal coordinates, and rates of these; or balanced
+        states.
     state_space : StateSpace
+        State-space matrices.
     basis : (f, k) array, optional
-        Coordinates of the full model with those of this one; none of balanced states.
+        Reduced basis, coordinates of the full model per coordinate of this one; None for balanced states.
     interface : int
-        So many of the first states are coordinates of motors' joints.
+        Number of interface coordinates: the first states, which are coordinates of motors' joints.
     hankel : array, optional
         Hankel singular values of balanced truncation, in units of outputs over inputs.
     bound : float, optional
-        Of balanced truncation: the largest gain of the error over all frequencies is not above.
+        Upper bound of the error's largest gain over all frequencies, of balanced truncation.
     """
 
     full: LinearModel
@@ -70,12 +73,12 @@ class ReducedModel(NamedModel):
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
-        """Names and units, as of the full model."""
+        """Names and units of the inputs, those of the full model."""
         return self.full.inputs
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
-        """Names and units, as of the full model."""
+        """Names and units of the outputs, those of the full model."""
         return self.full.outputs
 
     @property
@@ -95,17 +98,17 @@ class ReducedModel(NamedModel):
 
     @property
     def D(self) -> Array:
-        """Feed-through (outputs, inputs)."""
+        """Feed-through matrix (outputs, inputs)."""
         return self.state_space.D
 
     @property
     def shapes(self) -> Array:
-        """The basis (f, k).
+        """Reduced basis (f, k).
 
         Raises
         ------
         InputError
-            A model of balanced states.
+            The model has balanced states.
         """
         if self.basis is None:
             raise InputError(
@@ -116,23 +119,23 @@ class ReducedModel(NamedModel):
 
     @property
     def frequencies(self) -> Array:
-        """Undamped natural frequencies, inputs zero [rad/s].
+        """Undamped natural frequencies with zero inputs [rad/s].
 
         Raises
         ------
         InputError
-            A model of balanced states.
+            The model has balanced states.
         """
         return self._frequencies([])
 
     @checked_arguments()
     def held_frequencies(self, motors: Sequence[str] | None = None) -> Array:
-        """Undamped natural frequencies with motors held, by default all that are inputs [rad/s].
+        """Compute the undamped natural frequencies with motors held, by default all that are inputs [rad/s].
 
         Raises
         ------
         InputError
-            A motor that the mechanism does not have, or a model of balanced states.
+            The mechanism does not have a motor, or the model has balanced states.
         """
         return self._frequencies(self.full.motor_joints(motors))
 
@@ -143,11 +146,11 @@ class ReducedModel(NamedModel):
         return motions(equations.within(free), free).frequencies
 
     def poles(self) -> Complex:
-        """Poles, by magnitude [rad/s]."""
+        """Compute the poles, sorted by magnitude [rad/s]."""
         return by_size(np.asarray(scipy.linalg.eigvals(self.A), dtype=complex))
 
     def zeros(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Complex:
-        """Transmission zeros between some inputs and some outputs, by default all: see `LinearModel.zeros`."""
+        """Compute the transmission zeros between inputs and outputs, by default all: see `LinearModel.zeros`."""
         balance = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)
         scaled, size = balance[0], np.asarray(balance[1][0])
         columns, rows = numbers_of(inputs, self.inputs, "input"), numbers_of(outputs, self.outputs, "output")
@@ -156,7 +159,7 @@ class ReducedModel(NamedModel):
 
     @checked_arguments()
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
-        """Response C (s - A)^-1 B + D (k, outputs, inputs): see `LinearModel.frequency_response`."""
+        """Compute the response C (s - A)^-1 B + D (k, outputs, inputs): see `LinearModel.frequency_response`."""
         return np.array([self._response(complex(s)) for s in places_in_s(frequencies)])
 
     def _response(self, s: complex) -> Complex:
@@ -165,14 +168,14 @@ class ReducedModel(NamedModel):
 
     @checked_arguments()
     def error(self, frequencies: ArrayLike, outputs: Sequence[str] | None = None) -> Array:
-        """Largest gain of the error over the largest gain of the full model (k,), at each frequency.
+        """Compute the largest gain of the error relative to that of the full model (k,), at each frequency.
 
         Parameters
         ----------
         frequencies : (k,) array
             Angular frequencies [rad/s], or complex s.
         outputs : sequence of str, optional
-            Of one unit; all by default.
+            Names of the outputs, which should have the same unit; all by default.
         """
         rows = numbers_of(outputs, self.outputs, "output")
         full = self.full.frequency_response(frequencies)[:, rows]

@@ -1,4 +1,4 @@
-"""Reduction of linear models: bases of their own, of other poses or between these, and balanced truncation."""
+"""Reduction of linear models: modal bases of this or other poses, interpolated bases, and balanced truncation."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
 
-# States of reduced models, where no number is given.
+# Default number of states of reduced models.
 _STATES = 16
-# Methods whose bases can be taken over by other poses.
+# Methods whose bases can be reused at other poses.
 CARRIED = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.RUBIN)
 
 Source = LinearModel | Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun
@@ -52,39 +52,45 @@ def reduce(
     start: Start | State | None = None,
     balanced: bool = False,
 ) -> ReducedModel:
-    """A linear model of few states that stands for one of many.
+    """Reduce a linear model to a model with few states.
 
     Parameters
     ----------
     source : LinearModel, Mechanism, Model, TrackingTask, TrackingRun or MotionRun
-        As `linearise` makes it, or what it is made of.
+        Linear model, or a source from which `linearise` computes it.
     states : int, optional
-        How many are kept, 16 by default, or all of fewer; even but for balanced truncation.
+        Number of states, by default 16 or all if there are fewer; even except for balanced truncation.
     method : str, optional
-        "craig-bampton" (default): static shapes of all motors' coordinates, whatever the mode, and of prescribed
-        motions that are inputs, and vibrations with all these held. "rubin": the same static shapes, and shapes with
-        which the lowest modes with motors free are exact. "modal": these modes alone. "balanced": what inputs move and
-        outputs see most of the stable part, with a bound of the error.
+        Method of reduction. "craig-bampton" (default): static shapes of all motors' coordinates, whatever the mode, and
+        of prescribed motions that are inputs, and vibrations with all these held. "rubin": the same static shapes, and
+        shapes with which the lowest modes with free motors are exact. "modal": the lowest modes with free motors.
+        "balanced": the most controllable and observable states of the stable part, with an error bound.
     basis : ReducedModel or sequence of ReducedModel, optional
-        By "craig-bampton" or "rubin", of the mechanism in another pose, whose states are kept in this one as well; or
-        of several poses, between which the basis is interpolated. A mechanism is linearised in their coordinates.
+        Model reduced by "craig-bampton" or "rubin" at another pose of the mechanism, whose basis is used; or models at
+        several poses, between which the basis is interpolated. A mechanism is linearised in their coordinates.
     part : float, optional
-        Of several bases: 0 for the first, 1 for the second, 1.5 for half the way from this to the third.
+        Position among several bases: 0 (default) is the first, 1 the second, 1.5 halfway from the second to the third.
     renewed : bool
-        Of a basis, only the vibrations are taken, beside static shapes of this pose: rigid motions and stiffness stay
-        exact. Without, the basis is that of the other pose altogether.
+        True (default) takes only the vibrations from the basis, and static shapes of this pose: rigid motions and
+        stiffness remain exact. False takes the whole basis from the other pose.
     feed_through : bool
-        What is left out bends as forces and inertia forces want it, so that torques have places, angles and strains
-        jump a little (`D`). Without, these are combinations of the states. Balanced states have no such part.
+        True (default) adds the quasi-static response of the omitted vibrations to the outputs, so that torques have an
+        immediate effect `D` on positions, angles and strains. False omits it, so that these are combinations of the
+        states. Balanced truncation does not have this part.
     mode, at, assembly, start, balanced
-        See `linearise`; not of a linear model, which is what it is.
+        Operating point, see `linearise`; not admissible for a linear model.
+
+    Returns
+    -------
+    ReducedModel
+        Reduced-order model.
 
     Raises
     ------
     InputError
-        Fewer states than motors, or more than the model has; a mechanism without flexible links; balanced truncation of
-        a mechanism without damping; a basis of another mechanism, of other coordinates or of a pose beyond a singular
-        one.
+        The states are fewer than the motors require or more than the model has; the mechanism has no flexible links;
+        it has no damping for balanced truncation; or the basis is of another mechanism, in other coordinates or of a
+        pose beyond a singular one.
     AssemblyError
         The mechanism does not reach the pose.
     """
@@ -108,7 +114,7 @@ def _given(
     states: int | None,
     method: ReductionMethod | str | None,
 ) -> list[ReducedModel]:
-    """Reduced models whose bases are taken, in line with the other arguments."""
+    """Return the reduced models whose bases are used, checked against the other arguments."""
     given = [] if basis is None else [basis] if isinstance(basis, ReducedModel) else list(basis)
     if not given:
         if basis is not None or part is not None:
@@ -135,7 +141,7 @@ def _given(
 
 
 def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[str, Any]) -> LinearModel:
-    """The full model: as it is given, or linearised, in the coordinates of bases where there are some."""
+    """Return the full model, as given or linearised, in the coordinates of the bases if there are any."""
     if isinstance(source, LinearModel):
         for name, value in options.items():
             raise InputError("means nothing for a linear model, which is what it is", field=name, value=str(value),
@@ -162,7 +168,7 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
 
 
 def _check_alike(basis: ReducedModel, model: LinearModel) -> None:
-    """Refuse a basis of another mechanism or in other coordinates."""
+    """Raise an `InputError` for a basis of another mechanism or in other coordinates."""
     if [body.all for body in model.minimal.system.bodies] != [body.all for body in basis.full.minimal.system.bodies]:
         raise _of_another(basis, model.mechanism)
     if basis.full.states != model.states:
@@ -182,7 +188,7 @@ def _of_another(basis: ReducedModel, mechanism: str) -> InputError:
 def _carried(
     model: LinearModel, given: Sequence[ReducedModel], part: float, renewed: bool, feed_through: bool
 ) -> ReducedModel:
-    """The model in the basis of another pose, or between those of some."""
+    """Reduce the model by the basis of another pose, or by one interpolated between several."""
     first = given[0]
     shapes = interpolated([one.shapes for one in given], first.full.second_order.mass, first.interface, part)
     equations, rows = model.second_order, model.joint_rows([one.name for one in first.states[: first.interface]])
@@ -192,7 +198,7 @@ def _carried(
 
 
 def _reduced(model: LinearModel, states: int, method: ReductionMethod, feed_through: bool) -> ReducedModel:
-    """The model in a basis of its own."""
+    """Reduce the model by a basis of its own or by balanced truncation."""
     most = len(model.states)
     if not 1 <= states <= most:
         raise InputError("no such number of states", field="states", value=states, remedy=f"choose one up to {most}")
@@ -209,7 +215,7 @@ def _reduced(model: LinearModel, states: int, method: ReductionMethod, feed_thro
 
 
 def _balanced(model: LinearModel, states: int) -> ReducedModel:
-    """The model in balanced states."""
+    """Reduce the model by balanced truncation."""
     full = model.scaled
     found = balanced_truncation(full, states, model.low_frequency)
     left, right = found.left, found.right
@@ -223,7 +229,7 @@ def _symmetric(stiffness: Array) -> Array:
 
 
 def _basis(model: LinearModel, count: int, method: ReductionMethod) -> tuple[Basis, tuple[Variable, ...], int]:
-    """So many coordinates, their names, and how many of them are those of motors' joints."""
+    """Return a basis of `count` coordinates, their names, and the number of those that are joint coordinates."""
     equations = model.second_order
     stiffness = _symmetric(equations.stiffness)
     if method is ReductionMethod.MODAL:
@@ -248,11 +254,11 @@ def _basis(model: LinearModel, count: int, method: ReductionMethod) -> tuple[Bas
 
 
 def _projected(model: LinearModel, basis: Basis, feed_through: bool) -> StateSpace:
-    """The equations in y = T z; outputs see y = T z + G (F u - K T z - D T z' - M T z''), F u the forces of inputs.
+    """Project the equations on y = T z, with outputs of y = T z + G (F u - K T z - D T z' - M T z'').
 
-    With the flexibility G vibrations that are left out bend as forces and inertia forces want it, without being states
-    (mode acceleration, Craig 1981): so bent, accelerations T z'' and constraint forces are in balance. Without
-    feed-through this is left out where outputs are places, angles and strains.
+    F u are the forces of the inputs. The flexibility G gives the quasi-static response of the omitted vibrations to
+    forces and inertia forces (mode acceleration method, Craig 1981), with which accelerations T z'' and constraint
+    forces are in equilibrium. Without feed-through it is omitted in outputs that are positions, angles or strains.
     """
     T, f, k = basis.shapes, len(basis.shapes), basis.shapes.shape[1]
     equations = model.second_order

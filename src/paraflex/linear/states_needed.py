@@ -1,4 +1,4 @@
-"""How many states a reduced model needs: by actuation mode, method and output, up to a frequency."""
+"""Number of states that a reduced model needs up to a frequency, by actuation mode, method and output."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from paraflex.linear.reduction import reduce
 if TYPE_CHECKING:
     import xarray as xr
 
-# Responses are looked at as if all vibrations had this damping ratio more: of undamped ones no error would be small.
+# Additional damping ratio of all vibrations in the comparison: errors of undamped responses are never small.
 DAMPING = 0.01
-# So many frequencies, from this part of the highest on.
+# Number of frequencies, and the lowest relative to the highest.
 _FREQUENCIES, _LOWEST = 200, 1e-2
 
 
@@ -32,30 +32,31 @@ def states_needed(
     methods: Sequence[ReductionMethod | str] = (ReductionMethod.CRAIG_BAMPTON, ReductionMethod.MODAL),
     most: int = 80,
 ) -> xr.Dataset:
-    """The fewest states with which all gains to an output keep within an error of the full model's largest there.
+    """Compute the least number of states with which the error of a reduced model stays below a bound, by output.
 
     Parameters
     ----------
     models : sequence of LinearModel
-        Of one mechanism, each of another mode.
+        Linear models of a mechanism in different actuation modes.
     until : float
         Highest frequency [rad/s].
     error : float
-        Over the full model's gain to that output, at each frequency.
+        Bound of the error relative to the full model's gain to the output (norm over all inputs), at each frequency;
+        0.01 by default.
     methods : sequence of str
-        Of `reduce`.
+        Methods of `reduce`; "craig-bampton" and "modal" by default.
     most : int
-        Where more are needed, the number is NaN.
+        Largest number of states, 80 by default; the result is NaN where more are needed.
 
     Returns
     -------
     xarray.Dataset
-        `states` over mode, reduction and output.
+        Numbers `states` over mode, reduction and output.
 
     Raises
     ------
     InputError
-        No model, a frequency or an error that is not positive.
+        There are no models, methods or outputs, or the frequency or the error is not positive.
     """
     import xarray as xr
 
@@ -81,7 +82,7 @@ def states_needed(
 
 
 def _needed(model: LinearModel, method: ReductionMethod, s: Numbers, error: float, most: int) -> Array:
-    """Numbers of states (outputs,)."""
+    """Return the numbers of states needed (outputs,)."""
     full = model.frequency_response(s)
     size = np.linalg.norm(full, axis=2)
     needed = np.full(len(model.outputs), np.nan)
@@ -89,11 +90,11 @@ def _needed(model: LinearModel, method: ReductionMethod, s: Numbers, error: floa
         try:
             few = reduce(model, states, method=method).frequency_response(s)
         except InputError as refused:
-            # Fewer than the coordinates that a method keeps in any case.
+            # The number is less than that of the interface coordinates, which are always retained.
             if refused.field != "states":
                 raise
             continue
         within = np.all(np.linalg.norm(few - full, axis=2) <= error * size, axis=0)
-        # An error that is small by chance and grows with more states does not count.
+        # The bound must hold for all larger numbers of states as well.
         needed = np.where(within, np.where(np.isnan(needed), states, needed), np.nan)
     return needed

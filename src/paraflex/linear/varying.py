@@ -1,10 +1,10 @@
-"""Linear models along motions: matrices that vary with time, in one choice of minimal coordinates.
+"""Linear time-varying models along motions, in common minimal coordinates.
 
-The coordinates y(q) are the same functions of q all along, so that changes of y and y' obey, to first order,
+The coordinates y(q) are the same functions of q along the motion, so that deviations of y and y' obey, to first order,
 
     x' = A(t) x + B(t) u,    z = C(t) x + D(t) u
 
-with the terms of Z' that `minimal` has at every sample.
+including the terms of Z' that `minimal` has at every sample.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# Cubic splines pass through so many samples at least.
+# Least number of samples of a cubic spline.
 _FEWEST = 4
-# Coordinates of a larger condition number anywhere on a motion are chosen anew.
+# Coordinates with a larger condition number at a point of a motion are replaced by others.
 _WELL = 1e6
-# So often they are chosen anew beside once for each coordinate of a joint.
+# Number of attempts to choose coordinates, in addition to one for each joint coordinate.
 _MORE = 3
-# A period counts as the motion's duration if it is longer by this part.
+# Relative excess of a period over the motion's duration that is regarded as rounding.
 _SAME = 1e-9
 
 
 class Along(NamedTuple):
-    """What a motion has of a model's states (k, 2f), inputs (k, inputs) and outputs (k, outputs) at its samples."""
+    """States (k, 2f), inputs (k, inputs) and outputs (k, outputs) of a motion at its samples."""
 
     states: Array
     inputs: Array
@@ -58,27 +58,31 @@ class Along(NamedTuple):
 
 @dataclass(frozen=True)
 class VaryingModel:
-    """Small changes along a motion: x' = A(t) x + B(t) u, z = C(t) x + D(t) u, all changes from the nominal values.
+    """Linear time-varying model along a motion: x' = A(t) x + B(t) u, z = C(t) x + D(t) u.
 
-    States are the same minimal coordinates all along, then their rates: see `LinearModel`.
+    All variables are deviations from the nominal motion. The states are the same minimal coordinates along the motion,
+    then their rates: see `LinearModel`.
 
     Attributes
     ----------
     mechanism, mode, about : str
-        See `LinearModel`.
+        Mechanism, actuation mode and kind of motion, see `LinearModel`.
     states, inputs, outputs : tuple of Variable
-        Names and units.
+        Names and units of states, inputs and outputs.
     times : (k,) array
-        Of the samples [s].
+        Sample times [s].
     A, B, C, D : (k, 2f, 2f), (k, 2f, inputs), (k, outputs, 2f) and (k, outputs, inputs) arrays
+        State-space matrices at the samples.
     nominal : Along
-        States, inputs and outputs of the motion itself.
+        States, inputs and outputs of the nominal motion.
     coordinates : Coordinates
+        Candidate coordinates.
     chosen : Chosen
-        Which of them are states.
+        Minimal coordinates among them, which are states.
     ports : Ports
+        Description of inputs and outputs.
     modal : (array, array)
-        See `LinearModel.modal_states`, at the first sample.
+        Transformation to scaled modal states at the first sample, see `LinearModel.modal_states`.
     """
 
     mechanism: str
@@ -100,16 +104,17 @@ class VaryingModel:
 
     @checked_arguments()
     def along(self, run: TrackingRun | MotionRun) -> Along:
-        """States, inputs and outputs of another run of the mechanism: less `nominal`, they are what a model predicts.
+        """Return states, inputs and outputs of another run, whose differences from `nominal` the model predicts.
 
         Parameters
         ----------
         run : TrackingRun or MotionRun
+            Run of the same mechanism.
 
         Raises
         ------
         InputError
-            A run of a mechanism with other bodies.
+            The run is of a mechanism with other bodies.
         """
         found = moving(run, self.ports.mode)
         if [body.all for body in found.system.bodies] != [body.all for body in self.coordinates.system.bodies]:
@@ -120,24 +125,24 @@ class VaryingModel:
     @checked_arguments()
     @solvable("the sampled model")
     def discretised(self, period: float | None = None, *, hold: InputHold | str = InputHold.ZERO) -> SampledModel:
-        """The model at samples, each period's matrices by exponentials of A(t), which splines give between samples.
+        """Discretise the model in time, by exponentials of A(t), which is interpolated by splines.
 
         Parameters
         ----------
         period : float, optional
-            Time between samples, from the first on [s]; those of the model by default.
+            Sampling period, from the first sample on [s]; by default the samples are those of the model.
         hold : str
-            Inputs between samples: "zero", constant, or "first", straight lines.
+            Hold of the inputs between samples: "zero", constant (default), or "first", linear.
 
         Returns
         -------
         SampledModel
-            Its `error` has what splines and exponentials miss.
+            Discrete-time model; its `error` includes the errors of splines and exponentials.
 
         Raises
         ------
         InputError
-            A period that is not positive, or longer than the motion.
+            The period is not positive, or longer than the motion.
         """
         hold, times = as_enum(InputHold, hold, "hold"), self.times
         if period is not None:
@@ -155,14 +160,14 @@ class VaryingModel:
     def predict(
         self, x0: Mapping[str, float] | Array | None = None, du: Mapping[str, float | Array] | Array | None = None
     ) -> Predicted:
-        """What a small change of the start and of the inputs leads to, straight lines between the samples' inputs.
+        """Predict the response to small changes of the initial state and of the inputs, which are linear in between.
 
         Parameters
         ----------
         x0 : (2f,) array or mapping of str to float, optional
-            Change of the states at the first sample; of some by name.
+            Change of the states at the first sample, of all or by name; zero by default.
         du : (k, inputs) array or mapping of str to float or (k,) array, optional
-            Changes of the inputs at the samples; of some by name.
+            Changes of the inputs at the samples, of all or by name; zero by default.
         """
         return self._between_samples.predict(x0, du)
 
@@ -171,7 +176,7 @@ class VaryingModel:
         return self.discretised(hold=InputHold.FIRST)
 
     def to_xarray(self) -> xr.Dataset:
-        """Matrices and nominal values by time and by names of states, inputs and outputs, with units."""
+        """Return matrices and nominal values as a dataset labelled by time and names of variables, with units."""
         import xarray as xr
 
         data = {
@@ -196,25 +201,31 @@ def linearise_along(
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
 ) -> VaryingModel:
-    """A linear model of small changes along a planned motion or a run, which varies with time.
+    """Linearise a mechanism along a planned motion or a run, as a linear time-varying model.
 
-    Its states are the same coordinates all along. A motor's joint that hardly moves with the mechanism somewhere, as
-    that of a slider at a dead centre, is not among them.
+    The states are the same coordinates along the motion. The joint of a motor is not among them if it is nearly at a
+    stationary point somewhere, as that of a slider at a dead centre.
 
     Parameters
     ----------
     source : TrackingTask, TrackingRun or MotionRun
+        Planned motion or run.
     times : sequence of float, optional
-        Times of the samples [s], the nearest of the motion's; all of them by default.
+        Sample times, rounded to the nearest samples of the motion [s]; by default all its samples.
     mode, forces, prescribed, coordinates
-        See `linearise`.
+        Inputs and states, see `linearise`.
+
+    Returns
+    -------
+    VaryingModel
+        Linear time-varying model.
 
     Raises
     ------
     InputError
-        See `linearise`; or fewer than four samples.
+        There are fewer than four samples; or see `linearise`.
     SingularPositionError
-        A singular position, at which no coordinates describe the motion.
+        A position is singular, so that no coordinates describe the motion.
     """
     motion, ports, choice = charted(source, mode, forces, prescribed, coordinates)
     given = range(motion.times.size) if times is None else [nearest_sample(motion.times, at) for at in times]
@@ -236,9 +247,16 @@ def linearise_along(
 def in_one_chart(
     points: Sequence[MotionPoint], coordinates: Coordinates, ports: Ports, about: str, take: Callable[[LinearModel], T]
 ) -> tuple[Chosen, list[T]]:
-    """What is taken of the linear models at points of a motion, in coordinates that are well chosen at all of them.
+    """Linearise at points of a motion in common minimal coordinates, and apply `take` to each linear model.
 
-    They are those chosen at the first, unless they are singular later.
+    The coordinates are those chosen at the first point, unless they are singular at a later one.
+
+    Returns
+    -------
+    Chosen
+        Minimal coordinates.
+    list
+        Results of `take`, one per point.
 
     Raises
     ------
@@ -258,7 +276,7 @@ def in_one_chart(
 
 
 def _taken(models: Iterable[LinearModel], take: Callable[[LinearModel], T]) -> list[T] | LinearModel:
-    """What is taken of all models; or only the first of them beyond or near a singular position."""
+    """Apply `take` to all models; if one is beyond or near a singular position, return the first such model instead."""
     first, found = None, []
     for model in models:
         first = first or model
@@ -269,12 +287,12 @@ def _taken(models: Iterable[LinearModel], take: Callable[[LinearModel], T]) -> l
 
 
 def describes(minimal: Minimal, elsewhere: Minimal) -> bool:
-    """Whether coordinates describe the motion well at one point, and no singular position lies before another."""
+    """Return whether coordinates are well-conditioned at a point, without a singular position before another point."""
     return minimal.condition <= _WELL and minimal.orientation == elsewhere.orientation
 
 
 def _given_up(minimal: Minimal, coordinates: Coordinates) -> list[int]:
-    """Which coordinate of `measured` is to be a state no more where coordinates are nearly singular."""
+    """Return the coordinate of `measured` to exclude from the states because the coordinates are nearly singular."""
     k = minimal.most_dependent()
     if k is None:
         return []
@@ -292,7 +310,7 @@ def _singular(minimal: Minimal, names: Sequence[str]) -> SingularPositionError:
 
 
 def _along(points: Sequence[MotionPoint], coordinates: Coordinates, chosen: Chosen, ports: Ports) -> Along:
-    """States, inputs and outputs at points of a motion."""
+    """Return states, inputs and outputs at points of a motion."""
     mechanism = coordinates.system.mechanism
     t, q, v, a, multipliers, acting = (np.array(part) for part in zip(*points, strict=True))
     torques = acting[:, : len(mechanism.motors)]
@@ -307,7 +325,7 @@ def _along(points: Sequence[MotionPoint], coordinates: Coordinates, chosen: Chos
 
 
 def _every(period: float, times: Array) -> Array:
-    """Times that are a period apart, from the first on."""
+    """Return sample times with a given period, from the first time on [s]."""
     duration = float(times[-1] - times[0])
     if not 0.0 < period <= duration * (1.0 + _SAME):
         raise InputError("is no period of this motion", field="period", value=period,

@@ -1,13 +1,13 @@
-"""Transmission zeros of linear systems whose poles lie decades apart.
+"""Transmission zeros of linear systems with poles over many decades.
 
-Zeros are the s at which [A - s, B; C, D] loses rank (Emami-Naeini and Van Dooren 1982). Low ones are wanted, beside
-axial vibrations of links that are a thousand times as fast: they are found as the largest eigenvalues
-theta = 1 / (s - sigma) of a pencil inverted at a shift sigma; zeros at infinity are those where theta is zero.
+Zeros are the s at which [A - s, B; C, D] loses rank (Emami-Naeini and Van Dooren 1982). Low zeros are required, while
+axial vibrations of links are a thousand times as fast. They are computed as the largest eigenvalues
+theta = 1 / (s - sigma) of a pencil inverted at a shift sigma; zeros at infinity have theta = 0.
 
-A response may have a smaller rank than it has inputs or outputs at every s: of two motors at geared joints, say, or of
-a motor and a sensor on parts that move independently. Such systems, and those that are not square, are replaced by
-random combinations of as many inputs and outputs as the rank, twice: a zero of both at which the matrix of all inputs
-and outputs loses rank is one of the system.
+The rank of a response may be less than the number of inputs or outputs at every s, as for two motors at geared joints,
+or for a motor and a sensor on parts that move independently. Such systems, and those that are not square, are replaced
+twice by systems of random combinations of as many inputs and outputs as the rank. A zero of both at which the matrix of
+all inputs and outputs loses rank is a zero of the system.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from paraflex.limits import solvable
 from paraflex.linear.independent import sizes, unit_rows
 
 Complex = NDArray[np.complex128]
-# Zeros of two squared systems that agree this well are one.
+# Relative difference of zeros of two squared systems that are regarded as equal.
 _SAME = 1e-6
-# Singular values below this are zero in a matrix with entries of size one: rounding leaves 1e-14 of them.
+# Singular values below this are zero, in a matrix with entries of size one: rounding errors are about 1e-14.
 _RANK = 1e-11
-# The rank at almost every s is the largest at these multiples of the shift, none of which is a likely zero.
+# The normal rank is the largest at these multiples of the shift, which are unlikely to be zeros.
 _ANYWHERE = (1.0, 2.718281828, 31.41592654)
-# An eigenvalue theta below this part of the largest is that of a zero at infinity.
+# An eigenvalue theta below this fraction of the largest belongs to a zero at infinity.
 _INFINITE = 1e-12
-# Of a general system such zeros are blurred: those further out than this part of the fastest pole are left out.
+# Zeros at infinity of a general system are perturbed: zeros above this fraction of the fastest pole are omitted.
 _FURTHEST = 0.1
 
 
 class StateSpace(NamedTuple):
-    """x' = A x + B u, y = C x + D u."""
+    """Matrices of the state-space model x' = A x + B u, y = C x + D u."""
 
     A: Array
     B: Array
@@ -46,7 +46,7 @@ class StateSpace(NamedTuple):
 
     @classmethod
     def of(cls, *given: Any) -> StateSpace:
-        """A, B, C and D from what is taken for arrays; an A without entries stands for no states."""
+        """Return a model from array-like matrices; an empty A means a model without states."""
         A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in given)
         if not A.size:
             A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
@@ -54,7 +54,7 @@ class StateSpace(NamedTuple):
 
 
 class Vibrating(NamedTuple):
-    """Modes of unit mass: eta'' + damping eta' + diag(squares) eta = B u, y = C eta, or a derivative of C eta."""
+    """Modal equations of unit mass: eta'' + damping eta' + diag(squares) eta = B u, y = C eta or its derivatives."""
 
     squares: Array
     damping: Array
@@ -64,16 +64,17 @@ class Vibrating(NamedTuple):
 
 @solvable("zeros")
 def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
-    """Zeros of a mechanism about a pose at rest.
+    """Compute the transmission zeros of a mechanism at a pose at rest.
 
-    With P and N the null spaces of B^T and C, those s at which P^T (s^2 + s damping + diag(squares)) N is singular;
-    scaled by squares + shift^2, which makes low zeros as exact as their distance from the others allows.
+    With bases P and N of the null spaces of B^T and C, zeros are the s at which P^T (s^2 + s damping + diag(squares)) N
+    is singular. Scaling by squares + shift^2 makes low zeros as accurate as their distance from the others allows.
 
     Parameters
     ----------
     modes : Vibrating
+        Modal equations.
     shift : float
-        Positive, of the size of low frequencies [rad/s].
+        Shift of the size of low frequencies, positive [rad/s].
     """
 
     def matrix(s: complex) -> Complex:
@@ -92,13 +93,13 @@ def vibrating_zeros(modes: Vibrating, shift: float) -> Complex:
         companion = np.vstack([-slopes, np.eye(n, 2 * n)])
         return by_size(_shifted(scipy.linalg.eigvals(companion), shift))
 
-    # Null spaces leave as many rows and columns fewer as B and C have rank.
+    # The null spaces remove as many rows and columns as the ranks of B and C.
     more = sum(matrix(shift).shape) - modes.squares.size
     return _common(squared, matrix, (modes.C.shape[0], modes.B.shape[1]), more, shift)
 
 
 def _between(modes: Vibrating, low: float) -> tuple[Array, Array, Array]:
-    """P^T N, P^T damping N and P^T diag(squares) N, scaled by squares + low^2."""
+    """Return P^T N, P^T damping N and P^T diag(squares) N, scaled by squares + low^2."""
     scale = 1.0 / np.sqrt(np.maximum(modes.squares, 0.0) + low**2)
     left, right = (scipy.linalg.null_space(unit_rows(rows * scale), rcond=_RANK) for rows in (modes.B.T, modes.C))
     parts = (np.eye(scale.size), modes.damping, np.diag(modes.squares))
@@ -108,14 +109,14 @@ def _between(modes: Vibrating, low: float) -> tuple[Array, Array, Array]:
 
 @solvable("zeros")
 def zeros(system: StateSpace, shift: float) -> Complex:
-    """Transmission zeros of any linear system, up to a tenth of its fastest pole.
+    """Compute the transmission zeros of a linear system, up to a tenth of its fastest pole.
 
     Parameters
     ----------
     system : StateSpace
-        With states such that entries of A are of the size of angular frequencies.
+        Model with states scaled such that the entries of A are of the size of angular frequencies.
     shift : float
-        No zero, positive, of the size of low frequencies [rad/s].
+        Shift of the size of low frequencies, positive and not a zero [rad/s].
     """
     A, B, C, D = system
     n, fastest = len(A), np.linalg.norm(A, 2)
@@ -140,9 +141,20 @@ def zeros(system: StateSpace, shift: float) -> Complex:
 def _common(
     squared: Callable[..., Complex], matrix: Callable[..., Numbers], shape: tuple[int, int], more: int, shift: float
 ) -> Complex:
-    """Zeros of a system of a shape (outputs, inputs), from those of combinations by matrices from left and right.
+    """Compute the zeros of a system of shape (outputs, inputs) from those of combinations of its outputs and inputs.
 
-    The matrix at s loses rank at zeros; elsewhere it has so many more than the response.
+    Parameters
+    ----------
+    squared : callable
+        Zeros of the square system of combinations, given by a left matrix for outputs and a right one for inputs.
+    matrix : callable
+        System matrix at s, which loses rank at zeros.
+    shape : (int, int)
+        Numbers of outputs and inputs.
+    more : int
+        Rank of the system matrix minus that of the response, at an s that is not a zero.
+    shift : float
+        Shift of the size of low frequencies [rad/s].
     """
     full = max(_rank(matrix(part * shift)) for part in _ANYWHERE)
     rank, (outputs, inputs) = full - more, shape
@@ -165,12 +177,12 @@ def _common(
 
 
 def _rank(matrix: Numbers) -> int:
-    """Number of singular values of a matrix with entries of size one that are more than rounding."""
+    """Return the numerical rank of a matrix with entries of size one."""
     return int(np.count_nonzero(scipy.linalg.svdvals(matrix) > _RANK)) if matrix.size else 0
 
 
 def _pencil(whole: Array, mass: Array) -> Complex:
-    """Eigenvalues theta of mass x = theta whole x."""
+    """Compute the eigenvalues theta of mass x = theta whole x."""
     if not whole.size:
         return np.zeros(0, dtype=complex)
     size = sizes(whole, 1)
@@ -178,11 +190,11 @@ def _pencil(whole: Array, mass: Array) -> Complex:
 
 
 def _shifted(theta: Complex, shift: float) -> Complex:
-    """What lies 1 / theta from a shift, but not at infinity."""
+    """Return the finite values shift + 1 / theta."""
     kept = theta[np.abs(theta) > _INFINITE * np.max(np.abs(theta), initial=0.0)]
     return shift + 1.0 / kept
 
 
 def by_size(values: Complex) -> Complex:
-    """Complex numbers by magnitude, those of one in their order."""
+    """Sort complex numbers by magnitude, with a stable order."""
     return values[np.argsort(np.abs(values), kind="stable")]

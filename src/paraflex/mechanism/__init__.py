@@ -1,4 +1,4 @@
-"""Frozen descriptions of bodies, joints, motors and the mechanism they form."""
+"""Immutable descriptions of bodies, joints, motors and the mechanism that they form."""
 
 from paraflex.fem import Polynomial as Polynomial, ShapeFunction as ShapeFunction, Sine as Sine
 from paraflex.mechanism.actuation_modes import (

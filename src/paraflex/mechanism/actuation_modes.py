@@ -1,4 +1,4 @@
-"""Actuation modes by their names, their signs or their motors."""
+"""Actuation modes, looked up by their names, signs or motors."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import ActuationMode
 from paraflex.mechanism.quantities import known
 
-# The paper prints circled signs; some keyboards and many PDFs give these instead of plain ASCII.
+# The paper prints circled signs; some keyboards and many PDFs have these in place of plain ASCII.
 _SIGNS = str.maketrans({"⊕": "+", "⊖": "-", "−": "-", "–": "-"})
 
 
 @checked_arguments()
 def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:
-    """The mode a sign string names, one sign a motor: "+" active, "-" passive (Table 1).
+    """Return the actuation mode of a sign string with one sign per motor: "+" active, "-" passive (Table 1).
 
     Raises
     ------
     InputError
-        Any other character, or a wrong number of them.
+        The string has another character, or a wrong number of signs.
     """
     plain = signs.translate(_SIGNS)
     names = [motor.name for motor in mechanism.motors]
@@ -37,12 +37,12 @@ def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:
 
 @checked_arguments()
 def mode_of_motors(mechanism: Mechanism, names: Sequence[str]) -> ActuationMode:
-    """The mode in which just these motors are active, named by its sign string.
+    """Return the actuation mode in which exactly the given motors are active, named by its sign string.
 
     Raises
     ------
     InputError
-        An unknown motor, or one named twice.
+        A motor is unknown or named twice.
     """
     motors = [motor.name for motor in mechanism.motors]
     for name in names:
@@ -54,7 +54,7 @@ def mode_of_motors(mechanism: Mechanism, names: Sequence[str]) -> ActuationMode:
 
 @checked_arguments()
 def parse_mode(mechanism: Mechanism, text: str) -> ActuationMode:
-    """Read a mode: its name in the mechanism, signs ("+-+-"), or motor names ("tau1,tau5")."""
+    """Return the actuation mode of a text: a name in the mechanism, signs ("+-+-"), or motor names ("tau1,tau5")."""
     for mode in mechanism.modes:
         if text == mode.name:
             return mode

@@ -13,12 +13,13 @@ from paraflex.mechanism.quantities import not_negative, optional, positive
 
 
 class Amplifier(Enum):
-    """What an amplifier imposes on its motor.
+    """Quantity that an amplifier imposes on its motor.
 
     CURRENT
-        A current loop: the torque follows its command, at once or with the lag of the loop; back-EMF only limits it.
+        Current control: the torque follows its command without delay or with the lag of the loop; back-EMF only limits
+        it.
     VOLTAGE
-        The voltage: back-EMF brakes the joint like a viscous damper, also at zero voltage.
+        Voltage control: back-EMF acts on the joint as a viscous damper, also at zero voltage.
     """
 
     CURRENT = "current"
@@ -27,39 +28,41 @@ class Amplifier(Enum):
 
 @dataclass(frozen=True)
 class Actuator(CheckedFields):
-    """A direct-current motor (or a servo motor in its torque-producing axis) with a gear and an amplifier.
+    """Direct-current motor (or servo motor in its torque-producing axis) with a gear and an amplifier.
 
-    At the joint, w its rate: torque = n k_t i, and L i' + R i = u - n k_e w. The rotor's inertia J_m acts on the
-    coordinate of the joint as n^2 J_m.
+    With the rate w of the joint, the torque at the joint is n k_t i with L i' + R i = u - n k_e w. The rotor's inertia
+    J_m acts on the joint coordinate as n^2 J_m.
 
     Attributes
     ----------
     name : str
+        Name of the actuator.
     motors : tuple of str
-        Motors of the mechanism that are of this kind; all by default.
+        Names of the mechanism's motors that are of this type; all by default.
     gear : float
-        n, the rotor's angle by the joint's; of a joint that slides [rad/m].
+        Gear ratio n, rotor angle per joint angle, or per travel of a joint that slides [rad/m]; 1 by default.
     rotor_inertia : float
-        J_m, of the rotor and all that turns with it before the gear [kg m^2].
+        Moment of inertia J_m of the rotor and all that turns with it on the motor side [kg m^2]; 0 by default.
     torque_constant : float, optional
-        k_t [N m/A]; without it there is no electrical part.
+        Torque constant k_t [N m/A]; without it there is no electrical model.
     back_emf : float, optional
-        k_e [V s/rad]; the torque constant by default, which in SI units it is.
+        Back-EMF constant k_e [V s/rad]; by default the torque constant, which equals it in SI units.
     resistance : float, optional
-        R of the winding [ohm].
+        Resistance R of the winding [ohm].
     inductance : float
-        L of the winding [H].
+        Inductance L of the winding [H]; 0 by default.
     voltage_limit, current_limit : float, optional
-        Largest of the amplifier [V, A].
+        Limits of the amplifier [V, A]; none by default.
     amplifier : Amplifier or str
-        What the amplifier imposes: "current" or "voltage".
+        Quantity that the amplifier imposes: "current" (default) or "voltage".
     bandwidth : float, optional
-        Of the current loop, at which its first-order lag has -3 dB [Hz]; by default it follows at once.
+        Bandwidth (-3 dB) of the current loop, a first-order lag [Hz]; without lag by default.
 
     Raises
     ------
     InputError
-        A voltage without what makes it a torque, a limit or bandwidth that has no meaning.
+        A voltage amplifier, a limit or another value is given without the constants that it needs, or a bandwidth is
+        given for a voltage amplifier.
 
     Notes
     -----
@@ -118,28 +121,28 @@ class Actuator(CheckedFields):
 
     @property
     def imposes_voltage(self) -> bool:
-        """Whether its amplifier imposes the voltage."""
+        """Whether the amplifier imposes the voltage."""
         return self.amplifier is Amplifier.VOLTAGE
 
     @property
     def torque_per_current(self) -> float | None:
-        """N k_t, at the joint [N m/A, N/A]; None without a torque constant."""
+        """Torque constant at the joint, n k_t [N m/A, N/A]; None without a torque constant."""
         return None if self.torque_constant is None else self.gear * self.torque_constant
 
     @property
     def voltage_per_rate(self) -> float | None:
-        """N k_e, of the joint's rate [V s/rad, V s/m]; None without a torque constant."""
+        """Back-EMF constant at the joint, n k_e [V s/rad, V s/m]; None without a torque constant."""
         constant = self.torque_constant if self.back_emf is None else self.back_emf
         return None if constant is None else self.gear * constant
 
     @property
     def reflected_inertia(self) -> float:
-        """n^2 J_m, at the joint [kg m^2], or [kg] where it slides."""
+        """Rotor inertia reflected to the joint, n^2 J_m [kg m^2], or [kg] where the joint slides."""
         return self.gear**2 * self.rotor_inertia
 
     @property
     def back_emf_damping(self) -> float:
-        """n^2 k_t k_e/R, of the short-circuited motor at the joint [N m s/rad, N s/m]; 0 where it is not known."""
+        """Damping of the short-circuited motor at the joint, n^2 k_t k_e/R [N m s/rad, N s/m]; 0 if unknown."""
         per_current, per_rate = self.torque_per_current, self.voltage_per_rate
         if per_current is None or per_rate is None or self.resistance is None:
             return 0.0
@@ -147,36 +150,36 @@ class Actuator(CheckedFields):
 
     @property
     def damping(self) -> float:
-        """What of the back-EMF acts on the joint as viscous damping: none under a current loop [N m s/rad, N s/m]."""
+        """Viscous damping of the joint by back-EMF [N m s/rad, N s/m]; 0 under a current loop."""
         return self.back_emf_damping if self.imposes_voltage else 0.0
 
     @property
     def electrical_time(self) -> float:
-        """L/R [s]; 0 where it is not known."""
+        """Electrical time constant L/R [s]; 0 if unknown."""
         return 0.0 if self.resistance is None else self.inductance / self.resistance
 
     @property
     def mechanical_time(self) -> float:
-        """J_m R/(k_t k_e) of the rotor alone, whatever its gear [s]; infinite where back-EMF does not brake it."""
+        """Mechanical time constant J_m R/(k_t k_e) of the rotor alone [s]; infinite without back-EMF damping."""
         damping = self.back_emf_damping
         return self.reflected_inertia / damping if damping else inf
 
     @property
     def lag(self) -> float:
-        """Time constant with which torque follows its command [s]: L/R, or that of the current loop."""
+        """Time constant of the torque's response to its command [s]: L/R, or that of the current loop."""
         if self.imposes_voltage:
             return self.electrical_time
         return 0.0 if self.bandwidth is None else 1.0 / (2.0 * pi * self.bandwidth)
 
     @property
     def no_load_speed(self) -> float:
-        """U/(n k_e), of the joint at the largest voltage and no torque [rad/s, m/s]; infinite without a limit."""
+        """No-load speed of the joint at the largest voltage, U/(n k_e) [rad/s, m/s]; infinite without a limit."""
         per_rate = self.voltage_per_rate
         return inf if self.voltage_limit is None or per_rate is None else self.voltage_limit / per_rate
 
     @property
     def stall_torque(self) -> float:
-        """Largest torque at the joint at rest, by the limits of voltage and current [N m, N]; infinite without."""
+        """Stall torque at the joint, by the limits of voltage and current [N m, N]; infinite without limits."""
         per_current = self.torque_per_current
         if per_current is None:
             return inf
@@ -186,7 +189,7 @@ class Actuator(CheckedFields):
         return per_current * min(currents)
 
     def summary(self, *, slides: bool = False) -> str:
-        """What is known of it in a line, at a joint that turns or slides."""
+        """Return a one-line summary of the known values at a joint that turns or, with `slides`, one that slides."""
         of = ("kg", "N s/m", "N", "m/s") if slides else ("kg m^2", "N m s/rad", "N m", "rad/s")
         words = ("rotor", "back-EMF", "stall", "no load", "lag")
         values = (self.reflected_inertia, self.damping, self.stall_torque, self.no_load_speed, 1e3 * self.lag)
@@ -194,17 +197,17 @@ class Actuator(CheckedFields):
         return ", ".join(f"{word} {value:.4g} {unit}" for word, value, unit in known if 0.0 < value < inf)
 
     def matching_gear(self, inertia: float) -> float:
-        """The gear ratio with which a torque of the motor accelerates a load most: n^2 J_m equals its inertia.
+        """Return the gear ratio of largest acceleration of a load per motor torque: n^2 J_m equals the load's inertia.
 
         Parameters
         ----------
         inertia : float
-            Of the load about the joint [kg m^2], or its mass where the joint slides [kg].
+            Moment of inertia of the load about the joint [kg m^2], or its mass where the joint slides [kg].
 
         Raises
         ------
         InputError
-            One that is not positive, or no rotor inertia.
+            The inertia is not positive, or the rotor has no inertia.
         """
         positive(inertia, "inertia", "kg m^2")
         if not self.rotor_inertia:

@@ -1,4 +1,4 @@
-"""Bodies: rigid ones, flexible beams and bars of assumed modes. Points are named and lie in the body frame."""
+"""Rigid bodies, flexible beams and bars of assumed modes, with named points in the body frame."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Material(CheckedFields):
     Attributes
     ----------
     youngs_modulus : float
-        [Pa]
+        Young's modulus [Pa].
     density : float
-        [kg/m^3]
+        Density [kg/m^3].
     strength : float, optional
-        Largest stress that it bears, for instance its yield strength [Pa]; safety factors are over it.
+        Admissible stress, such as the yield strength [Pa]; safety factors are relative to it.
     """
 
     _table = "material"
@@ -52,14 +52,14 @@ class Material(CheckedFields):
 
 
 class Curvature(Enum):
-    """Continuity of a beam's curvature at a node with a lumped moment of inertia, where the true one jumps.
+    """Continuity of a beam's curvature at a node with a lumped moment of inertia, where the exact curvature jumps.
 
     SHARED
-        The paper's element: one value for both sides, zero at the tip. Converges with the first power of the element
-        there.
+        The paper's element: one value for both sides of the node, zero at the tip. Convergence is of first order in
+        the element length at such nodes.
     SEPARATE
-        A value on either side of such a node, and a free one at the tip, where a weld, a motor or a lump may bring in
-        a moment. Converges with the eighth power; one coordinate more for each such node and for the tip.
+        One value on either side of such a node, and a free value at the tip, where a weld, a motor or a lump may apply
+        a moment. Convergence is of eighth order, with one more coordinate for each such node and for the tip.
     """
 
     SHARED = "shared"
@@ -67,15 +67,14 @@ class Curvature(Enum):
 
 
 class BodyReduction(Enum):
-    """Shapes that a beam keeps of all that its elements can have.
+    """Reduced basis of a beam.
 
     MODAL
-        The lowest modes in its frame. Where the frame does not clamp the beam they carry no moment there: too stiff at
-        motors, springs and welds, unless many are kept.
+        Lowest modes in the beam's frame. They have no moment at an end that the frame does not clamp, so the beam is
+        too stiff at motors, springs and welds there unless many modes are retained.
     CRAIG_BAMPTON
-        What forces at its points bend it to, static shapes of the coordinates that joints, motors, springs, loads and
-        lumps act on, and the lowest modes with these coordinates held (Craig and Bampton 1968). The same in every
-        reference condition.
+        Static shapes of the coordinates that joints, motors, springs, loads and lumps act on, and the lowest modes with
+        these coordinates held (Craig and Bampton 1968). The result is the same in every reference condition.
     """
 
     MODAL = "modal"
@@ -84,7 +83,7 @@ class BodyReduction(Enum):
 
 @dataclass(frozen=True)
 class LumpedMass(CheckedFields):
-    """A mass [kg] and moment of inertia [kg m^2] at a named point of a beam."""
+    """Lumped mass [kg] and moment of inertia [kg m^2] at a named point of a beam."""
 
     _table = "lump"
 
@@ -95,17 +94,18 @@ class LumpedMass(CheckedFields):
 
 @dataclass(frozen=True)
 class RigidBody(CheckedFields):
-    """A rigid body.
+    """Rigid body.
 
     Attributes
     ----------
     name : str
+        Name of the body.
     mass : float
-        [kg]
+        Mass [kg].
     inertia : float
-        About the centre of mass [kg m^2].
+        Moment of inertia about the centre of mass [kg m^2].
     centre_of_mass : (x, y)
-        In the body frame [m].
+        Centre of mass in the body frame [m]; the origin by default.
     points : mapping
         Named points in the body frame [m].
     """
@@ -121,41 +121,43 @@ class RigidBody(CheckedFields):
 
 @dataclass(frozen=True)
 class FlexibleBeam(DeformableBody):
-    """A straight flexible beam along the x axis of its body frame, which starts at its first end.
+    """Straight flexible beam along the x axis of its body frame, with the first end at the origin.
 
     Attributes
     ----------
     name : str
+        Name of the body.
     length : float
-        [m]
+        Length [m].
     section : Section or tuple of Section
-        One for the whole beam, or one per span between neighbouring points and ends.
+        Cross-section of the whole beam, or one per span between neighbouring points and ends.
     material : Material or tuple of Material
-        Likewise.
+        Material of the whole beam, or one per span.
     points : mapping
-        Distance of each named point from the first end [m]; every one becomes a node.
+        Distance of each named point from the first end [m]; every point becomes a node.
     elements : int or tuple of int, optional
-        Elements per span between neighbouring points and ends. By default 1, and where a joint of a mechanism slides
-        along the beam so many that none is longer than a third of the beam (`mechanism.tracks`).
+        Number of elements per span between neighbouring points and ends, for all spans or each. By default 1; on a
+        beam that a joint slides along as many as keep each element below a third of the beam (`mechanism.tracks`).
     lumps : tuple of LumpedMass
+        Lumped masses at named points.
     reference : ReferenceCondition or str
-        How the floating frame is fixed to the beam. Pinned by default: deflections count from the chord, and stay small
-        where those from a tangent do not. The paper's is the cantilever.
+        Reference condition, which attaches the floating frame to the beam. Pinned by default: deflections are measured
+        from the chord, where they are smaller than from a tangent. The paper uses the cantilever condition.
     curvature : Curvature or str
-        At nodes with a lumped moment of inertia, and at the tip. Separate by default; the paper's is shared. Where
-        sections of different bending stiffness meet there is always one on either side.
+        Continuity of the curvature at nodes with a lumped moment of inertia and at the tip. Separate by default, shared
+        in the paper. Curvature is always separate where sections of different bending stiffness meet.
     modes : int, optional
-        Modes of lowest frequency kept as flexible coordinates; all by default.
+        Number of modes of lowest frequency retained as flexible coordinates; all by default.
     reduction : BodyReduction or str
-        Of which kind these are: "modal", in its frame; or "craig-bampton", with the points held that something acts on,
-        beside the static shapes of these.
-    damping : RayleighDamping or ModalDamping, optional
-        Of its material; none by default.
+        Kind of the retained modes: "modal" for modes in the beam's frame (default), or "craig-bampton" for modes with
+        the loaded points held, in addition to the static shapes of these points.
+    damping : RayleighDamping, ModalDamping or LossFactor, optional
+        Structural damping; none by default.
     flexible : bool
-        False holds all flexible coordinates at zero: the same inertia, rigid.
+        False holds all flexible coordinates at zero: a rigid beam of the same inertia.
     frames : int
-        Floating frames of equal length, joined rigidly (`mechanism.frames`): with more of them large deflections
-        converge to the exact beam. Results see one beam.
+        Number of floating frames of equal length, welded together (`mechanism.frames`), by default 1. With more frames
+        large deflections converge to those of the exact beam. Results describe a single beam.
     """
 
     name: str
@@ -175,7 +177,7 @@ class FlexibleBeam(DeformableBody):
 
     @cached_property
     def mesh(self) -> BeamMesh:
-        """Elements and nodes of the beam.
+        """Mesh of the beam.
 
         Raises
         ------
@@ -185,7 +187,7 @@ class FlexibleBeam(DeformableBody):
         mesh = mesh_beam(self.length, self.points, self.counts)
         spans = self._spans_of(mesh)
         stiffness = [spans[span].bending_stiffness for span in mesh.spans]
-        # At a step of E I the moment is continuous: a shared curvature would be wrong on one side at least.
+        # The moment is continuous at a step of E I, so a shared curvature would be wrong on one side at least.
         separate = {node for node in range(1, mesh.n_elements) if stiffness[node - 1] != stiffness[node]}
         if self.curvature is Curvature.SEPARATE:
             separate |= {mesh.points[lump.point] for lump in self.lumps if lump.inertia > 0.0} | {mesh.n_elements}
@@ -198,13 +200,13 @@ class FlexibleBeam(DeformableBody):
         Raises
         ------
         InputError
-            A number of sections or materials that is not that of the spans.
+            The number of sections or materials differs from the number of spans.
         """
         return self._spans_of(mesh_beam(self.length, self.points, self.counts))
 
     @property
     def counts(self) -> int | tuple[int, ...]:
-        """Elements per span, 1 where they are not given."""
+        """Number of elements per span, 1 if it is not given."""
         return 1 if self.elements is None else self.elements
 
     def _spans_of(self, mesh: BeamMesh) -> tuple[SpanProperties, ...]:
@@ -214,7 +216,7 @@ class FlexibleBeam(DeformableBody):
 
 
 def span_properties(section: Section, material: Material) -> SpanProperties:
-    """Mass and stiffness of a bar of one section and material."""
+    """Return mass and stiffness of a bar of one section and material."""
     return SpanProperties(
         mass_per_length=material.density * section.area,
         axial_stiffness=material.youngs_modulus * section.area,
@@ -237,31 +239,35 @@ def _per_span(value: T | tuple[T, ...], count: int, field: str) -> tuple[T, ...]
 
 @dataclass(frozen=True)
 class AssumedModesBeam(DeformableBody):
-    """A straight bar along the x axis of its body frame with shape functions of the user's choice.
+    """Straight bar along the x axis of its body frame with user-defined shape functions.
 
-    The functions fix the frame: they must contain no rigid motion of the bar. Its geometry is linear, whatever that of
-    the mechanism.
+    The functions define the frame, so they must not contain a rigid motion of the bar. The geometry of the bar is
+    linear, whatever the geometry of the mechanism.
 
     Attributes
     ----------
     name : str
+        Name of the body.
     length : float
-        [m]
+        Length [m].
     section : Section
+        Cross-section of the bar.
     material : Material
+        Material of the bar.
     transverse : tuple of ShapeFunction
-        Of x/L, `Sine` or `Polynomial`: transverse displacement per coordinate.
+        Transverse displacement per coordinate, `Sine` or `Polynomial` in x/L.
     axial : tuple of ShapeFunction
-        Axial displacement per coordinate; none for a bar that does not stretch.
+        Axial displacement per coordinate, `Sine` or `Polynomial` in x/L; none for an inextensible bar (default).
     points : mapping
         Distance of each named point from the first end [m].
     lumps : tuple of LumpedMass
+        Lumped masses at named points.
     modes : int, optional
-        Modes of lowest frequency kept as flexible coordinates; all by default.
-    damping : RayleighDamping or ModalDamping, optional
-        Of its material; none by default.
+        Number of modes of lowest frequency retained as flexible coordinates; all by default.
+    damping : RayleighDamping, ModalDamping or LossFactor, optional
+        Structural damping; none by default.
     flexible : bool
-        False holds all flexible coordinates at zero: the same inertia, rigid.
+        False holds all flexible coordinates at zero: a rigid bar of the same inertia.
     """
 
     name: str
@@ -304,5 +310,5 @@ given_as("a body")(Body)
 
 
 def given_shapes(bodies: Iterable[Body]) -> list[str]:
-    """Names of the flexible bodies with shapes given by the user, which have no mesh to refine."""
+    """Return the names of the flexible bodies with user-defined shapes, which have no mesh to refine."""
     return [body.name for body in bodies if isinstance(body, AssumedModesBeam | ModalBody) and body.flexible]

@@ -1,4 +1,4 @@
-"""Checks of one body: plausible numbers, points on the body, shapes that can be integrated."""
+"""Checks of a body: plausible numbers, points on the body, shapes that can be integrated."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ T = TypeVar("T")
 
 
 def check_body(body: Body) -> None:
-    """Check masses, lengths and stiffnesses, and that lumps are at points that exist.
+    """Check masses, lengths, stiffnesses, damping, modes and frames, and that lumps are at points that exist.
 
     Raises
     ------
     InputError
-        The first thing found wrong.
+        The first check that fails.
     """
     field = f"body.{body.name}"
     if isinstance(body, RigidBody):
@@ -79,7 +79,7 @@ def _check_frames(beam: FlexibleBeam, field: str) -> None:
 
 
 def check_damping(damping: Damping | None, field: str) -> None:
-    """Check the kind of damping, and that its coefficients are not negative."""
+    """Check that damping is of a known kind and that its coefficients are valid, above all not negative."""
     if damping is not None and not isinstance(damping, Damping):
         raise InputError(
             "not a damping", field=field, value=damping, remedy="give RayleighDamping or ModalDamping, or leave it out"
@@ -109,7 +109,7 @@ def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
 
 
 def _each(value: T | tuple[T, ...], field: str) -> Iterator[tuple[str, T]]:
-    """Sections or materials of a beam, one per span, each with the name of its field."""
+    """Yield the sections or materials of a beam, one or one per span, each with the name of its field."""
     if isinstance(value, tuple):
         yield from ((f"{field}.{k}", each) for k, each in enumerate(value))
     else:

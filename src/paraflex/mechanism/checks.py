@@ -1,4 +1,4 @@
-"""Structural checks of a mechanism, each by name. A mechanism that passes can be turned into a system."""
+"""Structural checks of a mechanism. A mechanism that passes all of them can be assembled into a system."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from paraflex.mechanism.sensors import JointForceSensor, PointSensor, Sensor, St
 
 
 def check_mechanism(mechanism: Members) -> None:
-    """Run every check below.
+    """Run all structural checks.
 
     Raises
     ------
     InputError
-        The first thing found wrong.
+        The first check that fails.
     """
     check_names(mechanism)
     for body in mechanism.bodies:
@@ -44,7 +44,7 @@ def check_mechanism(mechanism: Members) -> None:
 
 
 def check_names(mechanism: Members) -> None:
-    """Check that names of bodies, joints, motors, assemblies and modes are unique, and that none is "ground"."""
+    """Check that names are admissible and unique in each group, none is "ground", and there is at least one body."""
     for group, members in grouped(mechanism):
         counts = Counter(member.name for member in members)
         for name, count in counts.items():
@@ -59,7 +59,7 @@ def check_names(mechanism: Members) -> None:
 
 
 def check_joints(mechanism: Members) -> None:
-    """Check that joints name existing points of two bodies."""
+    """Check that joints refer to existing points of two bodies, and that joints along beams slide on a beam."""
     for joint in mechanism.joints:
         field = f"joint.{joint.name}"
         _two_bodies(mechanism, joint.a, joint.b, field, "a joint", "one side must lie on another body or on the ground")
@@ -76,7 +76,7 @@ def check_joints(mechanism: Members) -> None:
 
 
 def check_members_at_joints(mechanism: Members) -> None:
-    """Check that members at joints name joints that move, and that modes name motors."""
+    """Check that members at joints refer to joints with the required motion, and actuation modes to motors."""
     joints = {joint.name: joint for joint in mechanism.joints}
     for group, members in grouped(mechanism):
         for member in members:
@@ -105,7 +105,7 @@ def check_relations(mechanism: Members) -> None:
 
 
 def check_assemblies(mechanism: Members) -> None:
-    """Check that assemblies name bodies and points of bodies, and place every body."""
+    """Check that assemblies refer to bodies and points of bodies, and determine the angle of every body."""
     bodies = [body.name for body in mechanism.bodies]
     for assembly in mechanism.assemblies:
         for name, angle in assembly.angles.items():
@@ -116,13 +116,13 @@ def check_assemblies(mechanism: Members) -> None:
             known_point(mechanism, ref, field)
             finite(place, f"{field}.{ref}")
             _on_body(ref, field, "the places of ground points are given in [ground]")
-        # It names the body that neither angles nor points place.
+        # Raises an error with the name of a body whose angle is not determined.
         approximate_poses(mechanism, assembly)
         _check_hung(mechanism, assembly)
 
 
 def _check_hung(mechanism: Members, assembly: Assembly) -> None:
-    """Check that a body on distances alone has a place, unless the mechanism takes its poses from another."""
+    """Check that bodies with distance joints only have a position, unless the mechanism was derived from another."""
     hung = [name for name, joints in mechanism.joints_at.items() if {each.holds for each in joints} == {("distance",)}]
     placed = placed_poses(mechanism, assembly) if hung and mechanism.cut is None else hung
     for name in (name for name in hung if name not in {GROUND, *placed}):
@@ -133,7 +133,7 @@ def _check_hung(mechanism: Members, assembly: Assembly) -> None:
 
 
 def check_connected(mechanism: Members) -> None:
-    """Check that joints connect every body with the ground, or without ground joints all bodies with one another."""
+    """Check that joints connect every body with the ground, or all bodies with one another if none is on the ground."""
     start = GROUND if mechanism.joints_at[GROUND] else mechanism.bodies[0].name
     reached = mechanism.reached(start)
     lost = [body.name for body in mechanism.bodies if body.name not in reached]
@@ -175,12 +175,12 @@ def _check_points_of(mechanism: Members, group: Group, member: Any) -> None:
 
 
 def check_sensor(mechanism: Members, sensor: Sensor) -> None:
-    """Check a sensor of any mechanism that its joints, points, body and place exist and can be measured at.
+    """Check that the joints, points, body and position of a sensor exist in a mechanism and can be measured.
 
     Raises
     ------
     InputError
-        One that does not exist, or not of the right kind.
+        One of them does not exist or is not of the required kind.
     """
     group = groups_of(type(mechanism))["sensors"]
     _check_joints_of(sensor, group, {joint.name: joint for joint in mechanism.joints})
@@ -189,7 +189,7 @@ def check_sensor(mechanism: Members, sensor: Sensor) -> None:
 
 
 def _check_measured(mechanism: Members, sensor: Sensor) -> None:
-    """Check that a sensor measures what there is: a body, an axis of a joint, strain on a beam."""
+    """Check that the body, the joint axis or the beam at which a sensor measures exists."""
     field = f"sensor.{sensor.name}"
     if isinstance(sensor, PointSensor):
         known(sensor.body, mechanism.points, f"{field}.body", "body")
@@ -205,7 +205,7 @@ def _check_measured(mechanism: Members, sensor: Sensor) -> None:
 
 
 def _check_strain(mechanism: Members, sensor: StrainGauge, field: str) -> None:
-    """Check that a strain gauge is on a beam, and its distance from the neutral axis is known."""
+    """Check that a `StrainGauge` is on a beam, and that its distance from the neutral axis is known."""
     known(sensor.body, mechanism.points, f"{field}.body", "body")
     beam = None if sensor.body == GROUND else mechanism.body(sensor.body)
     if not isinstance(beam, FlexibleBeam | AssumedModesBeam):
@@ -244,7 +244,7 @@ def _on_body(ref: PointRef, field: str, problem: str) -> None:
 
 
 def known_point(mechanism: Members, ref: PointRef, field: str) -> None:
-    """Check that the mechanism has a point."""
+    """Raise an `InputError` unless the mechanism has a point."""
     points = mechanism.points
     known(ref.body, points, field, "body")
     if ref.point not in points[ref.body]:

@@ -1,4 +1,4 @@
-"""What the user described, where a mechanism for computing has been made of it: beams cut up, members added."""
+"""Link from a mechanism derived for computation, with divided beams or added members, to the one described."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from paraflex.mechanism.joints import PointRef
 
 @dataclass(frozen=True)
 class Cut:
-    """The mechanism as described, and where the bodies of the one made of it are on its bodies.
+    """Mechanism as described by the user, and the map from its bodies to those of a derived mechanism.
 
     Attributes
     ----------
     whole : Mechanism
+        Mechanism as described.
     carriers : mapping
-        Of each body of the other mechanism the body it is a part of, and how far along that it starts [m]; empty where
-        members were added only.
+        Original body of each body of the derived mechanism, and the distance along it at which that body starts [m];
+        empty if members were only added.
     points : mapping of PointRef to PointRef
-        Points of bodies that were cut, and where they are now.
+        Points of divided bodies in the derived mechanism, by their points in the described one.
     """
 
     whole: Any
@@ -30,7 +31,7 @@ class Cut:
 
     @cached_property
     def parts(self) -> dict[str, tuple[str, ...]]:
-        """Parts of each body of the mechanism as described, first end first; itself if it was not cut."""
+        """Parts of each body of the described mechanism, from the first end on; the body itself if it is undivided."""
         found: dict[str, list[str]] = {body.name: [] for body in self.whole.bodies}
         for part, (body, _) in self.carriers.items():
             found[body].append(part)

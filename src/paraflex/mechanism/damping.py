@@ -1,4 +1,4 @@
-"""Structural damping of a flexible body: by ratios of its modes, by Rayleigh's coefficients, or by a loss factor."""
+"""Structural damping of a flexible body: modal damping ratios, Rayleigh coefficients, or a loss factor."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from paraflex.mechanism.quantities import in_unit, not_negative, positive
 class RayleighDamping(CheckedFields):
     """Damping in proportion to mass and stiffness: D = mass M + stiffness K.
 
-    The part in proportion to mass is that of the body's vibration as its joints hold it (`ModalDamping`); the part in
-    proportion to stiffness depends on nothing but the deformation.
+    The mass-proportional part acts on the vibrations of the body with its joints held (see `ModalDamping`); the
+    stiffness-proportional part depends on the deformation only.
 
     Attributes
     ----------
     mass : float
-        [1/s]
+        Coefficient of the mass-proportional part [1/s]; 0 by default.
     stiffness : float
-        [s]
+        Coefficient of the stiffness-proportional part [s]; 0 by default.
     """
 
     _table = "damping"
@@ -33,7 +33,7 @@ class RayleighDamping(CheckedFields):
     stiffness: float = field(default=0.0, metadata=in_unit(not_negative, "s"))
 
     def coefficients(self, omega: Array) -> Array:
-        """Damping coefficients of the body's mass-normalised modes, as held by its joints, by frequency [1/s]."""
+        """Return damping coefficients [1/s] of mass-normalised modes by frequency [rad/s], the body's joints held."""
         return self.mass + self.stiffness * omega**2
 
 
@@ -48,13 +48,13 @@ def _check_ratios(ratios: tuple[float, ...], field: str) -> None:
 class ModalDamping(CheckedFields):
     """Damping by a ratio for each mode of the body with its joints held, whatever its reference condition.
 
-    The modes are those of the body alone, ascending in frequency, with what its joints hold of it held still: see
-    `dynamics.damping`.
+    The modes are those of the body alone, ascending in frequency, with the displacements that its joints constrain
+    held at zero: see `dynamics.damping`.
 
     Attributes
     ----------
     ratios : tuple of float
-        Parts of critical damping; the last serves all modes that follow.
+        Damping ratios, as fractions of critical damping; the last one applies to all higher modes.
     """
 
     _table = "damping"
@@ -62,24 +62,24 @@ class ModalDamping(CheckedFields):
     ratios: tuple[float, ...] = field(metadata={"check": _check_ratios})
 
     def coefficients(self, omega: Array) -> Array:
-        """2 ratio omega of each mode [1/s]."""
+        """Return the damping coefficient 2 ratio omega of each mode [1/s]."""
         last = len(self.ratios) - 1
         return 2.0 * omega * np.array([self.ratios[min(k, last)] for k in range(omega.size)])
 
 
 @dataclass(frozen=True)
 class LossFactor(CheckedFields):
-    """Damping of the material by its loss factor at one frequency: D = loss_factor / (2 pi frequency) K.
+    """Damping by the material's loss factor at one frequency: D = loss_factor / (2 pi frequency) K.
 
-    A vibration at that frequency has the damping ratio loss_factor / 2, one at another frequency more or less in
-    proportion to it: this is viscous damping, where a material's loss factor would be the same at all frequencies.
+    A vibration at that frequency has the damping ratio loss_factor / 2. The ratio at other frequencies is proportional
+    to the frequency, because the damping is viscous; a constant loss factor would give the same ratio at all of them.
 
     Attributes
     ----------
     loss_factor : float
-        Energy lost in a cycle over 2 pi times the largest strain energy in it.
+        Energy dissipated per cycle divided by 2 pi times the largest strain energy of the cycle.
     frequency : float
-        Of the vibration that it is meant for [Hz].
+        Frequency at which the loss factor holds [Hz].
     """
 
     _table = "damping"
@@ -93,7 +93,7 @@ class LossFactor(CheckedFields):
         return self.loss_factor / (2.0 * np.pi * self.frequency)
 
     def coefficients(self, omega: Array) -> Array:
-        """Damping coefficients of the body's mass-normalised modes, by their angular frequencies [1/s]."""
+        """Return damping coefficients [1/s] of the body's mass-normalised modes by angular frequency [rad/s]."""
         return self.stiffness * omega**2
 
 
@@ -102,7 +102,7 @@ given_as("a damping")(Damping)
 
 
 def stiffness_proportional(damping: Damping) -> float | None:
-    """The coefficient beta of D = beta K [s], or None if damping is not proportional to stiffness alone."""
+    """Return the coefficient beta of D = beta K [s], or None if damping is not proportional to stiffness alone."""
     if isinstance(damping, LossFactor):
         return damping.stiffness
     if isinstance(damping, RayleighDamping) and damping.mass == 0.0:
@@ -111,7 +111,7 @@ def stiffness_proportional(damping: Damping) -> float | None:
 
 
 def stiffness_damping(damping: Damping | None, what: str, field: str) -> float:
-    """The coefficient beta of D = beta K [s]; an `InputError` for damping of another kind."""
+    """Return the coefficient beta of D = beta K [s], 0 without damping; raise an `InputError` for other kinds."""
     beta = 0.0 if damping is None else stiffness_proportional(damping)
     if beta is None:
         problem = f"{what} can be damped in proportion to stiffness only"

@@ -1,6 +1,6 @@
-"""Beams with several floating frames: cut into as many beams, welded end to end.
+"""Beams with several floating frames, which are divided into as many beams, welded end to end.
 
-Deflections count from each frame, so that slopes stay small where the whole beam bends far.
+Deflections are relative to each frame, so slopes remain small when the whole beam has large deflections.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.segments import FIRST_END, LAST_END, frame_read, moved, rebuilt
 from paraflex.mechanism.sensors import Sensor, StrainGauge
 
-# Places nearer than this part of the beam are one.
+# Positions closer than this fraction of the beam coincide.
 _SAME = 1e-9
 
 
 def in_frames(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with a beam for each frame of its flexible beams; itself where all have one.
+    """Return the mechanism with one beam for each floating frame; the given mechanism if every beam has one frame.
 
     Raises
     ------
     InputError
-        A sensor that reads in the frame of such a beam, or a joint that slides along it.
+        A sensor that is not a `StrainGauge` measures in the frame of a divided beam, or a joint slides along it.
     """
     beams = {body.name: body for body in mechanism.bodies
              if isinstance(body, FlexibleBeam) and body.flexible and body.frames > 1}  # fmt: skip
@@ -74,7 +74,7 @@ def _check(mechanism: Mechanism, beams: set[str]) -> None:
 
 
 def _on_part(sensor: Sensor, beams: Mapping[str, FlexibleBeam]) -> Sensor:
-    """A strain gauge on the part of its beam that it is on; at a cut on the side of the last end."""
+    """Return a `StrainGauge` moved to the right part of its beam; at a cut to the part nearer to the last end."""
     if not isinstance(sensor, StrainGauge) or sensor.body not in beams:
         return sensor
     beam = beams[sensor.body]
@@ -88,12 +88,12 @@ def _name(beam: FlexibleBeam, number: int) -> str:
 
 
 def _part_at(beam: FlexibleBeam, place: float) -> int:
-    """Number of the part at a distance from the first end; at a cut that which begins there."""
+    """Return the number of the part at a distance from the first end [m]; at a cut the part that begins there."""
     return min(int(place / beam.length * beam.frames + _SAME), beam.frames - 1)
 
 
 def _parts(beam: FlexibleBeam) -> list[FlexibleBeam]:
-    """The beams that a beam is cut into, each with the sections, materials and elements of its spans."""
+    """Divide a beam into one beam per frame, each with the sections, materials and elements of its spans."""
     knots = [0.0, *sorted({x for x in beam.points.values() if _SAME < x / beam.length < 1.0 - _SAME}), beam.length]
     knots = [knots[0], *(b for a, b in pairwise(knots) if b - a > _SAME * beam.length)]
     length = beam.length / beam.frames
@@ -114,10 +114,10 @@ def _parts(beam: FlexibleBeam) -> list[FlexibleBeam]:
 
 
 def _near(x: float, length: float) -> float:
-    """A place, at an end where rounding alone puts it elsewhere."""
+    """Return a position [m], moved to an end (0 or `length`) from which it differs by rounding only."""
     return 0.0 if abs(x) < _SAME * length else length if abs(x - length) < _SAME * length else x
 
 
 def _of_spans(values: Any, spans: Sequence[int]) -> Any:
-    """What was given for each span of the whole beam, for the spans of a part."""
+    """Select the values of the given spans, if there is one value per span of the whole beam."""
     return tuple(values[span] for span in spans) if isinstance(values, tuple) else values

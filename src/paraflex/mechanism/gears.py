@@ -1,4 +1,4 @@
-"""Gears and other relations, in which one joint's coordinate follows another's."""
+"""Gears and other linear relations between joint coordinates."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ PHASE = said(
 
 
 class Relation(CheckedFields):
-    """A weighted sum of joints' coordinates is the phase; of two joints: second = transmission * first + phase.
+    """Linear relation between joint coordinates: their weighted sum equals the phase.
 
-    A kind of relation is a dataclass derived from this one. It has these fields, in its own words, and says what its
-    transmission is; all else asks that.
+    For two joints, second = transmission * first + phase. A kind of relation is a dataclass derived from this class
+    that declares these fields and defines `transmission` or `shares`, on which all other code relies.
 
     Attributes
     ----------
     name : str
+        Name of the relation.
     first_joint, second_joint : str
-        Their coordinates are those of body b against body a, slopes of beams included.
+        Names of the joints; their coordinates are those of body b relative to body a, slopes of beams included.
     phase : float, optional
-        Coordinate of the second joint where that of the first is zero [rad or m]. By default as the first assembly
-        stands; a mechanism has the number.
+        Coordinate of the second joint where that of the first is zero [rad or m]; by default its value in the first
+        assembly, which a mechanism fills in.
     """
 
     name: str
@@ -38,7 +39,7 @@ class Relation(CheckedFields):
 
     @property
     def transmission(self) -> float:
-        """Derivative of the second joint's coordinate by the first's: without unit, in m/rad or in rad/m."""
+        """Derivative of the second joint coordinate with respect to the first: dimensionless, in m/rad or in rad/m."""
         raise NotImplementedError
 
     @property
@@ -48,29 +49,30 @@ class Relation(CheckedFields):
 
     @property
     def shares(self) -> dict[str, float]:
-        """Weights of the joints' coordinates in the sum; the row is in the unit of the first of these."""
+        """Weights of the joint coordinates by joint; the constraint row has the unit of the first."""
         return {self.second_joint: 1.0, self.first_joint: -self.transmission}
 
 
 @dataclass(frozen=True)
 class Gear(Relation):
-    """The coordinate of the second joint is ratio times that of the first, plus phase.
+    """Gear: the coordinate of the second joint is ratio times that of the first, plus phase.
 
-    Of two wheels with fixed centres the ratio is -r1/r2 where they mesh outside, r1/r2 where one lies within the other,
-    or where a belt or a chain joins them. A joint that slides has a travel: of a pinion and its rack the ratio is the
-    pinion's radius [m/rad]. Angles count turns. Like a motor a gear acts on the material at the joints, by torques
-    about them (a force along the axis where a joint slides); what teeth press on the bearings besides is not in it.
+    The ratio of two wheels with fixed centres is -r1/r2 for external meshing, and r1/r2 for internal meshing, a belt or
+    a chain. The coordinate of a joint that slides is its travel: the ratio of a pinion and its rack is the pinion's
+    radius [m/rad]. Angles are not limited to one turn. A gear acts on the material at the joints, as a motor does, by
+    torques about them (a force along the axis where a joint slides). Forces of the teeth on the bearings are neglected.
 
     Attributes
     ----------
     name : str
+        Name of the gear.
     first_joint, second_joint : str
-        Their coordinates are those of body b against body a, slopes of beams included.
+        Names of the joints; their coordinates are those of body b relative to body a, slopes of beams included.
     ratio : float
-        By the kinds of the joints without unit, in m/rad or in rad/m.
+        Transmission ratio: dimensionless, in m/rad or in rad/m, depending on the joints.
     phase : float, optional
-        Coordinate of the second joint where that of the first is zero [rad or m]. By default as the first assembly
-        stands; a mechanism has the number.
+        Coordinate of the second joint where that of the first is zero [rad or m]; by default its value in the first
+        assembly, which a mechanism fills in.
     """
 
     _table = "gear"
@@ -90,7 +92,7 @@ class Gear(Relation):
 
     @property
     def transmission(self) -> float:
-        """The ratio."""
+        """Transmission ratio, `ratio`."""
         return self.ratio
 
 
@@ -101,16 +103,17 @@ def _weigh(weights: Mapping[str, float], field: str) -> None:
 
 @dataclass(frozen=True)
 class SumRelation(Relation):
-    """The sum of joints' coordinates, each times its weight, is constant: of belts, differentials, planetary gears.
+    """Constant weighted sum of joint coordinates, as for belts, differentials and planetary gears.
 
     Attributes
     ----------
     name : str
+        Name of the relation.
     weights : mapping of str to float
-        By joint; their units are such that the products have one. The row's multiplier is the torque or force on the
-        joint of largest weight, less; that on each other is as its weight to this one.
+        Weights by joint, with units such that all products have the same unit. The multiplier of the constraint row is
+        the negative torque or force on the joint of largest weight; that on another joint is in the ratio of weights.
     phase : float, optional
-        The sum, by default as the first assembly stands; a mechanism has the number.
+        Value of the sum; by default its value in the first assembly, which a mechanism fills in.
     """
 
     _table = "relation"
@@ -121,5 +124,5 @@ class SumRelation(Relation):
 
     @property
     def shares(self) -> dict[str, float]:
-        """The weights, the largest first."""
+        """Weights by joint, the largest in magnitude first."""
         return dict(sorted(self.weights.items(), key=lambda one: -abs(one[1])))

@@ -1,4 +1,4 @@
-"""Groups of members of a mechanism: description of each group, given once in `Members`."""
+"""Groups of members of a mechanism, each described once, in `Members`."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from paraflex.mechanism.gears import Relation
 
 @dataclass(frozen=True)
 class Group:
-    """A group of members that have names: joints, springs, loads.
+    """Group of named members, such as joints, springs or loads.
 
     Attributes
     ----------
     table : str
-        Its name in files, as in [spring.NAME]; errors name it.
+        Name of the table in files, as in [spring.NAME]; errors quote it.
     word : str
-        What errors and tables call one of them.
+        Noun for a member in errors and tables.
     kinds : tuple of type
-        Classes of members whose table in a file has the fields of the class; several have a `kind` each, which is the
-        table's `type`. Without them `files` reads and writes the table in a way of its own.
+        Classes of members whose table in a file has the fields of the class. Where there are several, each has a
+        `kind`, which is the table's `type`. Without classes `files` reads and writes the table by its own code.
     plural : str
-        That of the word, by default with an s.
+        Plural of the word, by default the word with an s.
     engines : bool
-        Whether Exudyn and MuJoCo can express them.
+        Whether Exudyn and MuJoCo can represent the members.
     resists : bool
-        Whether they are forces of springs, dampers or friction. These do not constrain, and KED leaves them out.
+        Whether the members are forces of springs, dampers or friction. They impose no constraints, and
+        kineto-elastodynamics (KED) refuses them.
     measures : bool
-        Whether they are sensors, which do not act on the mechanism.
+        Whether the members are sensors, which do not act on the mechanism.
     """
 
     table: str
@@ -43,32 +44,32 @@ class Group:
 
     @property
     def relates(self) -> bool:
-        """Whether its members relate the coordinates of joints."""
+        """Whether the members relate the coordinates of joints."""
         return bool(self.kinds) and all(issubclass(kind, Relation) for kind in self.kinds)
 
     @property
     def one(self) -> str:
-        """The word for one member, with its article."""
+        """Noun for a member with its article."""
         return f"a{'n' if self.word[0] in 'aeiou' else ''} {self.word}"
 
     @property
     def words(self) -> str:
-        """The word for several members."""
+        """Noun for several members."""
         return self.plural or f"{self.word}s"
 
 
 def group(table: str, word: str, *kinds: type, **others: Any) -> Any:
-    """The field of `Members` with the members of a group, by default none."""
+    """Return the dataclass field of `Members` for a group, by default empty."""
     return field(default=(), metadata={"group": Group(table, word, kinds, **others)})
 
 
 @cache
 def groups_of(members: type) -> dict[str, Group]:
-    """Groups of a mechanism by their fields."""
+    """Return the groups of a mechanism's class by the names of their fields."""
     return {each.name: each.metadata["group"] for each in fields(members) if "group" in each.metadata}
 
 
 def grouped(mechanism: Any) -> Iterator[tuple[Group, tuple[Any, ...]]]:
-    """Each group of a mechanism and its members."""
+    """Yield each group of a mechanism and its members."""
     for name, one in groups_of(type(mechanism)).items():
         yield one, getattr(mechanism, name)

@@ -1,9 +1,9 @@
 """Joints between named points, prescribed joint angles, and motors at joints.
 
-The two bodies of a joint have an order. Its coordinate is that of body b against body a, angles positive anticlockwise,
-and results tell what body a does to body b: the force at point b in the ground frame and the moment about point b,
-positive anticlockwise (`dynamics.joint_loads`). A motor's positive torque or force acts on body b so that the
-coordinate grows.
+The two bodies of a joint are ordered. The joint coordinate is that of body b relative to body a, angles positive
+anticlockwise. Joint loads in results act from body a on body b: the force at point b in the ground frame and the moment
+about point b, positive anticlockwise (`dynamics.joint_loads`). A positive torque or force of a motor acts on body b
+such that the coordinate increases.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ GROUND = "ground"
 @given_as("a point", 'a point, "body.point", say "link1.B1"')
 @dataclass(frozen=True, order=True)
 class PointRef(CheckedFields):
-    """A named point of a body, or of the ground: written "link1.B1" or "ground.A1" in files."""
+    """Named point of a body or of the ground, written "link1.B1" or "ground.A1" in files."""
 
     _table = "point"
 
@@ -32,7 +32,7 @@ class PointRef(CheckedFields):
 
     @classmethod
     def taken_from(cls, given: object, field: str) -> PointRef | None:
-        """A point from "body.point", or from the two names; None for anything else."""
+        """Return the point of "body.point" or of the two names; None for anything else."""
         if isinstance(given, str):
             return cls.parse(given, str(field))
         if isinstance(given, tuple | list) and len(given) == 2:
@@ -42,12 +42,12 @@ class PointRef(CheckedFields):
     @classmethod
     @checked_arguments()
     def parse(cls, text: str, field: str = "point") -> PointRef:
-        """Read "body.point".
+        """Parse "body.point".
 
         Raises
         ------
         InputError
-            If the text is not of this form.
+            The text is not of this form.
         """
         body, dot, point = text.partition(".")
         if not (dot and body and point):
@@ -66,14 +66,14 @@ class PointRef(CheckedFields):
 class AtEnd(Enum):
     """Action of a run when a point that slides along a beam reaches the beam's end.
 
-    Error:
-        It fails, with what was computed until then.
+    ERROR (default)
+        The run fails and keeps the result computed until then.
     STOP
-        It ends there, as at a limit of the joint, and has not failed.
+        The run ends there without failing, as at a limit of the joint.
     WARN
         The run continues with extrapolated deflections, and the result has a finding.
     IGNORE
-        It goes on and says nothing.
+        The run continues with extrapolated deflections, without a finding.
     """
 
     ERROR = "error"
@@ -88,7 +88,7 @@ _SYMBOLS = {("points",): "pin", ("points", "angle"): "weld", ("axis", "angle"): 
 
 
 class _Directions:
-    """Default of joints without this field."""
+    """Default values of the fields that a kind of joint does not define."""
 
     direction: float = 0.0
     angle: float = 0.0
@@ -99,28 +99,32 @@ class _Directions:
 @given_as("a joint", "a joint of any kind, say RevoluteJoint")
 @dataclass(frozen=True)
 class Joint(CheckedFields, _Directions):
-    """A joint between point a of one body and point b of another: the base of all kinds.
+    """Joint between point a of one body and point b of another: the base class of all kinds.
 
-    A subclass is a kind, `class SlotJoint(Joint, kind="slot", holds=("axis",))`: files, equations, drawings and checks
-    know it by that. Its own fields, `direction`, `angle` and others, say in their metadata what files say of them.
+    A subclass such as `class SlotJoint(Joint, kind="slot", holds=("axis",))` defines a kind of joint for files,
+    equations, drawings and checks. The metadata of its own fields (`direction`, `angle` and others) describe them in
+    files.
 
     Attributes
     ----------
     name : str
+        Name of the joint.
     a, b : PointRef
+        Points of the first and the second body.
     kind : str
-        The name in files.
+        Name of the kind in files.
     holds : tuple of str
-        "points", which it holds together (two constraints); an "axis" through point a, at `direction` against body a,
-        that it keeps point b on (one); the "angle" of body b against body a, kept at `angle` (one); the "distance" of
-        point b from point a, kept at `length` (one).
+        Constraints of the joint: "points", points a and b coincide (two rows); "axis", point b stays on an axis through
+        point a at `direction` relative to body a (one row); "angle", body b keeps the angle `angle` relative to body a
+        (one row); "distance", points a and b keep the distance `length` (one row).
     follows_beam : bool
-        Whether its axis is the centre line of a's beam, bent as it is; else it turns with the material at a.
+        Whether the axis is the deformed centre line of the beam of point a; otherwise the axis turns with the material
+        at a.
     symbol : str
-        How it is drawn: a name of `plots.marks.SYMBOLS`, by default that of a joint which holds the same.
+        Symbol in drawings, a name of `plots.marks.SYMBOLS`; by default that of the joint with the same constraints.
     slides, moves : bool
-        Whether its coordinate is a travel along its axis [m], else the angle of b against a [rad]; whether that is
-        free.
+        Whether the joint coordinate is a travel along the axis [m] and not the angle of b relative to a [rad]; whether
+        this coordinate is free.
     """
 
     _table = "joint"
@@ -146,12 +150,12 @@ class Joint(CheckedFields, _Directions):
         JOINT_KINDS[kind] = cls
 
     def check_moves(self, field: str, does: JointThat = "moves") -> None:
-        """Check that the joint has a free angle or travel, or the one that is required, if any is.
+        """Check that the joint has the motion that `does` requires: a free angle, a free travel, either, or none.
 
         Raises
         ------
         InputError
-            It has none, as a weld, or the other.
+            The joint has no free coordinate, as a weld, or one of the other kind.
         """
         if does == "exists":
             return
@@ -166,16 +170,16 @@ class Joint(CheckedFields, _Directions):
 
 
 def points_named(member: Any) -> dict[str, PointRef]:
-    """Points that the fields of a member name."""
+    """Return the points that a member refers to, by the names of its fields."""
     return {each.name: at for each in fields(member) if isinstance(at := getattr(member, each.name), PointRef)}
 
 
 @dataclass(frozen=True)
 class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
-    """A joint at which two points coincide: p_b - p_a = 0.
+    """Revolute joint, at which two points coincide: p_b - p_a = 0.
 
-    The joint's angle is that of body b relative to body a (or to the ground), each turned by the slope of its
-    beam at the joint.
+    The joint angle is that of body b relative to body a (or to the ground), each including the slope of its beam at
+    the joint.
     """
 
 
@@ -186,17 +190,17 @@ _ANGLE = said("the angle of the second body against the first in rad", finite)
 
 @dataclass(frozen=True)
 class PrismaticJoint(Joint, kind="prismatic", holds=("axis", "angle")):
-    """Body b slides along an axis that body a carries, and does not turn against it.
+    """Prismatic joint: body b slides along an axis of body a and does not rotate relative to it.
 
-    The axis goes through point a, at `direction` against body a's x axis there (against the ground's, on the ground);
-    on a beam it turns with the slope at a. The joint's coordinate is its travel: how far point b is along the axis [m].
+    The axis passes through point a at the angle `direction` to the x axis of body a, or of the ground; on a beam it
+    turns with the slope at a. The joint coordinate is the travel of point b along the axis from point a [m].
 
     Attributes
     ----------
     direction : float
-        Of the axis against body a [rad].
+        Angle of the axis relative to body a [rad]; 0 by default.
     angle : float
-        Of body b against body a, constant [rad]; slopes of beams included.
+        Constant angle of body b relative to body a, including slopes of beams [rad]; 0 by default.
     """
 
     direction: float = field(default=0.0, metadata=_DIRECTION)
@@ -205,9 +209,9 @@ class PrismaticJoint(Joint, kind="prismatic", holds=("axis", "angle")):
 
 @dataclass(frozen=True)
 class SlotJoint(Joint, kind="slot", holds=("axis",)):
-    """A pin in a slot: point b stays on an axis through point a of body a, and body b turns freely.
+    """Pin in a slot: point b stays on an axis through point a of body a, and body b rotates freely.
 
-    The axis is that of a `PrismaticJoint`, and so is the joint's coordinate.
+    Axis, `direction` [rad] and joint coordinate are defined as those of a `PrismaticJoint`.
     """
 
     direction: float = field(default=0.0, metadata=_DIRECTION)
@@ -215,15 +219,15 @@ class SlotJoint(Joint, kind="slot", holds=("axis",)):
 
 @dataclass(frozen=True)
 class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", follows_beam=True):
-    """Point b slides along the centre line of a deformed beam, and body b turns freely.
+    """Sliding joint: point b slides along the centre line of a deformed beam, and body b rotates freely.
 
-    Point a says which beam. The joint's coordinate is how far point b is beyond point a along the x axis of the beam's
-    frame [m]. Deflections are taken where the point stands in the undeformed beam, as a linear theory does.
+    Point a identifies the beam. The joint coordinate is the distance of point b from point a along the x axis of the
+    beam's frame [m]. Deflections are evaluated at this position in the undeformed beam, as in linear theory.
 
     Attributes
     ----------
     at_end : AtEnd or str
-        What a run does where point b comes to an end of the beam; a value is taken for the member.
+        Action of a run when point b reaches an end of the beam; an error by default.
     """
 
     at_end: AtEnd = optional(  # noqa: RUF009 - a field
@@ -233,21 +237,21 @@ class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", fol
 
 @dataclass(frozen=True)
 class WeldJoint(Joint, kind="weld", holds=("points", "angle")):
-    """Two points coincide, and body b has a constant angle [rad] against body a, slopes of beams included."""
+    """Weld: points a and b coincide, and body b has a constant angle to body a, slopes of beams included [rad]."""
 
     angle: float = field(default=0.0, metadata=_ANGLE)
 
 
 @dataclass(frozen=True)
 class DistanceJoint(Joint, kind="distance", holds=("distance",), symbol="rod"):
-    """A massless rod between pins: points a and b keep their distance, |p_b - p_a| = length.
+    """Massless rod between two pins: points a and b keep their distance, |p_b - p_a| = length.
 
-    The bodies turn freely. The multiplier of its row is the axial force of the rod [N], tension positive.
+    The bodies rotate freely. The multiplier of the constraint row is the axial force of the rod [N], tension positive.
 
     Attributes
     ----------
     length : float, optional
-        Of the rod [m]. By default as the first assembly stands; a mechanism has the number.
+        Length of the rod [m]; by default the distance in the first assembly, which a mechanism fills in.
     """
 
     length: float | None = field(default=None, metadata=_LENGTH)
@@ -255,7 +259,7 @@ class DistanceJoint(Joint, kind="distance", holds=("distance",), symbol="rod"):
 
 @dataclass(frozen=True)
 class PrescribedAngle(CheckedFields):
-    """A rheonomic constraint: the angle of a revolute joint follows a law in time."""
+    """Rheonomic constraint: the angle or travel of a joint follows a given function of time."""
 
     _table = "prescribed"
 
@@ -273,7 +277,7 @@ class PrescribedAngle(CheckedFields):
 
 @dataclass(frozen=True)
 class Motor(CheckedFields):
-    """A motor at a revolute joint; positive torque turns body b of the joint relative to body a.
+    """Motor at a joint that turns or slides; a positive torque or force moves body b relative to body a.
 
     The torque acts on the material at the joint: on the body's angle and on the slope of the beam there.
     """

@@ -1,4 +1,4 @@
-"""Laws in time, of prescribed motions, loads and torques: functions, constant speed, pieces, a table."""
+"""Profiles of prescribed motions, loads and torques in time: functions, constant speed, pieces and tables."""
 
 from __future__ import annotations
 
@@ -18,33 +18,41 @@ from paraflex.errors import InputError
 
 Values = tuple[Array, Array, Array]
 
-# What a law and its rate may jump by at a knot, as a fraction of their size: rounding of its expressions.
+# Admissible jump of a profile and its rate at a knot, relative to its value: rounding of its expressions.
 _SMOOTH = 1e-9
-# A run may end this far beyond a table, as a fraction of it: rounding of times.
+# A run may end beyond a table by this fraction of its duration: rounding of times.
 _BEYOND_TABLE = 1e-9
 _DEGREE = 5
-# Kinks of a linear table at which integration steps end, at most: error control does without the less sharp ones.
+# Largest number of kinks of a linear table at which integration steps end; error control handles the less sharp ones.
 _MOST_STOPS = 200
 
 
 @given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")
 @runtime_checkable
 class AngleLaw(Protocol):
-    """An angle, a travel, a force or a torque as a function of time."""
+    """Profile of an angle, a travel, a force or a torque in time."""
 
     def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Value [rad, m, N or N m] and its first and second derivatives at times t [s]."""
+        """Return the value [rad, m, N or N m] and its first and second derivatives at times t [s]."""
         ...
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Times [s] at which a derivative of the law jumps; steps end there, or at its `stops` if it has any."""
+        """Times at which a derivative jumps [s]; steps end there, or at the attribute `stops` if it exists."""
         ...
 
 
 @dataclass(frozen=True)
 class SampledAngle(CheckedFields):
-    """A law from three functions of time: the angle, or whatever it is a law of, and its first two derivatives."""
+    """Profile given by three functions of time: the value and its first two derivatives.
+
+    Attributes
+    ----------
+    angle, rate, acceleration : callable
+        Functions of times t [s]: angle or another quantity, and its first and second derivatives.
+    knots : tuple of float
+        Times at which a derivative jumps [s]; none by default.
+    """
 
     angle: Callable[[Array], Array]
     rate: Callable[[Array], Array]
@@ -52,29 +60,29 @@ class SampledAngle(CheckedFields):
     knots: tuple[float, ...] = ()
 
     def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Angle, rate and acceleration at times t."""
+        """Return the angle, its rate and its acceleration at times t [s]."""
         return self.angle(t), self.rate(t), self.acceleration(t)
 
 
 @dataclass(frozen=True)
 class HeldAngle:
-    """An angle [rad], or a travel [m], that does not change."""
+    """Constant angle [rad] or travel [m]."""
 
     value: float
     knots: tuple[float, ...] = ()
     breaks: tuple[float, ...] = ()
 
     def evaluate(self, t: Array) -> Values:
-        """Value, rate and acceleration at times t."""
+        """Return the value, its rate and its acceleration at times t [s]."""
         return np.full(t.shape, self.value), np.zeros(t.shape), np.zeros(t.shape)
 
 
 @dataclass(frozen=True)
 class ConstantSpeed(CheckedFields):
-    """A start value [rad or m] and a constant speed [rad/s or m/s].
+    """Profile of constant speed [rad/s or m/s] with a value at t = 0, `angle` [rad or m].
 
-    With `from_assembly` the start value of a prescribed motion is not given: it is that of the assembly or start which
-    a run begins from, and `angle` is its number there.
+    With `from_assembly` the start value of a prescribed motion is not given by the user but taken from the assembly or
+    initial state of a run, which replaces `angle`.
     """
 
     _table = "law"
@@ -85,25 +93,25 @@ class ConstantSpeed(CheckedFields):
     from_assembly: bool = field(default=False, compare=False)
 
     def evaluate(self, t: Array) -> Values:
-        """Value, rate and acceleration at times t."""
+        """Return the value, its rate and its acceleration at times t [s]."""
         return self.angle + self.speed * t, np.full_like(t, self.speed), np.zeros_like(t)
 
 
 @dataclass(frozen=True)
 class PiecewiseLaw(CheckedFields):
-    """Laws in succession. Those of a prescribed motion must meet in value and rate; loads and torques may jump.
+    """Profile of successive pieces, continuous in value and rate for a prescribed motion; loads and torques may jump.
 
     Attributes
     ----------
     pieces : tuple of AngleLaw
-        Each a function of the same time.
+        Pieces in order, each a function of the same absolute time.
     ends : tuple of float
-        Of all pieces but the last, ascending [s].
+        End times of all pieces but the last, ascending [s].
 
     Raises
     ------
     InputError
-        Ends that do not ascend.
+        The end times do not ascend from 0.
     """
 
     _table = "law"
@@ -122,13 +130,13 @@ class PiecewiseLaw(CheckedFields):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Ends of the pieces, and knots of the pieces themselves [s]."""
+        """End times of the pieces, and knots within the pieces [s]."""
         starts, ends = (-np.inf, *self.ends), (*self.ends, np.inf)
         inner = [k for a, piece, b in zip(starts, self.pieces, ends, strict=True) for k in piece.knots if a < k < b]
         return tuple(sorted([*self.ends, *inner]))
 
     def evaluate(self, t: Array) -> Values:
-        """Value, rate and acceleration at times t; at a knot those of the later piece."""
+        """Return the value, its rate and its acceleration at times t [s]; at a knot those of the later piece."""
         t = np.asarray(t, dtype=float)
         which = np.searchsorted(self.ends, t, side="right")
         out = np.zeros((3, *t.shape))
@@ -140,7 +148,7 @@ class PiecewiseLaw(CheckedFields):
 
 
 class Interpolation(Enum):
-    """How a table is interpolated: by a quintic spline with four continuous derivatives, or by straight lines."""
+    """Interpolation of a table: a quintic spline with four continuous derivatives, or straight lines."""
 
     SPLINE = "spline"
     LINEAR = "linear"
@@ -148,23 +156,23 @@ class Interpolation(Enum):
 
 @dataclass(frozen=True)
 class TabulatedLaw(CheckedFields):
-    """A quintic spline through values at times, or straight lines between them, for loads and torques alone.
+    """Profile interpolated from a table, by a quintic spline or, for loads and torques only, by straight lines.
 
-    Fewer than six points are passed by the polynomial through them.
+    Fewer than six points are interpolated by the polynomial through all of them.
 
     Attributes
     ----------
     times : tuple of float
-        Ascending, at least two [s].
+        Times, ascending, at least two [s].
     values : tuple of float
-        [rad, m, N or N m]
+        Values at the times [rad, m, N or N m].
     interpolation : Interpolation
-        "spline" or "linear".
+        Interpolation, "spline" (default) or "linear".
 
     Raises
     ------
     InputError
-        Too few rows, numbers that are not finite, or times that do not ascend.
+        There are fewer than two rows, a number is not finite, or the times do not ascend.
     """
 
     _table = "law"
@@ -200,32 +208,32 @@ class TabulatedLaw(CheckedFields):
 
     @property
     def linear(self) -> bool:
-        """Whether straight lines join the rows."""
+        """Whether the interpolation is linear."""
         return self.interpolation is Interpolation.LINEAR
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Inner times of a linear table [s]; none of a spline."""
+        """Inner times of a linear table [s]; empty for a spline."""
         return self.times[1:-1] if self.linear else ()
 
     @cached_property
     def stops(self) -> tuple[float, ...]:
-        """Knots at which integration steps end [s]: all, but of a long table only the sharpest kinks."""
+        """Knots at which integration steps end [s]: all of them, or the sharpest kinks of a long table."""
         sharpest = np.argsort(-np.abs(np.diff(self._slopes)), kind="stable")[:_MOST_STOPS]
         return tuple(self.knots[k] for k in np.sort(sharpest)) if self.linear else ()
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Times between which the law is one polynomial of degree five at most [s]."""
+        """Times between which the profile is a polynomial of degree five at most [s]."""
         return self.times
 
     def evaluate(self, t: Array) -> Values:
-        """Value, rate and acceleration at times t; at a kink the rate after it.
+        """Return the value, its rate and its acceleration at times t [s]; at a kink the rate after it.
 
         Raises
         ------
         InputError
-            A time that the table does not cover.
+            The table does not cover a time.
         """
         first, last = self.times[0], self.times[-1]
         slack = _BEYOND_TABLE * (last - first)
@@ -243,22 +251,22 @@ class TabulatedLaw(CheckedFields):
 
 
 def marks(law: AngleLaw) -> tuple[float, ...]:
-    """Times at which a law may be largest between those that are looked at anyhow: its knots and rows [s]."""
+    """Return the times at which a profile may have a peak between samples: its knots and table rows [s]."""
     return (*law.knots, *getattr(law, "breaks", ()))
 
 
 def stops(law: AngleLaw) -> tuple[float, ...]:
-    """Times at which integration steps end [s]: all knots of a law but those that it can do without."""
+    """Return the times at which integration steps end [s]: the `stops` of a profile, by default all its knots."""
     return getattr(law, "stops", law.knots)
 
 
 def check_motion(law: AngleLaw) -> None:
-    """Check that a law can be that of a motion, in which only the acceleration may jump.
+    """Check that a profile is suitable for a prescribed motion, in which only the acceleration may jump.
 
     Raises
     ------
     InputError
-        A jump between pieces of the law or its rate, or a linear table.
+        The profile or its rate jumps between pieces, or it is a linear table.
     """
     if isinstance(law, TabulatedLaw) and law.linear:
         raise InputError(

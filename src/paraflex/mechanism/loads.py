@@ -1,4 +1,4 @@
-"""Forces on a mechanism besides those of motors: springs and dampers at joints, forces and torques."""
+"""Forces on a mechanism other than those of motors: springs, dampers, friction, applied forces and torques."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, option
 
 @dataclass(frozen=True)
 class TorsionalSpring(CheckedFields):
-    """A linear spring at a revolute joint: torque -stiffness (angle of body b less that of body a, less rest) on b.
+    """Linear spring at a joint: torque -stiffness (joint angle - rest) on body b, the angle being that of b less a.
 
-    Like a motor it acts on the material at the joint. Stiffness in N m/rad, rest in rad.
+    The spring acts on the material at the joint, as a motor does. Stiffness in N m/rad, rest in rad, or N/m and m at a
+    joint that slides.
     """
 
     _table = "spring"
@@ -32,9 +33,10 @@ class TorsionalSpring(CheckedFields):
 
 @dataclass(frozen=True)
 class TorsionalDamper(CheckedFields):
-    """Viscous friction at a revolute joint: torque -coefficient (rate of body b less that of body a) on b.
+    """Viscous damper at a joint: torque -coefficient (rate of body b less that of body a) on b.
 
-    Like a motor it acts on the material at the joint. Coefficient in N m s/rad.
+    The damper acts on the material at the joint, as a motor does. Coefficient in N m s/rad, or N s/m at a joint that
+    slides.
     """
 
     _table = "damper"
@@ -46,18 +48,20 @@ class TorsionalDamper(CheckedFields):
 
 @dataclass(frozen=True)
 class JointFriction(CheckedFields):
-    """Dry friction at a joint, regularised: force or torque -limit tanh(rate / speed) against the joint's rate.
+    """Regularised dry friction at a joint: force or torque -limit tanh(rate / speed).
 
-    It acts as a damper of limit / speed below that speed and as Coulomb's friction well above it.
+    Friction acts as a viscous damper of limit / speed below that speed, and as Coulomb friction well above it.
 
     Attributes
     ----------
     name : str
+        Name of the friction law.
     joint : str
+        Name of the joint.
     limit : float
-        [N m] at a revolute joint, [N] at a prismatic joint or slot.
+        Coulomb friction, torque [N m] at a revolute joint, force [N] at a joint that slides.
     speed : float
-        At which three quarters of the limit are reached [rad/s or m/s].
+        Regularisation speed, at which three quarters of the limit are reached [rad/s or m/s].
     """
 
     _table = "friction"
@@ -72,21 +76,23 @@ class JointFriction(CheckedFields):
 
 @dataclass(frozen=True)
 class LinearSpring(CheckedFields):
-    """A spring with a damper between two points, at most one of them on the ground.
+    """Spring with a damper between two points, at most one of them on the ground.
 
-    It pulls with stiffness (distance - length) + damping (rate of the distance). Explicit in Newton's iteration: very
-    stiff ones dictate the step.
+    The tensile force is stiffness (distance - length) + damping (rate of the distance). The force has no part in the
+    Jacobian of Newton's iteration, so very stiff springs limit the step size.
 
     Attributes
     ----------
     name : str
+        Name of the spring.
     a, b : PointRef
+        Points that the spring connects.
     stiffness : float
-        [N/m]
+        Stiffness [N/m].
     length : float
-        Free length [m].
+        Free length [m]; 0 by default.
     damping : float
-        [N s/m]
+        Damping coefficient [N s/m]; 0 by default.
     """
 
     _table = "linear_spring"
@@ -105,14 +111,14 @@ given_as("two numbers or laws in time", "[x, y], each a number or a law in time"
 
 
 def _finite_or_law(values: InTime | tuple[InTime, ...], field: str) -> None:
-    """Check numbers; laws are checked where they are evaluated."""
+    """Check that numbers are finite; profiles are checked on evaluation."""
     several = values if isinstance(values, tuple) else (values,)
     finite([each for each in several if not isinstance(each, AngleLaw)], field)
 
 
 @dataclass(frozen=True)
 class _Load(CheckedFields):
-    """What loads have in common."""
+    """Base class of loads."""
 
     _table = "load"
     kind: ClassVar[str]
@@ -123,22 +129,22 @@ class _Load(CheckedFields):
 
     @property
     def components(self) -> tuple[InTime, ...]:
-        """Force along x and y in the ground frame [N], or the torque [N m]: what the load's last field has."""
+        """Force along x and y in the ground frame [N], or the torque [N m]."""
         given = getattr(self, self.kind)
         return given if isinstance(given, tuple) else (given,)
 
     @property
     def laws(self) -> tuple[AngleLaw, ...]:
-        """Those of the components that are laws in time."""
+        """Components that are profiles in time."""
         return tuple(each for each in self.components if isinstance(each, AngleLaw))
 
     def evaluate(self, t: Array) -> Array:
-        """Components (k, 2) of a force, (k, 1) of a torque, at times t [N, N m].
+        """Evaluate the components at times t (k,) [s]: (k, 2) of a force [N], (k, 1) of a torque [N m].
 
         Raises
         ------
         InputError
-            A law that does not cover a time or is not finite there.
+            A profile does not cover a time or is not finite there.
         """
         try:
             each = [
@@ -149,14 +155,14 @@ class _Load(CheckedFields):
         return np.stack(each, axis=1)
 
     def largest(self, t: Array) -> float:
-        """The largest magnitude at times t, and where a law between them has a knot or a row [N, N m]."""
+        """Return the largest magnitude at times t [s] and at the knots and table rows between them [N, N m]."""
         within = [time for law in self.laws for time in marks(law) if np.min(t) <= time <= np.max(t)]
         return float(np.max(np.linalg.norm(self.evaluate(np.concatenate([t, within])), axis=1)))
 
 
 @dataclass(frozen=True)
 class PointForce(_Load):
-    """A force [N] at a named point of a body, given in the ground frame; each component a number or a law in time."""
+    """Force [N] at a named point of a body, in the ground frame; each component is a number or a profile in time."""
 
     kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
@@ -166,7 +172,7 @@ class PointForce(_Load):
 
 @dataclass(frozen=True)
 class AppliedTorque(_Load):
-    """A torque [N m] on the material at a named point of a body, a number or a law in time."""
+    """Torque [N m] on the material at a named point of a body, a number or a profile in time."""
 
     kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"

@@ -9,11 +9,12 @@ from paraflex.mechanism.mechanism import Mechanism
 
 
 def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:
-    """Independent loops, each by the names of its joints in order.
+    """Return a set of independent loops, each as the names of its joints in order.
 
-    Bodies and the ground are nodes, joints edges. A tree of joints is grown outwards from the ground, nearest bodies
-    first; every joint left over closes a loop with the ways back to where they meet. There are as many as joints less
-    bodies, and they are short where the ground is near.
+    Bodies and the ground are the nodes of a graph, joints its edges. A spanning tree is grown from the ground by
+    breadth-first search; every other joint closes a loop with the tree paths from its bodies to their common ancestor.
+    With a connection to the ground the number of loops is that of joints less that of bodies. Loops near the ground are
+    short.
     """
     parent = _tree(mechanism)
     in_tree = {entry[0] for entry in parent.values() if entry is not None}
@@ -30,7 +31,7 @@ def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:
 
 
 def _tree(mechanism: Mechanism) -> dict[str, tuple[str, str] | None]:
-    """For each body the joint and the body towards the root; None for the root."""
+    """Return for each body the joint and the body towards the root of the spanning tree; None for the root."""
     parent: dict[str, tuple[str, str] | None] = {}
     for root in (GROUND, *(body.name for body in mechanism.bodies)):
         if root in parent:
@@ -48,7 +49,7 @@ def _tree(mechanism: Mechanism) -> dict[str, tuple[str, str] | None]:
 
 
 def _way_back(parent: dict[str, tuple[str, str] | None], body: str) -> list[str]:
-    """Joints from a body to the root of its tree, the nearest first."""
+    """Return the joints from a body to the root of its tree, the nearest first."""
     way = []
     while (step := parent[body]) is not None:
         way.append(step[0])

@@ -1,4 +1,4 @@
-"""What is measured of a mechanism without asking for it: encoders of motors, the end-effector's place."""
+"""Default measurements of a mechanism: encoders of the motors and the position of the end-effector."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from paraflex.mechanism.sensors import Encoder, PositionSensor, Sensor
 
 
 def measured_sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:
-    """An encoder of every motor's joint, the end-effector's place, then the mechanism's own sensors, each name once."""
+    """Return an encoder at every motor's joint, position sensors of the end-effector, and the mechanism's own sensors.
+
+    A default sensor whose name is that of one of the mechanism's own sensors is omitted.
+    """
     joints = dict.fromkeys(motor.joint for motor in mechanism.motors)
     found: list[Sensor] = [Encoder(joint, joint) for joint in joints]
     effector = mechanism.end_effector
@@ -20,5 +23,5 @@ def measured_sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:
 
 
 def encoders_of(mechanism: Mechanism, motors: Container[str]) -> tuple[str, ...]:
-    """Names of the encoders of some motors, those of their joints, each once."""
+    """Return the names of the encoders of the given motors, which are those of their joints, without duplicates."""
     return tuple(dict.fromkeys(motor.joint for motor in mechanism.motors if motor.name in motors))

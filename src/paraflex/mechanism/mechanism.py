@@ -1,4 +1,4 @@
-"""The mechanism: its members, checked when it is made, and variants with other bodies."""
+"""Mechanism: its members, checked on construction, and variants with other bodies."""
 
 from __future__ import annotations
 
@@ -24,82 +24,92 @@ from paraflex.mechanism.tracks import with_meshes
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Mechanism(Members, Shown):
-    """A planar mechanism of rigid bodies and flexible beams. Checked when it is made.
+    """Planar mechanism of rigid and flexible bodies, checked on construction.
 
     Attributes
     ----------
     name : str
+        Name of the mechanism.
     ground : mapping
         Named points fixed in the ground frame [m].
     bodies : tuple of RigidBody, FlexibleBeam, AssumedModesBeam or ModalBody
+        Bodies of the mechanism, at least one.
     joints : tuple of Joint
-        Of any kind: RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint, WeldJoint,
+        Joints of any kind: RevoluteJoint, PrismaticJoint, SlotJoint, SlidingJoint, WeldJoint,
         DistanceJoint.
     motors : tuple of Motor
-        Their order is that of the signs in a mode such as "+-+-".
+        Motors, in the order of the signs of an actuation mode such as "+-+-".
     prescribed : tuple of PrescribedAngle
-        Joint angles given in time.
+        Joint angles prescribed as functions of time.
     springs : tuple of TorsionalSpring
+        Springs at joints.
     dampers : tuple of TorsionalDamper
+        Viscous dampers at joints.
     frictions : tuple of JointFriction
+        Dry friction at joints.
     linear_springs : tuple of LinearSpring
+        Springs with dampers between points.
     loads : tuple of PointForce or AppliedTorque
+        Applied forces and torques.
     sensors : tuple of Sensor
-        Of any kind: Encoder, Tachometer, PositionSensor, VelocitySensor, AccelerationSensor, StrainGauge,
-        JointForceSensor, DeflectionSensor. They do not act on it.
+        Sensors of any kind: Encoder, Tachometer, PositionSensor, VelocitySensor, AccelerationSensor, StrainGauge,
+        JointForceSensor, DeflectionSensor. They do not act on the mechanism.
     gears : tuple of Gear
-        Each with its phase.
+        Gears, each with its phase.
     sums : tuple of SumRelation
-        Relations of two joints and more, each with its phase.
+        Relations of two or more joints, each with its phase.
     actuators : tuple of Actuator
-        What motors are: gears, rotors, windings and amplifiers. Motors without one give torques as they are asked.
+        Gears, rotors, windings and amplifiers of motors. A motor without an actuator applies the commanded torque.
     gravity : (x, y)
-        Acceleration of free fall in the ground frame [m/s^2]; none by default.
+        Gravitational acceleration in the ground frame [m/s^2]; zero by default.
     end_effector : EndEffector, optional
+        Point whose motion is the task.
     assemblies : tuple of Assembly
-        The first is the default.
+        Assemblies of the mechanism; the first is the default.
     modes : tuple of ActuationMode
-        The modes to choose from by default; any other set of motors may be asked for.
+        Actuation modes to choose from by default; any other set of motors may be requested.
     geometry : Geometry or str
-        Of its flexible beams: "second-order" by default, "linear" in the paper.
+        Geometry of the flexible beams: "second-order" by default, "linear" in the paper.
     description : str
+        Description of the mechanism for its readers.
     payload : Payload or None
-        What `with_payload` has added to the body that carries the end-effector, for drawings and lists.
+        Payload that `with_payload` has added to the body of the end-effector, for drawings and tables.
     bases : mapping of str to (own, kept) nested sequence
-        Flexible coordinates that bodies keep, as combinations of all that their reference conditions leave them: see
-        `reduce_bodies`.
+        Reduced basis of each body named: retained flexible coordinates as combinations of all coordinates that its
+        reference condition leaves, see `reduce_bodies`.
     cut : Cut or None
-        The mechanism as described, of one that was made for computing: of segments, or of beams in several frames.
+        Mechanism as described by the user, if this one was derived from it for computation: with finite segments,
+        beams in several frames or rotors.
 
     Raises
     ------
     InputError
-        Anything that does not fit together: see `mechanism.checks`.
+        The members are inconsistent: see `mechanism.checks`.
     """
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_mechanism(self)
         object.__setattr__(self, "bodies", with_meshes(self))
-        # The checks have looked bodies up by name.
+        # The checks have cached the bodies by name.
         self.__dict__.pop("_bodies_by_name", None)
         for field, members in with_phases(self).items():
             object.__setattr__(self, field, members)
         self.__dict__.pop("_joints_by_name", None)
 
     def save(self, path: str | Path) -> None:
-        """Write the model file of this mechanism, from which `load` reads an equal one; see `Model.save`."""
-        # `files` is above `mechanism`, so it is imported when a file is written.
+        """Write the model file of this mechanism, from which `load` reads an equal mechanism; see `Model.save`."""
+        # `files` is a layer above `mechanism`, so it is imported only when a file is written.
         import_module("paraflex.files").Model(self).save(path)
 
     @classmethod
     def made_of(cls, given: object) -> Mechanism:
-        """The mechanism of a model, or the mechanism itself.
+        """Return the mechanism of a model, or the given mechanism.
 
         Raises
         ------
         InputError
-            Anything else.
+            The argument is neither a mechanism nor a model.
         """
         taken = given if isinstance(given, cls) else cls.taken_from(given)
         if taken is None:
@@ -108,21 +118,21 @@ class Mechanism(Members, Shown):
 
     @checked_arguments()
     def with_bodies(self, bodies: Iterable[Body]) -> Mechanism:
-        """The same mechanism with other bodies in place of those of the same names."""
+        """Return the mechanism with the given bodies in place of those of the same names."""
         new = {body.name: body for body in bodies}
         return replace(self, bodies=tuple(new.get(body.name, body) for body in self.bodies))
 
     @checked_arguments()
     def with_payload(self, payload: Payload) -> Mechanism:
-        """The mechanism with a payload at its end-effector, in addition to what the body there has.
+        """Return the mechanism with a payload at its end-effector, in addition to the mass that the body there has.
 
-        A rigid body gets the mass, centre of mass and moment of inertia of both; a beam a lump at the point, or a
-        heavier one; a body of given matrices those with the payload.
+        A rigid body receives the combined mass, centre of mass and moment of inertia. A beam receives a lump at the
+        point, or a heavier one. The matrices of a body given by matrices are updated.
 
         Raises
         ------
         InputError
-            No end-effector; an offset on a flexible body.
+            There is no end-effector, or the payload has an offset on a flexible body.
         """
         effector = self.end_effector
         if effector is None:
@@ -132,12 +142,12 @@ class Mechanism(Members, Shown):
 
     @checked_arguments()
     def rigid(self, names: Sequence[str] | None = None) -> Mechanism:
-        """The mechanism with the named bodies rigid; with all of them it is the RDM of Remark 3.
+        """Return the mechanism with the named bodies rigid, by default all: the RDM of Remark 3.
 
         Raises
         ------
         InputError
-            If a name is not that of a body.
+            A name is not that of a body.
         """
         for name in names or ():
             known(name, [body.name for body in self.bodies], "rigid", "body")
@@ -154,23 +164,25 @@ class Mechanism(Members, Shown):
         modes: int | None = None,
         reduction: BodyReduction | str | None = None,
     ) -> Mechanism:
-        """The mechanism with another mesh, reference condition, element variant or reduction on every flexible beam.
+        """Return the mechanism with another mesh, reference condition, curvature or reduction of every flexible beam.
 
         Parameters
         ----------
         elements : int, optional
-            Elements per span, the same for all.
+            Number of elements per span, the same for all spans; by default unchanged, as all that follow.
         reference : ReferenceCondition or str, optional
+            Reference condition of the floating frames.
         curvature : Curvature or str, optional
+            Continuity of the curvature at lumped moments of inertia.
         modes : int, optional
-            Modes of lowest frequency kept of each, and of each other flexible body.
+            Number of modes of lowest frequency that each beam, and each other flexible body, retains.
         reduction : BodyReduction or str, optional
-            Of which kind these are of beams: "modal" or "craig-bampton".
+            Reduction of the beams: "modal" or "craig-bampton".
 
         Raises
         ------
         InputError
-            Another mesh, condition or curvature for a flexible body of given shapes, or an unknown one.
+            A mesh, condition or curvature is given and a flexible body has user-defined shapes, or it is unknown.
         """
         reference = None if reference is None else as_enum(ReferenceCondition, reference, "reference")
         curvature = None if curvature is None else as_enum(Curvature, curvature, "curvature")
@@ -190,12 +202,12 @@ class Mechanism(Members, Shown):
 
     @checked_arguments()
     def refined(self, factor: int) -> Mechanism:
-        """The mechanism with a multiple of the elements on every span of its flexible beams.
+        """Return the mechanism with `factor` times as many elements on every span of its flexible beams.
 
         Raises
         ------
         InputError
-            A flexible body of given shapes, which has no elements, and a factor other than 1.
+            A flexible body has user-defined shapes and hence no elements, and the factor is not 1.
         """
         if factor != 1:
             self._refuse_given_shapes("elements")
@@ -216,11 +228,11 @@ class Mechanism(Members, Shown):
 
     @checked_arguments()
     def with_geometry(self, geometry: Geometry | str) -> Mechanism:
-        """The mechanism with linear or second-order geometry of its flexible beams.
+        """Return the mechanism with linear or second-order geometry of its flexible beams.
 
         Raises
         ------
         InputError
-            Neither of the two.
+            The geometry is neither of the two.
         """
         return replace(self, geometry=as_enum(Geometry, geometry, "geometry"))

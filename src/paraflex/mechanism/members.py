@@ -1,4 +1,4 @@
-"""The members of a mechanism, found by name."""
+"""Members of a mechanism, looked up by name."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TASK_COORDINATES = ("x", "y", "angle")
 
 @dataclass(frozen=True)
 class EndEffector(CheckedFields):
-    """The point whose motion is prescribed, and which of its coordinates are the task: "x", "y", "angle", each once."""
+    """Point whose motion is the task, and its task coordinates: any of "x", "y" and "angle", each once."""
 
     _table = "end_effector"
 
@@ -57,23 +57,24 @@ class EndEffector(CheckedFields):
 
     @classmethod
     def taken_from(cls, given: object, field: str) -> EndEffector | None:
-        """The end-effector at a point; None for anything else."""
+        """Return the end-effector at a point given as "body.point"; None for anything else."""
         return cls(PointRef.parse(given, str(field))) if isinstance(given, str) else None
 
 
 @dataclass(frozen=True)
 class Assembly(CheckedFields):
-    """One assembly of the mechanism, given by an approximate angle [rad] of each body.
+    """Assembly of the mechanism, given by an approximate angle of each body.
 
-    The solver closes the loops from there; several assemblies of one mechanism differ in their elbows.
+    The solver closes the loops from there. Several assemblies of a mechanism differ in the configuration of its elbows.
 
     Attributes
     ----------
     name : str
+        Name of the assembly.
     angles : mapping of str to float
-        Of all bodies, or of those whose angles do not follow from points [rad].
+        Approximate angles of all bodies, or of those whose angles do not follow from points [rad].
     points : mapping of PointRef to (x, y)
-        Approximate places in the ground frame [m].
+        Approximate positions of points in the ground frame [m].
     """
 
     _table = "assembly"
@@ -85,7 +86,7 @@ class Assembly(CheckedFields):
 
 @dataclass(frozen=True)
 class ActuationMode(CheckedFields):
-    """A set of active motors; the others turn freely."""
+    """Named set of active motors; all other motors are passive and exert no torque."""
 
     _table = "mode"
 
@@ -98,14 +99,14 @@ given_as("an actuation mode", _MODE)(str | ActuationMode)
 
 
 class Geometry(Enum):
-    """Dependence of a beam's shape on its flexible coordinates.
+    """Order of a beam's displacements in its flexible coordinates.
 
     LINEAR
-        As in the paper: displacements linear in the coordinates. A bent beam does not get shorter; where axial forces
-        are large the answer is wrong, by how much depends on the reference condition.
+        Displacements linear in the coordinates, as in the paper. Foreshortening is neglected: results are wrong where
+        axial forces are large, with an error that depends on the reference condition.
     SECOND_ORDER
-        With the shortening by bending, kept through inertia, joints and their Jacobians: right where axial forces are
-        large.
+        Displacements with the foreshortening by bending, included in inertia, joints and their Jacobians. Results are
+        correct where axial forces are large.
     """
 
     LINEAR = "linear"
@@ -115,9 +116,9 @@ class Geometry(Enum):
 @given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Members(CheckedFields):
-    """The members of a mechanism, found by name: see `Mechanism`, which is made of them and checked.
+    """Members of a mechanism, looked up by name: the unchecked base of `Mechanism`, which describes the fields.
 
-    A field with a `group` is a group of members: files, checks, engines and tables go through these.
+    A field with a `group` in its metadata is a group of members. Files, checks, engines and tables iterate over these.
     """
 
     name: str
@@ -143,31 +144,31 @@ class Members(CheckedFields):
     gravity: tuple[float, float] = (0.0, 0.0)
     geometry: Geometry = Geometry.SECOND_ORDER
     description: str = field(default="", compare=False)
-    # The body that carries it has it, so that it is no part of what is compared, saved or simulated.
+    # The body that carries it includes it, so it takes no part in comparison, saving and simulation.
     payload: Payload | None = field(default=None, compare=False, repr=False)
-    # Flexible coordinates (own, kept) that were chosen for bodies by name, by a reduction along a motion.
+    # Reduced bases (own, kept) of bodies by name, from a reduction along a motion.
     bases: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict, repr=False)
-    # Where it was made of another for computing.
+    # Present if this mechanism was derived from another one for computation.
     cut: Cut | None = field(default=None, compare=False, repr=False)
 
     @property
     def described(self) -> Self:
-        """The mechanism as the user described it: itself, unless it was made of another for computing."""
+        """Mechanism as the user described it: this one, unless it was derived from another one for computation."""
         return self if self.cut is None else self.cut.whole
 
     @classmethod
     def taken_from(cls, given: object, field: str = "mechanism") -> Self | None:
-        """The mechanism of a model; None for anything else, such as a task or a run."""
+        """Return the mechanism of a model; None for anything else, such as a task or a run."""
         paths, mechanism = getattr(given, "paths", None), getattr(given, "mechanism", None)
         return mechanism if isinstance(paths, Mapping) and isinstance(mechanism, cls) else None
 
     def body(self, name: str) -> Body:
-        """The body of that name; an `InputError` if there is none."""
+        """Return the body of a name; raise an `InputError` if there is none."""
         known(name, self._bodies_by_name, "body", "body")
         return self._bodies_by_name[name]
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name; an `InputError` if there is none."""
+        """Return the joint of a name; raise an `InputError` if there is none."""
         known(name, self._joints_by_name, "joint", "joint")
         return self._joints_by_name[name]
 
@@ -181,17 +182,17 @@ class Members(CheckedFields):
 
     @property
     def relations(self) -> tuple[Relation, ...]:
-        """Gears, and all other members that relate the coordinates of joints."""
+        """Gears and all other members that relate the coordinates of joints."""
         return tuple(one for group, members in grouped(self) if group.relates for one in members)
 
     @cached_property
     def points(self) -> Mapping[str, Mapping[str, object]]:
-        """Named points of every body, and of the ground by its name."""
+        """Named points of every body and of the ground, by the name of the body or "ground"."""
         return {GROUND: self.ground} | {body.name: body.points for body in self.bodies}
 
     @cached_property
     def joints_at(self) -> Mapping[str, list[Joint]]:
-        """Joints of every body and of the ground, in the order of the mechanism."""
+        """Joints at every body and at the ground, in the order of the mechanism."""
         found: dict[str, list[Joint]] = {name: [] for name in self.points}
         for joint in self.joints:
             for name in dict.fromkeys((joint.a.body, joint.b.body)):
@@ -200,13 +201,13 @@ class Members(CheckedFields):
 
     @property
     def points_used(self) -> set[PointRef]:
-        """Points that a joint, a spring, a load or another member names, or the end-effector."""
+        """Points that a joint, a spring, a load, another member or the end-effector refers to."""
         used = {point for _, members in grouped(self) for one in members for point in points_named(one).values()}
         return used if self.end_effector is None else used | {self.end_effector.point}
 
     @checked_arguments()
     def reached(self, start: str, past: str = "") -> set[str]:
-        """A body or the ground, and all bodies that joints connect with it without passing another body."""
+        """Return the bodies that joints connect with a body or the ground, itself included, not by way of `past`."""
         known(start, self.joints_at, "start", "body")
         seen, waiting = {start, past}, [start]
         while waiting:
@@ -217,29 +218,29 @@ class Members(CheckedFields):
         return seen - {past}
 
     def slides(self, joint: str) -> bool:
-        """Whether a joint, given by its name, has a travel and not an angle."""
+        """Return whether the coordinate of the named joint is a travel, not an angle."""
         return self.joint(joint).slides
 
     def motor_units(self) -> tuple[str, ...]:
-        """Units of the motors' torques: N m, or N where the joint slides."""
+        """Return the units of the motors' torques: N m, or N where the joint slides."""
         return tuple("N" if self.slides(motor.joint) else "N m" for motor in self.motors)
 
     def sensor_units(self) -> tuple[str, ...]:
-        """Units of the sensors' readings."""
+        """Return the units of the sensors' readings."""
         return tuple(self.sensor_unit(sensor) for sensor in self.sensors)
 
     @checked_arguments()
     def sensor_unit(self, sensor: Sensor) -> str:
-        """Unit of a sensor's readings, which those at joints have of the joint's kind."""
+        """Return the unit of a sensor's readings, which may depend on whether its joint turns or slides."""
         return sensor.unit(any(self.slides(joint) for _, joint, _ in joints_named(sensor)))
 
     def assembly(self, name: str | None = None) -> Assembly:
-        """The assembly of that name, or the first.
+        """Return the assembly of a name, by default the first.
 
         Raises
         ------
         InputError
-            If there is none.
+            There is no such assembly.
         """
         names = ", ".join(assembly.name for assembly in self.assemblies)
         for assembly in self.assemblies:

@@ -1,4 +1,4 @@
-"""A flexible body given by its matrices, from any finite-element program or by hand."""
+"""Flexible body given by its matrices, from a finite-element program or entered by hand."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from paraflex.mechanism.quantities import in_unit, positive
 Row = Sequence[float]
 Matrix = Sequence[Sequence[float]]
 
-# Largest deviation of a matrix from symmetric or skew, as a fraction of its largest entry: lost digits.
+# Admissible asymmetry of a symmetric or skew matrix, relative to its largest entry: digits lost in files.
 _ASYMMETRY = 1e-6
-# Smallest eigenvalue of a matrix scaled to a unit diagonal that counts as positive.
+# Smallest positive eigenvalue of a matrix scaled to a unit diagonal; smaller ones are regarded as zero.
 _SMALLEST_EIGENVALUE = 1e-12
 
 
 @dataclass(frozen=True)
 class ModalPoint(CheckedFields):
-    """A material point of a body of given matrices; nf flexible coordinates.
+    """Material point of a body given by matrices, with nf flexible coordinates.
 
     Attributes
     ----------
     position : (x, y)
-        Undeformed, in the body frame [m].
+        Undeformed position in the body frame [m].
     shape : (2, nf) nested sequence
         Displacement per flexible coordinate in the body frame, N.
     slope : (nf,) sequence
-        Turn of the material there per flexible coordinate, N2'.
+        Rotation of the material per flexible coordinate, N2'.
     """
 
     _table = "point"
@@ -50,53 +50,55 @@ class ModalPoint(CheckedFields):
 
 
 class DeformableBody(CheckedFields):
-    """A body with flexible coordinates, which may be held at zero: its field `flexible` says so."""
+    """Body with flexible coordinates, which are held at zero if its field `flexible` is False."""
 
     _table = "body"
 
     def as_rigid(self) -> Self:
-        """The same body without flexibility."""
+        """Return the body without flexibility."""
         return replace(self, flexible=False)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True)
 class ModalBody(DeformableBody):
-    """A flexible body given by its constants, with a displacement linear in nf flexible coordinates u of any kind.
+    """Flexible body given by its constants, with displacements linear in nf flexible coordinates u of any kind.
 
-    The symbols are those of the theory, with s0 the place of a mass element dm in the undeformed body and N its
-    displacement per coordinate. Lumped moments of inertia count in `inertia`, `mass_matrix` and `G1`. Coordinates
-    must not move the body as a whole.
+    The symbols are those of the theory: s0 is the undeformed position of a mass element dm and N its displacement per
+    coordinate. `inertia`, `mass_matrix` and `G1` include lumped moments of inertia. The coordinates must not contain a
+    rigid motion of the body.
 
     Attributes
     ----------
     name : str
+        Name of the body.
     mass : float
-        [kg]
+        Mass [kg].
     first_moment : (2,) sequence
-        int s0 dm [kg m].
+        First moment S1, int s0 dm [kg m].
     inertia : float
-        About the body frame's origin [kg m^2].
+        Moment of inertia about the origin of the body frame, I0 + J [kg m^2].
     mass_matrix : (nf, nf) nested sequence
-        Of the flexible coordinates.
+        Mass matrix of the flexible coordinates, Mff.
     stiffness : (nf, nf) nested sequence
+        Stiffness matrix of the flexible coordinates, K.
     S2 : (2, nf) nested sequence
-        int N dm.
+        Inertia integral int N dm.
     I1 : (nf,) sequence
-        int s0^T N dm.
+        Inertia integral int s0^T N dm.
     G1 : (nf,) sequence
-        int (x N_y - y N_x) dm, and sum J N2' of lumped moments of inertia.
+        Inertia integral int (x N_y - y N_x) dm plus sum J N2' over lumped moments of inertia.
     G2 : (nf, nf) nested sequence
-        int N_x^T N_y - N_y^T N_x dm, skew.
+        Inertia integral int N_x^T N_y - N_y^T N_x dm, skew-symmetric.
     I2 : (nf, nf) nested sequence, optional
-        int N^T N dm; the mass matrix, unless lumped moments of inertia add to that.
+        Inertia integral int N^T N dm; by default the mass matrix, which is right without lumped moments of inertia.
     points : mapping of str to ModalPoint
-        The first and the last are its ends, of which results tell.
+        Named points; the first and the last are the ends, at which results report deflections.
     modes : int, optional
-        Modes of lowest frequency kept as flexible coordinates; all by default.
-    damping : RayleighDamping or ModalDamping, optional
-        None by default.
+        Number of modes of lowest frequency retained as flexible coordinates; all by default.
+    damping : RayleighDamping, ModalDamping or LossFactor, optional
+        Structural damping; none by default.
     flexible : bool
-        False holds all flexible coordinates at zero: the same inertia, rigid.
+        False holds all flexible coordinates at zero: a rigid body of the same inertia.
     """
 
     _own = ("first_moment", "mass_matrix", "stiffness", "S2", "I1", "G1", "G2", "I2")
@@ -127,13 +129,12 @@ class ModalBody(DeformableBody):
 
     @property
     def integrals(self) -> ShapeIntegrals:
-        """Constants of the body, checked.
+        """Shape integrals of the body, checked.
 
         Raises
         ------
         InputError
-            Sizes that do not fit together, a number that is not finite, a matrix that is not symmetric, skew or
-            positive definite.
+            Sizes are inconsistent, a number is not finite, or a matrix is not symmetric, skew or positive definite.
         """
         n = self.n_flexible
         if not n:
@@ -159,12 +160,12 @@ class ModalBody(DeformableBody):
         return integrals
 
     def point(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position (2,), shape (2, nf) and slope (nf,) of a named point.
+        """Return position (2,), shape (2, nf) and slope (nf,) of a named point.
 
         Raises
         ------
         InputError
-            Sizes that do not fit, or a number that is not finite.
+            A size is inconsistent, or a number is not finite.
         """
         n, point, where = self.n_flexible, self.points[name], f"points.{name}"
         return (
@@ -175,7 +176,7 @@ class ModalBody(DeformableBody):
 
 
 def _check_definite(s: ShapeIntegrals) -> None:
-    """Check that the undeformed body's mass matrix, its stiffness and its Mff - I2 are positive (semi-)definite."""
+    """Check that mass matrix and stiffness of the undeformed body and Mff - I2 are positive (semi-)definite."""
     _definite(s.Mff, "mass_matrix", "check it for coordinates that others make up")
     _definite(s.K, "stiffness", "leave out coordinates that move the body as a whole: its frame does that")
     rigid = np.array([[s.m, 0.0, -s.S1[1]], [0.0, s.m, s.S1[0]], [-s.S1[1], s.S1[0], s.I0]])
@@ -201,7 +202,7 @@ def _definite(matrix: np.ndarray, field: str, remedy: str) -> None:
 
 
 def _symmetric(matrix: np.ndarray, field: str, sign: float = 1.0) -> np.ndarray:
-    """The symmetric part of a matrix that is symmetric up to lost digits; with sign -1 the skew part."""
+    """Return the symmetric part of a nearly symmetric matrix, or with sign -1 the skew part of a nearly skew one."""
     other = sign * matrix.T
     if np.max(np.abs(matrix - other)) > _ASYMMETRY * np.max(np.abs(matrix)):
         raise InputError(
@@ -228,7 +229,7 @@ def _array(values: Any, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def _freeze(instance: Any, names: Iterable[str]) -> None:
-    """Turn arrays and lists into tuples, which compare by value."""
+    """Replace arrays and lists by tuples, which compare by value."""
     for name in names:
         object.__setattr__(instance, name, _tuples(getattr(instance, name)))
 

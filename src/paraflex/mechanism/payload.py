@@ -1,4 +1,4 @@
-"""A payload at the end-effector: the body that carries it, with its mass and moment of inertia."""
+"""Payload at the end-effector, and bodies with additional mass and moment of inertia."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from paraflex.mechanism.quantities import check_numbers, finite, in_unit, not_ne
 
 @dataclass(frozen=True)
 class Payload(CheckedFields):
-    """A mass that the end-effector carries, fixed to its point.
+    """Mass fixed to the point of the end-effector.
 
     Attributes
     ----------
     mass : float
-        [kg]
+        Mass [kg].
     inertia : float
-        About its centre of mass [kg m^2].
+        Moment of inertia about the payload's centre of mass [kg m^2]; 0 by default.
     offset : (x, y)
-        From the end-effector's point to its centre of mass, in the frame of the body that carries it [m].
+        Vector from the end-effector's point to the payload's centre of mass in the frame of the body [m]; 0 by default.
     """
 
     _table = "payload"
@@ -41,19 +41,19 @@ class Payload(CheckedFields):
 
 
 def together(one: Payload | None, other: Payload) -> Payload:
-    """Two payloads as one, about their common centre of mass."""
+    """Combine two payloads into one, about their common centre of mass."""
     if one is None or not one.mass + other.mass:
         return other
     return Payload(*_as_one((one.mass, other.mass), (one.inertia, other.inertia), (one.offset, other.offset)))
 
 
 def loaded(body: Body, point: str, payload: Payload) -> Body:
-    """A body with a payload at one of its points, in addition to what it has.
+    """Return a body with a payload at one of its points, in addition to the mass that it has.
 
     Raises
     ------
     InputError
-        An offset from the centre line of a beam, or from a point of a body of given matrices.
+        The payload has an offset, and the body is a beam or given by matrices.
     """
     if any(payload.offset) and not isinstance(body, RigidBody):
         raise InputError(
@@ -66,16 +66,18 @@ def loaded(body: Body, point: str, payload: Payload) -> Body:
 def with_lump(
     body: Body, point: str, mass: float, inertia: float = 0.0, offset: tuple[float, float] = (0.0, 0.0)
 ) -> Body:
-    """A body with a mass and a moment of inertia at one of its points, in addition to what it has; not checked.
+    """Return a body with an additional mass and moment of inertia at one of its points, without checks.
 
     Parameters
     ----------
     body : Body
+        Body to which the mass is added.
     point : str
+        Name of a point of the body.
     mass, inertia : float
-        [kg], and about that mass's centre [kg m^2].
+        Additional mass [kg], and its moment of inertia about its own centre of mass [kg m^2].
     offset : (x, y)
-        From the point to that centre in the body frame, of a rigid body [m].
+        Vector from the point to that centre in the frame of a rigid body [m]; ignored for other bodies.
     """
     if isinstance(body, RigidBody):
         places = (body.centre_of_mass, np.add(body.points[point], offset))
@@ -90,7 +92,7 @@ def with_lump(
 
 
 def _as_one(masses: Sequence[float], inertias: Sequence[float], places: Sequence[Any]) -> tuple[Any, Any, Any]:
-    """Mass, moment of inertia and centre of mass of two bodies as one: Steiner's theorem."""
+    """Return mass, moment of inertia and centre of mass of two bodies combined, by the parallel axis theorem."""
     m, at = np.array(masses), np.array(places)
     centre = m @ at / m.sum()
     inertia = np.array(sum(inertias) + m @ np.sum((at - centre) ** 2, axis=1))
@@ -98,7 +100,7 @@ def _as_one(masses: Sequence[float], inertias: Sequence[float], places: Sequence
 
 
 def _with_point_mass(body: ModalBody, point: str, mass: float, inertia: float) -> ModalBody:
-    """The constants of a body with what a mass element and a lumped moment of inertia at a point add to each."""
+    """Return a body given by matrices with the terms of a point mass and a lumped moment of inertia added."""
     (x, y), (along, across), slope = body.point(point)
     shape = np.array([along, across])
     translation = mass * shape.T @ shape

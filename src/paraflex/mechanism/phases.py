@@ -1,4 +1,4 @@
-"""Phases of relations and lengths of distance joints that are not given, by the first assembly."""
+"""Default phases of relations and lengths of distance joints, from the first assembly."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from paraflex.mechanism.quantities import positive
 
 
 def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:
-    """The joints and relations of a mechanism by the fields that have them, each with its length or phase.
+    """Return the joints and relations of a mechanism by field, with their missing lengths and phases filled in.
 
     Raises
     ------
     InputError
-        One without a length or phase where there is no assembly to take it from.
+        A length or phase is not given, and no assembly determines it.
     """
     found: dict[str, tuple[Any, ...]] = {
         "joints": tuple(_with_length(mechanism, one) if one.length is None else one for one in mechanism.joints)
@@ -34,7 +34,7 @@ def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:
 
 
 def _with_length(mechanism: Members, joint: Any) -> Joint:
-    """A joint that keeps a distance, with that of its points in the first assembly."""
+    """Return a distance joint with the distance of its points in the first assembly."""
     field = f"joint.{joint.name}.length"
     a, b = _in_first(mechanism, "the length", field, "give it in m", _place, (joint.a, joint.b))
     positive(dist(a, b), field, f"m: {joint.a} and {joint.b} coincide in assembly {mechanism.assemblies[0].name}")
@@ -42,7 +42,7 @@ def _with_length(mechanism: Members, joint: Any) -> Joint:
 
 
 def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
-    """A relation with its phase in the first assembly."""
+    """Return a relation with its phase in the first assembly."""
     field, shares = f"{group.table}.{relation.name}.phase", relation.shares
     joints = [mechanism.joint(name) for name in shares]
     remedy = "give it in rad (in m where the second joint slides)"
@@ -51,7 +51,7 @@ def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
 
 
 def _in_first(mechanism: Members, what: str, field: str, remedy: str, value: Callable[..., Any], of: Any) -> list[Any]:
-    """Values of points or joints in the first assembly, for a field that is not given."""
+    """Return values of points or joints in the first assembly, for a field that is not given."""
     if not mechanism.assemblies:
         raise InputError(
             f"{what} is not given, and there is no assembly to take it from", field=field,
@@ -69,7 +69,7 @@ def _in_first(mechanism: Members, what: str, field: str, remedy: str, value: Cal
 
 
 def _place(mechanism: Members, ref: PointRef, poses: dict[str, Pose]) -> Place | None:
-    """Place of a point at approximate poses of the bodies [m]; None if it is not known."""
+    """Return the position of a point at approximate poses of the bodies [m]; None if it is not known."""
     if ref.on_ground:
         return mechanism.ground[ref.point]
     pose = poses[ref.body]
@@ -77,7 +77,7 @@ def _place(mechanism: Members, ref: PointRef, poses: dict[str, Pose]) -> Place |
 
 
 def joint_value(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:
-    """A joint's angle or travel at approximate poses of the bodies; None if a pose or place is not known."""
+    """Return a joint's angle [rad] or travel [m] at approximate poses; None if a pose or position is not known."""
     if any(not ref.on_ground and ref.body not in poses for ref in (joint.a, joint.b)):
         return None
     turn_a, turn_b = (0.0 if ref.on_ground else poses[ref.body].angle for ref in (joint.a, joint.b))

@@ -1,4 +1,4 @@
-"""Approximate poses of bodies from the angles and places of points of an assembly, and the joints between them."""
+"""Approximate poses of bodies from the angles and the point positions of an assembly, by way of the joints."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SAME_PLACE = 1e-9
 
 @dataclass(frozen=True)
 class Pose:
-    """Angle of a body [rad], and the place of its frame's origin [m] if points determine it."""
+    """Angle of a body [rad], and the position of its frame's origin [m] if points determine it."""
 
     angle: float
     position: Place | None = None
@@ -28,15 +28,15 @@ class Pose:
 
 @checked_arguments()
 def approximate_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
-    """The pose of every undeformed body: its angle as given, or from two known points.
+    """Compute the pose of every undeformed body, its angle as given or from two known points.
 
-    Known are points on the ground, points the assembly gives, points joined to known ones, and all points of a body
-    whose pose is known.
+    Known points are those on the ground, those that the assembly gives, points joined to known ones, and all points of
+    a body whose pose is known.
 
     Raises
     ------
     InputError
-        A body whose angle is neither given nor follows.
+        The angle of a body is neither given nor determined by points.
     """
     poses: dict[str, Pose] = {name: Pose(angle) for name, angle in assembly.angles.items()}
     if assembly.points:
@@ -51,9 +51,9 @@ def approximate_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]
 
 
 def placed_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
-    """Poses with the places that follow from the angles, without closing loops.
+    """Compute poses with the positions that follow from the angles, without closing loops.
 
-    A slider that hangs on nothing else is where its axis begins.
+    A slider that is held by nothing else is placed at the start of its axis.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def placed_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
 
 
 def _joined(mechanism: Members, body: str) -> str:
-    """Addition to an error on a body that fewer than two joints hold: one may be missing."""
+    """Return a hint for the error message about a body with fewer than two joints: one may be missing."""
     names = [joint.name for joint in mechanism.joints_at[body]]
     if not names:
         return "; no joint holds it: is one missing?"
@@ -75,11 +75,11 @@ def _joined(mechanism: Members, body: str) -> str:
 def _from_points(
     mechanism: Members, angles: Mapping[str, float], points: Mapping[PointRef, Place], *, sliding: bool = False
 ) -> dict[str, Pose]:
-    """Poses with places; passes over joints and bodies until nothing more is known, then over joints that slide."""
+    """Return poses with positions, by iteration over joints and bodies; sliding joints are used last, if at all."""
     poses: dict[str, Pose] = {}
     known: dict[PointRef, Place] = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()}
     known |= points
-    # Other joints do not determine the place of a point.
+    # Other joints do not determine the position of a point.
     for telling in ({"points"}, {"points", "axis"})[: 1 + sliding]:
         before = -1
         while before < len(known) + len(poses):
@@ -94,7 +94,7 @@ def _from_points(
                     local = local_points(body)
                     found = {name: known[ref] for name in local if (ref := PointRef(body.name, name)) in known}
                     if sliding:
-                        # A gap that the angles leave is at one joint.
+                        # One point only: approximate angles leave a gap, which is then at a single joint.
                         found = dict([*found.items()][:1])
                     pose = _fit(local, found, angles.get(body.name))
                     if pose is not None:
@@ -105,7 +105,7 @@ def _from_points(
 
 
 def local_points(body: Body) -> Mapping[str, Place]:
-    """Named points in the frame of the undeformed body [m]."""
+    """Return the named points of the undeformed body in its frame [m]."""
     if isinstance(body, RigidBody):
         return body.points
     if isinstance(body, ModalBody):
@@ -114,7 +114,7 @@ def local_points(body: Body) -> Mapping[str, Place]:
 
 
 def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | None) -> Pose | None:
-    """The pose that brings points of a body nearest to their known places; None where these are too few."""
+    """Return the least-squares pose for the known positions of a body's points; None if these are too few."""
     if not found:
         return None
     n = len(found)
@@ -125,7 +125,7 @@ def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | 
         size = max(hypot(x - cx, y - cy) for x, y in local.values())
         if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) <= _SAME_PLACE * size:
             return None
-        # Best fit in the sense of least squares.
+        # Angle of the least-squares fit.
         angle = atan2(
             sum(ax * by - ay * bx for ax, ay, bx, by in arms), sum(ax * bx + ay * by for ax, ay, bx, by in arms)
         )
@@ -134,7 +134,7 @@ def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | 
 
 
 def placed_in(pose: Pose, local: Place) -> Place:
-    """Place of a point of the undeformed body in the ground frame [m]."""
+    """Return the position of a point of the undeformed body in the ground frame [m]."""
     assert pose.position is not None
     c, s = cos(pose.angle), sin(pose.angle)
     return pose.position[0] + c * local[0] - s * local[1], pose.position[1] + s * local[0] + c * local[1]

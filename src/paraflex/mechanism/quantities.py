@@ -1,4 +1,4 @@
-"""Metadata of fields of members of a mechanism, and checks of single numbers."""
+"""Metadata of the fields of a mechanism's members, and checks of single numbers."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ from typing import Any, Literal, cast
 from paraflex.errors import InputError, suggestion
 from paraflex.limits import of_size, possible
 
-# Motions of joints that members name: an angle, a travel, or either; "exists" for a joint of any kind.
+# Motion that a member requires of its joint: an angle, a travel, or either; "exists" for a joint of any kind.
 JointThat = Literal["moves", "turns", "slides", "exists"]
 
 
 def known(name: str, names: Collection[str], field: str, kind: str) -> None:
-    """Raise an `InputError` that names the nearest name, unless a name is a known one."""
+    """Raise an `InputError` that suggests the nearest name, unless a name is known."""
     if not isinstance(name, str) or name not in names:
         raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 
 def all_known(given: Iterable[str], names: Collection[str], field: str, kind: str) -> None:
-    """Raise an `InputError` that names the nearest name, unless all names are known ones."""
+    """Raise an `InputError` that suggests the nearest name, unless all names are known."""
     for name in given:
         known(name, names, field, kind)
 
 
 def finite(values: float | Iterable[float], field: str) -> None:
-    """Raise an `InputError` unless a value, or each of several, is finite and of a size that is possible."""
+    """Raise an `InputError` unless a value, or each of several, is finite and of admissible size."""
     several = isinstance(values, Iterable) and getattr(values, "ndim", 1)
     for value in cast("Iterable[float]", values if several else (values,)):
         of_size(value, field)
 
 
 def positive(value: float, field: str, unit: str) -> None:
-    """Raise an `InputError` unless a value is positive and finite."""
+    """Raise an `InputError` unless a value is positive, finite and of a size possible for its unit."""
     if not (math.isfinite(value) and value > 0.0):
         raise InputError("must be positive", field=field, value=value, remedy=f"give it in {unit}")
     possible(value, field, unit)
 
 
 def not_negative(value: float, field: str, unit: str) -> None:
-    """Raise an `InputError` unless a value is zero or positive and finite."""
+    """Raise an `InputError` unless a value is zero, or positive, finite and of a size possible for its unit."""
     if not (math.isfinite(value) and value >= 0.0):
         raise InputError("must not be negative", field=field, value=value, remedy=f"give it in {unit}")
     if value:
@@ -50,7 +50,7 @@ def not_negative(value: float, field: str, unit: str) -> None:
 
 
 def not_zero(value: float, field: str, unit: str) -> None:
-    """Raise an `InputError` unless a value is finite and not zero."""
+    """Raise an `InputError` unless a value is not zero, finite and of a size possible for its unit."""
     if not (math.isfinite(value) and value != 0.0):
         raise InputError("must be a finite number other than zero", field=field, value=value, remedy=f"give it {unit}")
     possible(value, field, unit.removeprefix("in "))
@@ -59,22 +59,30 @@ def not_zero(value: float, field: str, unit: str) -> None:
 def said(
     description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: JointThat | None = None
 ) -> dict[str, Any]:
-    """Metadata of a member's field for model files, their schema and errors, with the unit behind "in".
+    """Return the metadata of a member's field for model files, their schema and errors.
 
-    A number is checked, unless it is None, by `finite`, or with a unit to ask for by `positive`, `not_negative` or
-    `not_zero`; a name may be that of a joint that moves, turns, slides, or of any kind.
+    Parameters
+    ----------
+    description : str
+        Description of the field in the schema, with its unit after "in".
+    check : callable, optional
+        Check of a value that is not None: `finite`, or `positive`, `not_negative` or `not_zero`, which need a unit.
+    unit : str
+        Unit that the remedy of the check's error asks for; by default the check takes none.
+    joint : "moves", "turns", "slides" or "exists", optional
+        Motion required of a joint, if the field is the name of one.
     """
     checked = partial(check, unit=unit) if check is not None and unit else check
     return {"description": description, "check": checked, "joint": joint}
 
 
 def optional(default: Any, description: str, check: Callable[..., None] | None = None, unit: str = "") -> Any:
-    """The field of a member that need not be given; see `said`."""
+    """Return a dataclass field with a default value and with the metadata of the other arguments."""
     return field(default=default, metadata=said(description, check, unit))
 
 
 def in_unit(check: Callable[..., None], unit: str) -> dict[str, Any]:
-    """Metadata of a number that a check asks for in a unit."""
+    """Return the metadata of a number with a check and the unit that its error asks for."""
     return {"check": partial(check, unit=unit)}
 
 
@@ -90,7 +98,7 @@ def check_numbers(member: Any, place: str) -> None:
 
 
 def joints_named(member: Any) -> Iterator[tuple[str, str, JointThat]]:
-    """Joints that a member names, each with its field in files and the motion that it must have."""
+    """Yield the joints that a member refers to, as field in files, name and required motion."""
     together = joint_pair(member)
     for each in fields(member):
         if does := each.metadata.get("joint"):
@@ -100,6 +108,6 @@ def joints_named(member: Any) -> Iterator[tuple[str, str, JointThat]]:
 
 
 def joint_pair(member: Any) -> list[str]:
-    """Fields of a member, or of its class, that name two joints: `joints` in files. None if it names one."""
+    """Return the fields of a member, or of its class, that name two joints (`joints` in files); empty if it has one."""
     named = [each.name for each in fields(member) if each.metadata.get("joint")]
     return named if len(named) > 1 else []

@@ -1,6 +1,6 @@
 """RAParM-I built in Python: the redundantly actuated 2-DOF parallel manipulator with parallelogram branches.
 
-Two arms A_i B_i C meet at the end-effector C; beside each runs D_i E_i F_i, whose links are parallel to those of
+Two arms A_i B_i C meet at the end-effector C. Beside each arm is a branch D_i E_i F_i with links parallel to those of
 the arm, so that the distal link 4 (8) can be driven from the base as well (Figs. 2, 8 and 9 of the paper).
 """
 
@@ -34,26 +34,26 @@ def raparm_i(
 ) -> Mechanism:
     """Build RAParM-I as in the paper; the defaults are the reference set, identified from the paper's results.
 
-    Linear geometry, cantilever frames, shared curvature. A better model of the same manipulator is
+    The model has linear geometry, cantilever frames and shared curvature. A better model of the same manipulator is
     `raparm_i().with_geometry("second-order").with_beams(reference=ReferenceCondition.PINNED,
     curvature=Curvature.SEPARATE)`.
 
     Parameters
     ----------
     e : float
-        Half distance of the base pivots [m].
+        Half the distance of the base pivots [m].
     l1 : float
-        Links 1, 5 (A_i B_i) and 3, 7 (E_i F_i) [m].
+        Length of links 1, 5 (A_i B_i) and 3, 7 (E_i F_i) [m].
     la : float
-        Links 2, 6 (D_i E_i), and B_i F_i on links 4, 8 [m].
+        Length of links 2, 6 (D_i E_i), and distance B_i F_i on links 4, 8 [m].
     l2 : float
-        Links 4, 8 (B_i C) [m].
+        Length of links 4, 8 (B_i C) [m].
     section, material
-        Of all eight links.
+        Cross-section and material of all eight links.
     joint : (mass, moment of inertia)
-        Lumped at both ends of every link and at F_i of links 4, 8, except at C [kg, kg m^2].
+        Lump at both ends of every link and at F_i of links 4, 8, except at C [kg, kg m^2].
     end : (mass, moment of inertia)
-        Lumped at the C end of links 4 and 8, each [kg, kg m^2].
+        Lump at the C end of links 4 and 8, each [kg, kg m^2].
     """
 
     def link(number: int, points: dict[str, float], elements: int | tuple[int, ...]) -> FlexibleBeam:
@@ -99,8 +99,8 @@ def raparm_i(
     )
 
 
-# Proximal and distal angle of each arm [degrees] near the centre of the workspace, for the four ways to fold the
-# elbows: B1 left of the line A1 C and B2 right of A2 C is "outward".
+# Proximal and distal angle of each arm [degrees] near the centre of the workspace, for the four elbow configurations:
+# B1 left of the line A1 C and B2 right of A2 C is "outward".
 _LEFT = {"outward": (124.0, 14.0), "inward": (14.0, 124.0)}
 _RIGHT = {name: tuple(180.0 - angle for angle in angles) for name, angles in _LEFT.items()}
 _ELBOWS = {

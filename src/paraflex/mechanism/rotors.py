@@ -1,4 +1,4 @@
-"""What actuators add to a mechanism: rotors as lumps at joints, back-EMF as dampers."""
+"""Contributions of actuators to a mechanism: rotors as lumps at joints, back-EMF as dampers."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from paraflex.mechanism.quantities import known
 
 
 def actuator_motors(actuator: Actuator, mechanism: Members) -> tuple[str, ...]:
-    """Names of the motors of a mechanism that an actuator is of."""
+    """Return the names of the motors of a mechanism that an actuator describes."""
     return actuator.motors or tuple(motor.name for motor in mechanism.motors)
 
 
 def actuators_by_motor(mechanism: Members) -> dict[str, Actuator]:
-    """The actuator of each motor that has one, in the order of the motors."""
+    """Return the actuator of each motor that has one, in the order of the motors."""
     found = {name: one for one in mechanism.actuators for name in actuator_motors(one, mechanism)}
     return {motor.name: found[motor.name] for motor in mechanism.motors if motor.name in found}
 
 
 def check_actuators(mechanism: Members) -> None:
-    """Check that actuators name motors, each one once, and that their rotors' inertia can act where they are.
+    """Check that actuators refer to motors, each motor once, and that a single body can take each rotor's inertia.
 
     Raises
     ------
     InputError
-        The first that does not.
+        The first check that fails.
     """
     names, taken = [motor.name for motor in mechanism.motors], dict[str, str]()
     for one in mechanism.actuators:
@@ -63,30 +63,31 @@ def _check_rotor(mechanism: Members, motor: Motor, actuator: Actuator) -> None:
 
 
 def _driven_point(joint: Joint) -> PointRef | None:
-    """The point of the one body whose motion the joint's coordinate is; None where it is that of two bodies.
+    """Return the joint's point on the only body whose motion determines the joint rate; None if two bodies do.
 
-    Against the ground the rate of the coordinate is that of the body's angle, or the speed of a point on a fixed axis.
+    At a joint on the ground the rate is that of the body's angle, or the speed of a point along a fixed axis.
     """
     if joint.a.on_ground:
         return joint.b
-    # An axis that the body carries turns with it, unless the joint keeps its angle.
+    # An axis on the body rotates with it, unless the joint holds the body's angle.
     on_fixed_axis = not joint.slides or ("angle" in joint.holds and not joint.follows_beam)
     return joint.a if joint.b.on_ground and on_fixed_axis else None
 
 
 def with_actuators(mechanism: Any) -> Any:
-    """The mechanism with rotors as lumps and back-EMF as dampers at joints, for computing; itself without actuators.
+    """Return the mechanism for computation, with rotors as lumps and back-EMF as dampers at joints.
 
-    A lump of mass n^2 J_m on a fixed axis stands for a rotor that has no weight: a force at its point balances that.
+    A lump of mass n^2 J_m on a fixed axis represents a rotor without weight, so a force at its point cancels gravity.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism with actuators.
 
     Returns
     -------
     Mechanism
-        Its `described` is the one given.
+        Derived mechanism, whose `described` is that of the given one; without actuators the given one.
     """
     if not mechanism.actuators:
         return mechanism
@@ -115,7 +116,7 @@ def with_actuators(mechanism: Any) -> Any:
 
 
 def rotor_mass(mechanism: Members) -> float:
-    """What rotors add to the masses of bodies that slide, n^2 J_m each, which is no mass that anyone weighs [kg]."""
+    """Return the sum of the reflected inertias n^2 J_m of rotors at joints that slide, which have no weight [kg]."""
     found = actuators_by_motor(mechanism)
     sliding = (found[motor.name] for motor in mechanism.motors if motor.name in found and mechanism.slides(motor.joint))
     return sum(one.reflected_inertia for one in sliding)

@@ -1,4 +1,4 @@
-"""Rigid mechanisms of any size: a row of four-bars side by side, and a hanging chain."""
+"""Rigid mechanisms of variable size: a row of four-bar linkages and a hanging chain."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ GRAVITY = (0.0, -9.81)
 
 @checked_arguments()
 def four_bars_in_a_row(n: int) -> Mechanism:
-    """Build n four-bars side by side, neighbours sharing a crank: benchmark A02 of the IFToMM library.
+    """Build a row of n four-bar linkages in which neighbours share a crank: benchmark A02 of the IFToMM library.
 
-    Cranks A_i B_i, i = 0 to n, on pins 1 m apart; couplers from B_i-1 to B_i. All links are uniform rods of 1 kg and
-    1 m under weight of 9.81 m/s^2. One degree of freedom. In the benchmark the cranks start upright, with B0 moving at
-    +1 m/s in x: `mechanism.Start(angular={"crank0": -1.0})`, the joints give the rest.
+    Cranks A_i B_i, i = 0 to n, are on pins 1 m apart, and couplers connect B_i-1 with B_i. All links are uniform rods
+    of 1 kg and 1 m; gravity is 9.81 m/s^2. There is one degree of freedom. In the benchmark the cranks start upright,
+    with a velocity of B0 of +1 m/s in x: `mechanism.Start(angular={"crank0": -1.0})`; the joints determine the rest.
 
-    The mechanism passes positions with all links in line, where n constraints depend on the others.
+    The mechanism passes singular configurations with all links in line, where n constraints depend on the others.
 
     Parameters
     ----------
     n : int
-        Loops.
+        Number of loops.
 
     Raises
     ------
     InputError
-        Fewer than one.
+        The number is less than one.
     """
     _check_number(n, "loops")
     cranks = [_rod(f"crank{i}", "A", "B") for i in range(n + 1)]
@@ -61,25 +61,26 @@ def four_bars_in_a_row(n: int) -> Mechanism:
 def chain_of_segments(
     n: int, *, length: float = 1.0, mass: float = 1.0, bending_stiffness: float = 0.02, angle: float = 0.0
 ) -> Mechanism:
-    """Build a chain of n equal rigid segments that hangs from the ground, with springs between them: a cable.
+    """Build a hanging cable: a chain of n equal rigid segments with springs between them, fixed to the ground by a pin.
 
-    No loops and n degrees of freedom. Springs of n EI / length stand for the bending of two half segments each.
+    The chain has no loops and n degrees of freedom. Each spring of stiffness n EI / length represents the bending of
+    two half segments.
 
     Parameters
     ----------
     n : int
-        Segments.
+        Number of segments.
     length, mass : float
-        Of the whole [m, kg].
+        Total length [m] and mass [kg], 1 by default.
     bending_stiffness : float
-        EI [N m^2].
+        Bending stiffness EI [N m^2], 0.02 by default.
     angle : float
-        Of all segments at the start, from the x axis [rad].
+        Initial angle of all segments to the x axis [rad], 0 by default.
 
     Raises
     ------
     InputError
-        Fewer than one segment, or numbers that make no sense.
+        There is less than one segment, or a number is not admissible.
     """
     _check_number(n, "segments")
     part = length / n
@@ -106,6 +107,6 @@ def _check_number(n: int, field: str) -> None:
 
 
 def _rod(name: str, first: str, last: str, mass: float = 1.0, length: float = 1.0) -> RigidBody:
-    """A uniform rod along the x axis of its frame."""
+    """Return a uniform rod along the x axis of its frame."""
     points = {first: (0.0, 0.0), last: (length, 0.0)}
     return RigidBody(name, mass, mass * length**2 / 12.0, (0.5 * length, 0.0), points)

@@ -1,4 +1,4 @@
-"""Cross-sections of beams: area and second moment of area, given themselves or by a shape."""
+"""Cross-sections of beams: area and second moment of area, given directly or by a shape."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from paraflex.mechanism.quantities import in_unit, positive
 @given_as("a shape", "Rectangle(...), Round(...) or Tube(...)")
 @dataclass(frozen=True)
 class Shape(CheckedFields, ABC):
-    """A shape of cross-sections: the base of all kinds. All its fields are lengths, `wall` that of a hollow one [m]."""
+    """Shape of a cross-section: the base class of all kinds. All fields are lengths, `wall` is a wall thickness [m]."""
 
     _table = "section"
     kind: ClassVar[str]
@@ -36,17 +36,17 @@ class Shape(CheckedFields, ABC):
     @property
     @abstractmethod
     def smallest(self) -> float:
-        """The smallest outer dimension [m]."""
+        """Smallest outer dimension [m]."""
 
     @property
     @abstractmethod
     def area(self) -> float:
-        """The area [m^2]."""
+        """Area [m^2]."""
 
     @property
     @abstractmethod
     def second_moment(self) -> float:
-        """Of area, about the axis normal to the plane of motion [m^4]."""
+        """Second moment of area about the axis normal to the plane of motion [m^4]."""
 
     @property
     @abstractmethod
@@ -56,7 +56,7 @@ class Shape(CheckedFields, ABC):
 
 @dataclass(frozen=True)
 class Rectangle(Shape):
-    """A rectangle, hollow where it has a wall: width out of the plane of motion, thickness in it [m]."""
+    """Rectangle with a width out of the plane of motion and a thickness in it, hollow if it has a wall [m]."""
 
     kind: ClassVar[str] = "rectangle"
 
@@ -66,17 +66,17 @@ class Rectangle(Shape):
 
     @property
     def smallest(self) -> float:
-        """The smaller side [m]."""
+        """Smaller side [m]."""
         return min(self.width, self.thickness)
 
     @property
     def area(self) -> float:
-        """The area [m^2]."""
+        """Area [m^2]."""
         return self.width * self.thickness - self._of_hole(1)
 
     @property
     def second_moment(self) -> float:
-        """Of area, about the axis normal to the plane of motion [m^4]."""
+        """Second moment of area about the axis normal to the plane of motion [m^4]."""
         return self.width * self.thickness**3 / 12.0 - self._of_hole(3) / 12.0
 
     @property
@@ -85,7 +85,7 @@ class Rectangle(Shape):
         return self.thickness / 2.0
 
     def _of_hole(self, power: int) -> float:
-        """Width times a power of the thickness of the hole."""
+        """Return the width of the hole times a power of its thickness; zero for a solid section."""
         if self.wall is None:
             return 0.0
         return (self.width - 2.0 * self.wall) * (self.thickness - 2.0 * self.wall) ** power
@@ -93,7 +93,7 @@ class Rectangle(Shape):
 
 @dataclass(frozen=True)
 class Round(Shape):
-    """A solid circle [m]."""
+    """Solid circle with a diameter [m]."""
 
     kind: ClassVar[str] = "round"
 
@@ -101,28 +101,28 @@ class Round(Shape):
 
     @property
     def smallest(self) -> float:
-        """The diameter [m]."""
+        """Outer diameter [m]."""
         return self.diameter
 
     @property
     def area(self) -> float:
-        """The area [m^2]."""
+        """Area [m^2]."""
         return math.pi / 4.0 * self.diameter**2
 
     @property
     def second_moment(self) -> float:
-        """Of area, about a diameter [m^4]."""
+        """Second moment of area about a diameter [m^4]."""
         return math.pi / 64.0 * self.diameter**4
 
     @property
     def outer_fibre(self) -> float:
-        """The outer radius [m]."""
+        """Outer radius [m]."""
         return self.diameter / 2.0
 
 
 @dataclass(frozen=True)
 class Tube(Round):
-    """A circular tube of an outer diameter and a wall [m]."""
+    """Circular tube with an outer diameter and a wall thickness [m]."""
 
     kind: ClassVar[str] = "tube"
 
@@ -130,12 +130,12 @@ class Tube(Round):
 
     @property
     def area(self) -> float:
-        """The area [m^2]."""
+        """Area [m^2]."""
         return math.pi * self.wall * (self.diameter - self.wall)
 
     @property
     def second_moment(self) -> float:
-        """Of area, about a diameter: the area times the sum of both squared diameters over 16 [m^4]."""
+        """Second moment of area about a diameter: area times the sum of both squared diameters over 16 [m^4]."""
         return self.area * (self.diameter**2 + (self.diameter - 2.0 * self.wall) ** 2) / 16.0
 
 
@@ -150,14 +150,14 @@ class Section(CheckedFields):
     Attributes
     ----------
     area : float
-        [m^2]
+        Area [m^2].
     second_moment : float
-        Of area, about the axis normal to the plane of motion [m^4].
+        Second moment of area about the axis normal to the plane of motion [m^4].
     shape : Shape, optional
-        What it has them from.
+        Shape from which the other values were computed.
     outer_fibre : float, optional
-        Distance of the outermost fibre from the neutral axis, in the plane of motion [m]; without it there are no
-        bending stresses.
+        Distance of the outermost fibre from the neutral axis, in the plane of motion [m]; bending stresses are not
+        available without it.
     """
 
     _table = "section"
@@ -169,23 +169,26 @@ class Section(CheckedFields):
 
     @classmethod
     def of(cls, shape: Shape) -> Section:
-        """The section of a shape."""
+        """Return the section of a shape."""
         return cls(shape.area, shape.second_moment, shape, shape.outer_fibre)
 
     @classmethod
     @checked_arguments()
     def rectangle(cls, width: float, thickness: float, wall: float | None = None) -> Section:
-        """A rectangle: width out of the plane of motion, thickness in it; hollow with a wall [m]."""
+        """Return a rectangular section with a width out of the plane of motion and a thickness in it [m].
+
+        A wall thickness [m] makes it hollow.
+        """
         return cls.of(Rectangle(width, thickness, wall))
 
     @classmethod
     @checked_arguments()
     def round(cls, diameter: float) -> Section:
-        """A solid circle [m]."""
+        """Return a solid circular section with a diameter [m]."""
         return cls.of(Round(diameter))
 
     @classmethod
     @checked_arguments()
     def tube(cls, diameter: float, wall: float) -> Section:
-        """A circular tube of an outer diameter and a wall [m]."""
+        """Return the section of a circular tube with an outer diameter and a wall thickness [m]."""
         return cls.of(Tube(diameter, wall))

@@ -1,4 +1,4 @@
-"""The virtual prototype (section 6.1): a mechanism whose flexible beams become rigid segments joined by springs."""
+"""Virtual prototype (section 6.1): a mechanism whose flexible beams are replaced by rigid segments with springs."""
 
 from __future__ import annotations
 
@@ -25,20 +25,21 @@ from paraflex.mechanism.sensors import DeflectionSensor, Sensor
 
 T = TypeVar("T")
 
-# Points at which segments are joined.
+# Points at which segments are connected.
 FIRST_END = "_first"
 LAST_END = "_last"
 
 
 @dataclass(frozen=True)
 class Segmented:
-    """A mechanism of finite segments and their places on the beams.
+    """Mechanism of finite segments and the positions of the segments on the beams.
 
     Attributes
     ----------
     mechanism : Mechanism
+        Mechanism with segments in place of flexible beams.
     carriers : mapping
-        For each of its bodies the name of the body it comes from, and how far along that it starts [m].
+        Original body of each body of the mechanism, and the distance along it at which that body starts [m].
     """
 
     mechanism: Mechanism
@@ -47,9 +48,14 @@ class Segmented:
 
 @checked_arguments()
 def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, int]:
-    """Numbers of segments of similar length: a given number on the longest flexible beam, others in proportion.
+    """Return numbers of segments in proportion to the lengths of the flexible beams.
 
-    Eight make the paper's 56 segments of RAParM-I.
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Mechanism with flexible beams.
+    longest : int
+        Number of segments of the longest beam; the default of 8 gives the paper's 56 segments of RAParM-I.
     """
     lengths = {body.name: body.length for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.flexible}
     # Rounding of the ratio of lengths must not add a segment.
@@ -59,29 +65,30 @@ def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, i
 
 @checked_arguments()
 def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8) -> Segmented:
-    """Replace each flexible beam by n equal rigid segments, hinged in a row with springs of n E I / L between them.
+    """Replace each flexible beam by n equal rigid segments in a row, connected by hinges with springs of n E I / L.
 
-    A joint of two half segments bends as they do together: k = E I / (L / n), of spans of several stiffnesses the
-    reciprocal of int dx / E I over the two halves. Lumped masses move with the segment they lie on. The model is
+    A hinge represents the bending of the two adjacent half segments: k = E I / (L / n), or the reciprocal of
+    int dx / E I over the two halves where the stiffness varies. Lumped masses move with their segment. The model is
     another discretisation of the same beam, without elongation and without shape functions. Sensors of strain and
-    deflection, and those along axes that a beam carries, are left out.
+    deflection in a segmented beam, and sensors along axes of its frame, are removed.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism with flexible beams.
     segments : int or mapping of str to int
-        Per flexible beam, one number for all or one for each.
+        Number of segments of each flexible beam: one for all (8 by default), or one by name.
 
     Returns
     -------
     Segmented
-        Segment i of a beam is called like "link1_1".
+        Mechanism of segments, which are named like "link1_1", and their positions.
 
     Raises
     ------
     InputError
-        Fewer than one segment, a beam without a number, a name that is no flexible beam's, a flexible body of given
-        shapes, or a beam that a joint slides along.
+        A number is less than one or too large, a beam has no number, a name is not that of a flexible beam, a flexible
+        body has user-defined shapes, or a joint slides along a flexible beam.
     """
     check_segmentable(mechanism)
     beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.flexible]
@@ -98,7 +105,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
             carriers[body.name] = (body.name, 0.0)
             continue
         assert isinstance(body, FlexibleBeam)
-        # The only damping of hinges.
+        # Hinges can only have stiffness-proportional damping.
         n, lag = counts[body.name], stiffness_damping(body.damping, "finite segments", f"body.{body.name}.damping")
         length = body.length / n
         names = [f"{body.name}_{i + 1}" for i in range(n)]
@@ -125,14 +132,14 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
 
 
 def moved(member: T, points: Mapping[PointRef, PointRef]) -> T:
-    """A member at the points that those it names are now."""
+    """Return a member with its points replaced by the new ones, where `points` has them."""
     return replace(member, **{field: points.get(ref, ref) for field, ref in points_named(member).items()})  # type: ignore[type-var]
 
 
 def rebuilt(
     mechanism: Mechanism, bodies: Sequence[Body], joints: Sequence[Joint], cut: Cut, **changed: Any
 ) -> Mechanism:
-    """A mechanism of other bodies and more joints, whose members are at the points that theirs are now."""
+    """Return a mechanism of other bodies and additional joints, with all members moved to the new points."""
     kept = {
         name: tuple(moved(one, cut.points) for one in getattr(mechanism, name))
         for name, group in groups_of(Mechanism).items()
@@ -151,22 +158,22 @@ def rebuilt(
 
 
 def frame_read(sensor: Sensor) -> str:
-    """The body in whose frame or inside a sensor measures; empty of one that needs none."""
+    """Return the name of the body in or in whose frame a sensor measures; empty for a sensor without one."""
     return sensor.point.body if isinstance(sensor, DeflectionSensor) else getattr(sensor, "body", "")
 
 
 def is_hinge(joint: Joint) -> bool:
-    """Whether a joint is one between two finite segments of a beam."""
+    """Return whether a joint connects two segments or two parts of a beam."""
     return (joint.a.point, joint.b.point) == (LAST_END, FIRST_END)
 
 
 def check_segmentable(mechanism: Mechanism) -> None:
-    """Check that every flexible body can be cut into segments.
+    """Check that every flexible body can be divided into segments.
 
     Raises
     ------
     InputError
-        A flexible body of given shapes cannot, nor a beam that a joint slides along: no segment reaches far enough.
+        A flexible body has user-defined shapes, or a joint slides along a flexible beam, beyond any single segment.
     """
     for joint in mechanism.joints:
         if joint.follows_beam and getattr(mechanism.body(joint.a.body), "flexible", False):
@@ -183,7 +190,7 @@ def check_segmentable(mechanism: Mechanism) -> None:
 
 
 def _assembly(mechanism: Mechanism, assembly: Assembly, carriers: Mapping[str, tuple[str, float]]) -> Assembly:
-    """An assembly of the segments along the undeformed beams; angles that follow from points are found first."""
+    """Return an assembly with the segments along the undeformed beams, after angles were computed from points."""
     poses = approximate_poses(mechanism, assembly)
     return replace(assembly, angles={name: poses[carrier].angle for name, (carrier, _) in carriers.items()}, points={})
 
@@ -208,7 +215,7 @@ def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, in
 
 
 def _pieces(beam: FlexibleBeam, start: float, end: float) -> list[tuple[float, float, SpanProperties]]:
-    """Pieces of a beam between two places, each within one span: start and end [m], properties of the span."""
+    """Return the pieces of a beam between two positions, each within a span: start, end [m], span properties."""
     pieces = []
     for (a, b), span in zip(pairwise(beam.mesh.knots.tolist()), beam.spans, strict=True):
         if min(b, end) > max(a, start):
@@ -217,12 +224,12 @@ def _pieces(beam: FlexibleBeam, start: float, end: float) -> list[tuple[float, f
 
 
 def _stiffness(beam: FlexibleBeam, start: float, end: float) -> float:
-    """Stiffness of the spring for the bending between two places: pieces are springs in series [N m/rad]."""
+    """Return the stiffness of a spring for the bending between two positions: pieces in series [N m/rad]."""
     return 1.0 / sum((b - a) / span.bending_stiffness for a, b, span in _pieces(beam, start, end))
 
 
 def _segment(beam: FlexibleBeam, name: str, i: int, length: float, owners: Mapping[str, int]) -> RigidBody:
-    """Segment i: its part of the bar and the lumps on it, about their common centre of mass."""
+    """Return segment i: its part of the bar and the lumps on it, about their common centre of mass."""
     start = i * length
     parts = []
     for a, b, span in _pieces(beam, start, start + length):

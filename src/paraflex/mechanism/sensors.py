@@ -1,4 +1,4 @@
-"""Sensors: named quantities that a run measures and a linear model has as outputs."""
+"""Sensors: named quantities that are measured in a run and are outputs of a linear model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SENSOR_KINDS: dict[str, type[Sensor]] = {}
 
 
 def _axis(*words: str, angle: bool = True) -> Callable[[Any, str], None]:
-    """Check of an axis: one of some words, or an angle [rad] if it may be one."""
+    """Return a check that an axis is one of the words, or an angle [rad] if angles are admissible."""
     quoted = ", ".join(f'"{word}"' for word in words)
     remedy = f"give {quoted} or an angle in rad" if angle else f"give one of {quoted}"
 
@@ -35,18 +35,19 @@ def _axis(*words: str, angle: bool = True) -> Callable[[Any, str], None]:
 @given_as("a sensor", "a sensor of any kind, say Encoder")
 @dataclass(frozen=True)
 class Sensor(CheckedFields):
-    """A quantity of a mechanism in motion, measured without error or delay: the base of all kinds.
+    """Ideal sensor without error or delay: the base class of all kinds.
 
-    A subclass is a kind, `class Encoder(Sensor, kind="encoder", units=("rad", "m"))`; files, results and linear models
-    know it by that.
+    A subclass such as `class Encoder(Sensor, kind="encoder", units=("rad", "m"))` defines a kind of sensor for files,
+    results and linear models.
 
     Attributes
     ----------
     name : str
+        Name of the sensor.
     kind : str
-        The name in files.
+        Name of the kind in files.
     units : tuple of str
-        SI unit of its readings; of a sensor at a joint that of an angle, then that of a travel.
+        SI unit of the readings; for a sensor at a joint that at a joint which turns, then that at one which slides.
     """
 
     _table = "sensor"
@@ -62,13 +63,13 @@ class Sensor(CheckedFields):
             SENSOR_KINDS[kind] = cls
 
     def unit(self, slides: bool) -> str:
-        """The SI unit of its readings; `slides` says whether its joint has a travel."""
+        """Return the SI unit of the readings; `slides` is whether the coordinate of the joint is a travel."""
         return self.units[-1 if slides else 0]
 
 
 @dataclass(frozen=True)
 class Encoder(Sensor, kind="encoder", units=("rad", "m")):
-    """Angle [rad] or travel [m] of a joint: of its second body against its first, slopes of beams included."""
+    """Angle [rad] or travel [m] of a joint: second body relative to the first, slopes of beams included."""
 
     joint: str = field(metadata=AT_JOINT)
 
@@ -82,17 +83,18 @@ class Tachometer(Sensor, kind="tachometer", units=("rad/s", "m/s")):
 
 @dataclass(frozen=True)
 class PointSensor(Sensor):
-    """A component of the motion of a named point: what position, velocity and acceleration sensors have in common.
+    """Component of the motion of a named point: the base class of position, velocity and acceleration sensors.
 
     Attributes
     ----------
     point : PointRef
+        Point whose motion is measured.
     axis : "x", "y" or float
-        Along which it measures, an angle against the x axis [rad].
+        Axis of the measurement; a number is its angle to the x axis [rad].
     body : str
-        In whose frame the axis is fixed and turns; the ground's by default. A beam's frame is that of its reference
-        condition and does not follow the slope at the point. What is measured is the component of the absolute
-        velocity or acceleration; of a position that against the origin of the frame.
+        Body in whose frame the axis is fixed, so that the axis turns with the body; the ground by default. The frame of
+        a beam is that of its reference condition and does not follow the slope at the point. Velocities and
+        accelerations are absolute; positions are relative to the origin of the frame.
     """
 
     point: PointRef = field(metadata=said('"body.point"'))
@@ -103,13 +105,13 @@ class PointSensor(Sensor):
 
     @property
     def direction(self) -> tuple[float, float]:
-        """Unit vector of its axis in the frame."""
+        """Unit vector of the axis in the frame."""
         return unit_vector(self.axis)
 
 
 @dataclass(frozen=True)
 class PositionSensor(PointSensor, kind="position", units=("m",)):
-    """Place of a point along an axis, from the origin of the frame that the axis is fixed in [m]."""
+    """Position of a point along an axis, from the origin of the frame in which the axis is fixed [m]."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +123,8 @@ class VelocitySensor(PointSensor, kind="velocity", units=("m/s",)):
 class AccelerationSensor(PointSensor, kind="acceleration", units=("m/s^2",)):
     """Component of a point's absolute acceleration along an axis [m/s^2].
 
-    An accelerometer fixed to a link has that link as its `body`. It also senses weight, which is not in this reading:
-    it shows the acceleration less that of free fall.
+    An accelerometer fixed to a link has that link as its `body`. A real one measures the acceleration minus that of
+    gravity; this reading does not include gravity.
     """
 
 
@@ -133,12 +135,12 @@ class StrainGauge(Sensor, kind="strain", units=("1",)):
     Attributes
     ----------
     body : str
-        A beam, or a bar of assumed modes. Held rigid it has no strain.
+        Name of a beam or a bar of assumed modes. The strain of a rigid one is zero.
     at : float or str
-        Distance from the beam's first end [m], or one of its named points. Where the moment or the section jumps, what
-        is measured is on the side of the last end.
+        Distance from the first end of the beam [m], or one of its named points. Where the moment or the section jumps,
+        the strain on the side of the last end is measured.
     distance : float, optional
-        From the neutral axis, positive on the side of the y axis [m]; by default that of the outermost fibre.
+        Distance from the neutral axis, positive on the side of the y axis [m]; by default that of the outermost fibre.
     """
 
     body: str = field(metadata=said("the name of a beam"))
@@ -151,23 +153,24 @@ class StrainGauge(Sensor, kind="strain", units=("1",)):
     )
 
     def place(self, points: Mapping[str, float]) -> float:
-        """Distance from the first end [m] of a beam with these points."""
+        """Return the distance from the first end [m] of a beam with the given points."""
         return points[self.at] if isinstance(self.at, str) else self.at
 
 
 @dataclass(frozen=True)
 class JointForceSensor(Sensor, kind="joint_force"):
-    """Component of what a joint's first body does to its second: a force [N], or the moment [N m].
+    """Component of the force [N], or the moment [N m], that the first body of a joint exerts on the second.
 
-    It acts at the joint's point of the second body and is of all that is in the joint: constraints, motors, springs,
-    dampers, friction, gears.
+    It acts at the joint's point of the second body and includes everything in the joint: constraints, motors, springs,
+    dampers, friction and gears.
 
     Attributes
     ----------
     joint : str
+        Name of the joint.
     axis : "x", "y", "along", "moment" or float
-        In the ground frame, an angle against its x axis [rad]; "along" the axis of a joint that slides, or of
-        the rod of a distance joint, its tension; the "moment" about the point, positive anticlockwise.
+        Direction in the ground frame, a number being its angle to the x axis [rad]; "along" the axis of a joint that
+        slides or the rod of a distance joint (tension); or the "moment" about the point, positive anticlockwise.
     """
 
     joint: str = field(metadata=said("the name of a joint", joint="exists"))
@@ -179,19 +182,20 @@ class JointForceSensor(Sensor, kind="joint_force"):
     )
 
     def unit(self, slides: bool) -> str:
-        """See `Sensor.unit`."""
+        """Return the SI unit of the readings, see `Sensor.unit`."""
         return "N m" if self.axis == "moment" else "N"
 
 
 @dataclass(frozen=True)
 class DeflectionSensor(Sensor, kind="deflection"):
-    """Displacement of a material point in the frame of its body, from its place in the undeformed one.
+    """Displacement of a material point in the frame of its body, relative to the undeformed body.
 
     Attributes
     ----------
     point : PointRef
+        Point whose displacement is measured.
     axis : "x", "y" or "angle"
-        Of the body's frame [m], or the turn of the material there, a beam's slope [rad].
+        Axis of the body's frame [m], or the rotation of the material, which is a beam's slope [rad].
     """
 
     point: PointRef = field(metadata=said('"body.point"'))
@@ -200,12 +204,12 @@ class DeflectionSensor(Sensor, kind="deflection"):
     )
 
     def unit(self, slides: bool) -> str:
-        """See `Sensor.unit`."""
+        """Return the SI unit of the readings, see `Sensor.unit`."""
         return "rad" if self.axis == "angle" else "m"
 
 
 def unit_vector(axis: str | float) -> tuple[float, float]:
-    """The direction of an axis given as "x", "y" or an angle [rad]."""
+    """Return the unit vector of an axis given as "x", "y" or an angle [rad]."""
     if isinstance(axis, str):
         return (1.0, 0.0) if axis == "x" else (0.0, 1.0)
     return math.cos(axis), math.sin(axis)

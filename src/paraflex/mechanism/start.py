@@ -1,4 +1,4 @@
-"""The start of a motion, by names: deflections, velocities, or all coordinates of bodies."""
+"""Initial state of a motion, given by names: deflections, velocities, or all coordinates of bodies."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from paraflex.mechanism.quantities import known
 
 @dataclass(frozen=True)
 class Deflection(CheckedFields):
-    """Displacement of a point of a beam from the tangent at the first end; None leaves it to the others.
+    """Deflection of a point of a beam from the tangent at the first end; components that are None are free.
 
-    Of a body of given shapes, off its place in the body frame.
+    The deflection of a body of user-defined shapes is that from the undeformed position in the body frame.
 
     Attributes
     ----------
     axial, transverse : float, optional
-        Stretch and displacement across [m]; what bending takes from the length comes on top in second-order geometry.
+        Stretch and transverse displacement [m], without the foreshortening of second-order geometry.
     slope : float, optional
-        [rad]
+        Slope [rad].
     """
 
     _table = "deflection"
@@ -39,15 +39,15 @@ class Deflection(CheckedFields):
 
 @dataclass(frozen=True)
 class BodyValues(CheckedFields):
-    """All coordinates of a body, or their rates.
+    """Coordinates of a body, or their rates.
 
     Attributes
     ----------
     x, y, phi : float
-        Of the body frame [m, rad], or [m/s, rad/s].
+        Position and angle of the body frame [m, rad], or their rates [m/s, rad/s].
     flexible : tuple of float, optional
-        Its own flexible coordinates: those its reference condition leaves of the nodes', `modes.vectors @ eta` of the
-        modal ones. Zeros where None.
+        Flexible coordinates before the modal transformation, `modes.vectors @ eta`: of a beam the nodal coordinates
+        that its reference condition leaves free. Zero by default.
     """
 
     _table = "coordinates"
@@ -60,19 +60,19 @@ class BodyValues(CheckedFields):
 
 @dataclass(frozen=True)
 class Start(CheckedFields):
-    """The given part of the start of a motion.
+    """Prescribed part of the initial state of a motion.
 
     Attributes
     ----------
     deflection : mapping of str to mapping of str to Deflection
-        Of points, by body and point: the shape is that of least elastic energy.
+        Deflections of points, by body and point; the shape is that of least elastic energy.
     angular : mapping of str to float
-        Rates of bodies' angles [rad/s].
+        Angular velocities of bodies [rad/s].
     point : mapping of PointRef to (x, y)
-        Velocities of points in the ground frame [m/s]. What these and the joints leave open has least kinetic energy,
-        with links that do not begin to bend.
+        Velocities of points in the ground frame [m/s]. The velocities that these and the joints leave free have least
+        kinetic energy, with zero rates of deformation.
     coordinates, rates : mapping of str to BodyValues
-        Taken as they are.
+        Coordinates of bodies and their rates, used without modification.
     """
 
     _table = "start"
@@ -85,14 +85,21 @@ class Start(CheckedFields):
 
     @property
     def places(self) -> bool:
-        """Whether it gives coordinates, and not velocities alone."""
+        """Whether coordinates are given, and not velocities alone."""
         return bool(self.deflection or self.coordinates)
 
 
 def standing(mechanism: Mechanism, assembly: str | None = None, start: Start | None = None) -> Mechanism:
-    """The mechanism with prescribed motions that begin where an assembly stands, if their start is not given.
+    """Return the mechanism with prescribed motions that start at an assembly, unless their start value is given.
 
-    Bodies whose coordinates a start gives stand there.
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Mechanism with prescribed motions.
+    assembly : str, optional
+        Name of the assembly, by default the first.
+    start : Start, optional
+        Initial state, whose coordinates take precedence over the assembly for the bodies that it names.
     """
     poses: dict[str, Pose] = {}
     if mechanism.assemblies and mechanism.prescribed:
@@ -104,7 +111,7 @@ def standing(mechanism: Mechanism, assembly: str | None = None, start: Start | N
 
 
 def begun_at(mechanism: Mechanism, value: Callable[[str], float], time: float = 0.0) -> Mechanism:
-    """The mechanism with prescribed motions whose start is not given at the values of their joints at a time [s]."""
+    """Return the mechanism with prescribed motions whose start is not given set to the joint values at a time [s]."""
 
     def begun(law: AngleLaw, joint: str) -> AngleLaw:
         if isinstance(law, ConstantSpeed) and law.from_assembly:
@@ -117,12 +124,12 @@ def begun_at(mechanism: Mechanism, value: Callable[[str], float], time: float = 
 
 @checked_arguments()
 def check_start(mechanism: Mechanism, start: Start) -> None:
-    """Check that a start names bodies and points that exist, and gives each number once.
+    """Check that an initial state refers to existing bodies and points and gives each quantity once.
 
     Raises
     ------
     InputError
-        It names the field under "start".
+        A check fails; the error gives the field under "start".
     """
     bodies = {body.name: body for body in mechanism.bodies}
     for table in ("deflection", "velocity.angular", "coordinates", "rates"):

@@ -1,4 +1,4 @@
-"""Beams that a joint slides along, and the mesh that they need under it."""
+"""Beams that a joint slides along, and the mesh that such beams need."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ import numpy as np
 from paraflex.mechanism.bodies import Body, FlexibleBeam
 from paraflex.mechanism.members import Members
 
-# The longest element over its beam: with it the torque that drives a crank shaper and the stress of its lever are
-# within 0.4 % of those of 16 elements; with half of the beam they are 1.5 % off, with the whole of it 18 %.
+# Longest element relative to the beam. With it, the driving torque of a crank shaper and the stress in its lever differ
+# from those with 16 elements by less than 0.4 %; with elements of half a beam by 1.5 %, with a single element by 18 %.
 LONGEST_ELEMENT = 1.0 / 3.0
-# Rounding of lengths.
+# Allowance for the rounding of lengths, relative.
 _ROUNDING = 1e-9
 
 
 def tracks(mechanism: Members) -> Iterator[FlexibleBeam]:
-    """The beams along which a joint slides."""
+    """Return the beams along which a joint slides."""
     names = {joint.a.body for joint in mechanism.joints if joint.follows_beam}
     return (body for body in mechanism.bodies if isinstance(body, FlexibleBeam) and body.name in names)
 
 
 def longest_element(beam: FlexibleBeam) -> float:
-    """The longest element of a beam as a part of the beam."""
+    """Return the length of the longest element of a beam relative to the length of the beam."""
     nodes = np.real(beam.mesh.nodes)
     return float(np.max(np.diff(nodes)) / nodes[-1])
 
 
 def with_meshes(mechanism: Members) -> tuple[Body, ...]:
-    """The bodies of a mechanism, with elements for the beams along which a joint slides where none are given."""
+    """Return the bodies of a mechanism, with default meshes of beams that a joint slides along set explicitly."""
     meshed = {beam.name: replace(beam, elements=_elements(beam)) for beam in tracks(mechanism) if beam.elements is None}
     return tuple(meshed.get(body.name, body) for body in mechanism.bodies)
 
 
 def _elements(beam: FlexibleBeam) -> tuple[int, ...]:
-    """As few elements a span as keep each within the longest."""
+    """Return the least number of elements per span with which none exceeds `LONGEST_ELEMENT`."""
     knots = np.real(beam.mesh.knots)
     return tuple(ceil(part / LONGEST_ELEMENT - _ROUNDING) for part in np.diff(knots) / knots[-1])
 
 
 def too_long(beam: FlexibleBeam) -> bool:
-    """Whether an element is longer than what is right under a joint that slides along."""
+    """Return whether a flexible beam has an element too long for a joint that slides along it."""
     return beam.flexible and longest_element(beam) > LONGEST_ELEMENT * (1.0 + _ROUNDING)

@@ -15,12 +15,12 @@ Number = str | float
 
 
 class ESDIRK(NativeMethod):
-    """A scheme with one diagonal element, an explicit first stage and a last stage at the end of the step.
+    """Scheme with one diagonal element, an explicit first stage and a last stage at the end of the step.
 
     Attributes
     ----------
     tableau : Tableau
-        From `make_tableau`.
+        Butcher tableau, from `make_tableau`.
     """
 
     family = Family.ESDIRK
@@ -30,7 +30,7 @@ class ESDIRK(NativeMethod):
 
     @property
     def scheme(self) -> Tableau:
-        """The scheme as the kernel's tableau."""
+        """Scheme as the kernel's tableau."""
         return self.tableau
 
 
@@ -42,20 +42,20 @@ def make_tableau(
     nodes: Sequence[int],
     dense: Sequence[int] | None = None,
 ) -> Tableau:
-    """A tableau from the lower triangle of A, whose last row is b.
+    """Return a tableau from the lower triangle of A, whose last row is b.
 
     Parameters
     ----------
     rows : sequence of sequences
-        Fractions as strings, or numbers. c is their sums.
+        Rows of A, with fractions as strings, or numbers; c is their sums.
     companion : sequence
-        b^ of the embedded formula; without one the error is estimated from the last step's acceleration.
+        Weights b^ of the embedded formula; without them the error is estimated from the last step's acceleration.
     error_order : int
-        The power of h that the error estimated per unit of time falls with.
+        Order of the estimated error per unit of time in h.
     nodes : sequence of int
         Stages at different times, ascending, through which multipliers are interpolated.
     dense : sequence of int, optional
-        Stages accurate enough to interpolate q and v between; first and last by default.
+        Stages accurate enough for interpolation of q and v; first and last by default.
     """
     stages = len(rows)
     A = np.zeros((stages, stages))
@@ -74,9 +74,10 @@ def make_tableau(
 
 
 def paired_rows(diagonal: Number, rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
-    """Rows of A, all with two equal entries from the third on: given once, and the entries up to the diagonal.
+    """Return the rows of A for methods whose rows have two equal first entries, given once each from the third row on.
 
-    So have methods of stage order two that Kennedy and Carpenter derive.
+    The given rows have the entries before the diagonal. Methods of stage order two by Kennedy and Carpenter have such
+    rows.
     """
     return [[0.0], [diagonal, diagonal], *([row[0], *row, diagonal] for row in rows)]
 

@@ -1,7 +1,7 @@
 """TR-BDF2 (Bank et al. 1985, as an ESDIRK by Hosea and Shampine 1996).
 
 The trapezoidal rule leads to gamma h, the second backward difference formula from there to h; gamma = 2 - sqrt 2 gives
-both stages one diagonal, d = gamma / 2, and makes the scheme L-stable. Its companion is of order 3.
+both stages the same diagonal element, d = gamma / 2, and makes the scheme L-stable. The embedded formula has order 3.
 """
 
 from math import sqrt
@@ -14,7 +14,7 @@ _W = sqrt(2.0) / 4.0
 
 
 class TRBDF2(ESDIRK):
-    """The trapezoidal rule followed by the second backward difference formula: L-stable."""
+    """Trapezoidal rule followed by the second backward difference formula: L-stable."""
 
     name = "tr-bdf2"
     title = "TR-BDF2"

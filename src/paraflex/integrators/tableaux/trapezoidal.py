@@ -1,4 +1,4 @@
-"""The trapezoidal rule: A-stable, of order 2, without any damping. Its error is estimated from the last step."""
+"""Trapezoidal rule: A-stable, of order 2, without any damping. Its error is estimated from the last step."""
 
 from typing import ClassVar
 
@@ -6,7 +6,7 @@ from paraflex.integrators.tableaux.make import ESDIRK, Tableau, make_tableau
 
 
 class Trapezoidal(ESDIRK):
-    """The trapezoidal rule: A-stable, without any damping."""
+    """Trapezoidal rule: A-stable, without any damping."""
 
     name = "trapezoidal"
     title = "Trapezoidal rule"
