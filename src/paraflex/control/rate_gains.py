@@ -17,7 +17,7 @@ from paraflex.control.rates import RateFeedback
 from paraflex.control.sampled import SampledPlant, as_sampled
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel, ReducedModel
-from paraflex.mechanism import Mechanism, StrainGauge
+from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import known, positive
 
 # A pole this near to z = 1 is that of a free motion, which feedback of strains leaves as it is.
@@ -348,11 +348,12 @@ def _nearest_gauge(mechanism: Mechanism, motor: str, outputs: Sequence[str]) -> 
     joint, bodies = mechanism.joint(motors[motor]), {body.name: body for body in mechanism.bodies}
     apart = {}
     for sensor in mechanism.sensors:
-        if isinstance(sensor, StrainGauge) and sensor.name in outputs:
-            points: Any = getattr(bodies[sensor.body], "points", {})
-            at = [points[one.point] for one in (joint.a, joint.b) if one.body == sensor.body]
+        location = sensor.location
+        if location.at is not None and sensor.name in outputs:
+            points: Any = getattr(bodies[location.frame], "points", {})
+            at = [points[one.point] for one in (joint.a, joint.b) if one.body == location.frame]
             if at:
-                apart[sensor.name] = min(abs(sensor.place(points) - place) for place in at)
+                apart[sensor.name] = min(abs(location.along(points) - place) for place in at)
     return min(apart, key=apart.__getitem__) if apart else None
 
 

@@ -13,7 +13,7 @@ from paraflex.dynamics import System
 from paraflex.dynamics.coordinates import GROUND_INDEX
 from paraflex.dynamics.sensors import SensorReader, sensor_rows
 from paraflex.integrators.run import Instant
-from paraflex.mechanism import GROUND, Encoder, JointForceSensor, PositionSensor, Sensor, StrainGauge, Tachometer
+from paraflex.mechanism import GROUND, Sensor
 
 # A reading is taken for a product with constant rows where it agrees to this part at random states.
 _SAME = 1e-9
@@ -112,8 +112,8 @@ class Readings:
         self.places: list[Place] = [place for place in several if place is not None]
         apart = {*self.linear, *(place.sensor for place in self.places)}
         self._others: list[int] = [k for k in range(len(sensors)) if k not in apart]
-        self.of_torques: bool = any(isinstance(self.sensors[k], JointForceSensor) for k in self._others)
         self._reader = SensorReader(system, [self.sensors[k] for k in self._others])
+        self.of_torques: bool = self._reader.of_torques
 
     @property
     def simple(self) -> bool:
@@ -139,40 +139,44 @@ class Readings:
 
 def _place(system: System, sensor: Sensor, number: int) -> Place | None:
     """A sensor as the place of a point of a body along an axis of the ground; None where it is none."""
-    if not isinstance(sensor, PositionSensor) or sensor.body != GROUND:
+    if sensor.fixed_point is None:
         return None
-    marker = system.marker(sensor.point)
+    point, axis = sensor.fixed_point
+    marker = system.marker(point)
     if marker.body == GROUND_INDEX:
         return None
     body = system.bodies[marker.body]
     bending = np.zeros((body.nf, body.nf)) if marker.bending is None else marker.bending
-    axis = np.array(sensor.direction, dtype=float)
-    return Place(number, body.offset, body.angle, body.flexible.start, axis, marker.x0, marker.N, bending)
+    return Place(
+        number, body.offset, body.angle, body.flexible.start, np.array(axis, dtype=float), marker.x0, marker.N, bending
+    )
 
 
 def _affine(system: System, sensor: Sensor) -> Affine | None:
     """The reading as a product with constant rows; None where it is none."""
-    if not isinstance(sensor, Encoder | Tachometer | StrainGauge):
+    if sensor.fixed_point is not None:
         return None
     n, m, motors = system.n, system.m, len(system.mechanism.motors)
-    body = sensor.body if isinstance(sensor, StrainGauge) else system.bodies[0].name
-    angle, still = system.body(body).angle, np.zeros(n)
+    frame = sensor.location.frame
+    angle, still = system.body(system.bodies[0].name if frame == GROUND else frame).angle, np.zeros(n)
     turning = np.zeros(n)
     turning[angle] = 1.0
     at_rest = sensor_rows(system, still, still, still, np.zeros(m), np.zeros(motors), [sensor])
     turned = sensor_rows(system, still, turning, still, np.zeros(m), np.zeros(motors), [sensor])
     reader = SensorReader(system, [sensor])
 
-    def read(q: Array, v: Array, a: Array, multipliers: Array) -> Array:
-        return reader(q[None], v[None], a[None], multipliers[None], np.zeros((1, motors)))[0]
+    def read(q: Array, v: Array, a: Array, multipliers: Array, torques: Array) -> Array:
+        return reader(q[None], v[None], a[None], multipliers[None], torques[None])[0]
 
     rows_q, rows_v, rows_a = (np.asarray(rows.todense()) for rows in (at_rest.q, at_rest.v, at_rest.a))
     extra = np.asarray(turned.q.todense()) - rows_q
-    found = Affine(read(still, still, still, np.zeros(m)), rows_q, rows_v, rows_a, extra, np.array([angle]))
+    found = Affine(
+        read(still, still, still, np.zeros(m), np.zeros(motors)), rows_q, rows_v, rows_a, extra, np.array([angle])
+    )
     random = np.random.default_rng(0)
     for _ in range(_TRIALS):
-        q, v, a, multipliers = (random.standard_normal(size) for size in (n, n, n, m))
-        exact, linear = read(q, v, a, multipliers), found.at(q, v, a)
+        q, v, a, multipliers, torques = (random.standard_normal(size) for size in (n, n, n, m, motors))
+        exact, linear = read(q, v, a, multipliers, torques), found.at(q, v, a)
         if abs(exact[0] - linear[0]) > _SAME * max(abs(exact[0]), abs(linear[0])):
             return None
     return found

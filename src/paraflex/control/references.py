@@ -14,7 +14,7 @@ from paraflex.control.controllers import Plant
 from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion
-from paraflex.mechanism import Encoder, Mechanism, PointSensor, Tachometer
+from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import all_known
 from paraflex.motion import MotionRun
@@ -133,7 +133,7 @@ def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:
 def readings_of(motion: RigidMotion, mechanism: Mechanism, names: Sequence[str]) -> dict[str, Array]:
     """Readings (k,) on a rigid motion of those sensors of a mechanism that it says something of, by name."""
     sensors = {sensor.name: sensor for sensor in measured_sensors(mechanism)}
-    told = [sensors[name] for name in names if isinstance(sensors[name], Encoder | Tachometer | PointSensor)]
+    told = [sensors[name] for name in names if sensors[name].rigid]
     system = motion.system
     nothing = np.zeros((motion.t.size, system.m)), np.zeros((motion.t.size, len(system.mechanism.motors)))
     values = SensorReader(system, told)(motion.q, motion.v, motion.a, *nothing)

@@ -6,8 +6,9 @@ complex steps in these alone. Squire, Trapp (1998), Using complex variables to e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,28 +18,11 @@ from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.contacts import sliding_joints
 from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, line_direction, marker_position
 from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
-from paraflex.dynamics.points import marker_motion
+from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.sections import section_at
 from paraflex.dynamics.system import System
-from paraflex.mechanism import (
-    GROUND,
-    AssumedModesBeam,
-    DeflectionSensor,
-    Encoder,
-    FlexibleBeam,
-    Joint,
-    JointForceSensor,
-    PointSensor,
-    PositionSensor,
-    Sensor,
-    StrainGauge,
-    Tachometer,
-    VelocitySensor,
-    joints_named,
-    points_named,
-)
+from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam, Joint, Mechanism, PointRef, Sensor
 from paraflex.mechanism.checks import check_sensor
-from paraflex.mechanism.sensors import unit_vector
 
 _STEP = 1e-30
 
@@ -63,23 +47,181 @@ class SensorRows(NamedTuple):
     torques: scipy.sparse.csr_matrix
 
 
-class _Local(NamedTuple):
-    """A sensor with what it depends on.
+class _Needed:
+    """Names of what a sensor reads, found by letting it read zeros: a `mechanism.sensors.Moving`."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        self.bodies: dict[str, None] = {}
+        self.loads: dict[str, None] = {}
+        self.beams: dict[str, None] = {}
+
+    def _of_joints(self, *joints: Joint) -> None:
+        self._of_bodies(*(point.body for joint in joints for point in (joint.a, joint.b)))
+
+    def _of_bodies(self, *names: str) -> None:
+        self.bodies |= {name: None for name in names if name != GROUND}
+
+    def coordinate(self, joint: str) -> Array:
+        self._of_joints(self._mechanism.joint(joint))
+        return np.zeros(1)
+
+    rate = coordinate
+
+    def position(self, point: PointRef) -> Array:
+        self._of_bodies(point.body)
+        return np.zeros((1, 2))
+
+    velocity = acceleration = position
+
+    def displacement(self, point: PointRef) -> Array:
+        self._of_bodies(point.body)
+        return np.zeros((1, 3))
+
+    def origin(self, body: str) -> Array:
+        self._of_bodies(body)
+        return np.zeros((1, 2))
+
+    def angle(self, body: str) -> Array:
+        self._of_bodies(body)
+        return np.zeros(1)
+
+    def strain(self, beam: str, at: float | str, distance: float | None) -> Array:
+        self._of_joints(*sliding_joints(self._mechanism, beam))
+        self._of_bodies(beam)
+        self.beams[beam] = None
+        return np.zeros(1)
+
+    def moment(self, joint: str) -> Array:
+        self.loads[joint] = None
+        return self.coordinate(joint)
+
+    def axis(self, joint: str) -> Array:
+        self.coordinate(joint)
+        return np.zeros((1, 2))
+
+    def force(self, joint: str) -> Array:
+        self.loads[joint] = None
+        return self.axis(joint)
+
+
+class _Local:
+    """A sensor in a system of the bodies alone that it depends on.
 
     Attributes
     ----------
-    read : callable
-        From those of its own columns alone to readings (k,).
     columns : MotionSamples of (c,) arrays
         Numbers of the coordinates, multipliers and motors that it depends on.
     """
 
-    read: Callable[[MotionSamples], Numbers]
-    columns: MotionSamples
+    def __init__(self, system: System, sensor: Sensor) -> None:
+        needed = _Needed(system.mechanism)
+        sensor.read(needed)
+        self._sensor = sensor
+        bodies, columns, offset = [], [np.zeros(0, int)], 0
+        for name in needed.bodies:
+            body = system.body(name)
+            bodies.append(replace(body, offset=offset))
+            columns.append(np.arange(body.all.start, body.all.stop))
+            offset += columns[-1].size
+        self.system: System = replace(system, bodies=tuple(bodies))
+        of_bodies = np.concatenate(columns)
+        rows: list[int] = []
+        motors: list[int] = []
+        # Of joints their parts and where their rows and motors begin; of beams where the rows of what slides on it do.
+        self.parts: dict[str, tuple[JointParts, slice, slice]] = {}
+        for name in needed.loads:
+            parts = joint_parts(system, name)
+            own = slice(len(rows), len(rows) + len(parts.rows)), slice(len(motors), len(motors) + len(parts.motors))
+            self.parts[name] = (parts.alone(), *own)
+            rows += parts.rows
+            motors += parts.motors
+        self.contacts: dict[str, slice] = {}
+        for name in needed.beams:
+            normal = [system.rows.index(f"{joint.name} normal") for joint in sliding_joints(system.mechanism, name)]
+            self.contacts[name] = slice(len(rows), len(rows) + len(normal))
+            rows += normal
+        self.section_at = cache(partial(section_at, self.system))
+        self.columns: MotionSamples = MotionSamples(
+            of_bodies, of_bodies, of_bodies, np.array(rows, int), np.array(motors, int)
+        )
 
     def taken(self, given: MotionSamples) -> MotionSamples:
         """Its own columns of those of a system."""
         return MotionSamples(*(values[:, own] for values, own in zip(given, self.columns, strict=True)))
+
+    def read(self, at: MotionSamples) -> Numbers:
+        """Readings (k,) from its own columns."""
+        return self._sensor.read(_Moving(self, at))
+
+
+class _Moving:
+    """Quantities of a local system in motion: a `mechanism.sensors.Moving`."""
+
+    def __init__(self, local: _Local, at: MotionSamples) -> None:
+        self._local, self._system, self._at = local, local.system, at
+
+    def coordinate(self, joint: str) -> Numbers:
+        return joint_coordinate(self._system, joint, self._at.q, self._at.v).value
+
+    def rate(self, joint: str) -> Numbers:
+        return joint_coordinate(self._system, joint, self._at.q, self._at.v).rate
+
+    def position(self, point: PointRef) -> Numbers:
+        return marker_position(self._system, self._system.marker(point), self._at.q)
+
+    def velocity(self, point: PointRef) -> Numbers:
+        return point_motion(self._system, point, self._at.q, self._at.v, self._at.a).velocity
+
+    def acceleration(self, point: PointRef) -> Numbers:
+        return point_motion(self._system, point, self._at.q, self._at.v, self._at.a).acceleration
+
+    def displacement(self, point: PointRef) -> Numbers:
+        marker = self._system.marker(point)
+        u = self._at.q[:, self._system.bodies[marker.body].flexible]
+        x, y = u @ marker.N[0], u @ marker.N[1]
+        if marker.bending is not None:
+            x = x - 0.5 * np.sum(u * (u @ marker.bending), axis=1)
+        return np.column_stack([x, y, u @ marker.slope])
+
+    def origin(self, body: str) -> Numbers:
+        return self._at.q[:, self._system.body(body).position]
+
+    def angle(self, body: str) -> Numbers:
+        return self._at.q[:, self._system.body(body).angle]
+
+    def strain(self, beam: str, at: float | str, distance: float | None) -> Numbers:
+        """N / E A - distance M / E I; without N where its coordinates do not stretch."""
+        described = self._system.mechanism.body(beam)
+        assert isinstance(described, FlexibleBeam | AssumedModesBeam)
+        at_place = self._local.section_at(beam, described.points[at] if isinstance(at, str) else at)
+        if at_place is None:
+            return np.zeros(len(self._at.q))
+        section, stiffness = at_place.section, at_place.material.youngs_modulus
+        distance = section.outer_fibre if distance is None else distance
+        assert distance is not None
+        multipliers = self._at.multipliers[:, self._local.contacts[beam]]
+        moment, force = at_place.loads(self._system, self._at.q, self._at.v, self._at.a, multipliers)
+        axial = 1.0 / (stiffness * section.area) * force if at_place.part.force is not None else 0.0
+        return axial - distance / (stiffness * section.second_moment) * moment
+
+    def force(self, joint: str) -> Numbers:
+        return self._load(joint)[0]
+
+    def moment(self, joint: str) -> Numbers:
+        return self._load(joint)[1]
+
+    def _load(self, joint: str) -> tuple[Numbers, Numbers]:
+        parts, rows, motors = self._local.parts[joint]
+        at = self._at
+        return load_in(self._system, joint, parts, at.q, at.multipliers[:, rows], at.torques[:, motors])
+
+    def axis(self, joint: str) -> Numbers:
+        named = self._system.mechanism.joint(joint)
+        if "distance" in named.holds:
+            return -line_direction(self._system, named, self._at.q)
+        angle = axis_angle(self._system, named, self._at.q)
+        return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 class SensorReader:
@@ -95,10 +237,16 @@ class SensorReader:
     ------
     InputError
         A sensor of what the mechanism does not have.
+
+    Attributes
+    ----------
+    of_torques : bool
+        Whether some readings depend on torques of motors.
     """
 
     def __init__(self, system: System, sensors: Sequence[Sensor] | None = None) -> None:
         self._locals: list[_Local] = _locals(system, sensors)
+        self.of_torques: bool = any(each.columns.torques.size for each in self._locals)
 
     def __call__(self, q: Numbers, v: Numbers, a: Numbers, multipliers: Numbers, torques: Numbers) -> Numbers:
         """See `sensor_readings`."""
@@ -191,124 +339,4 @@ def _locals(system: System, sensors: Sequence[Sensor] | None) -> list[_Local]:
     for sensor in given if sensors is not None else ():
         if sensor not in system.mechanism.sensors:
             check_sensor(system.mechanism, sensor)
-    return [_local(system, sensor) for sensor in given]
-
-
-def _local(system: System, sensor: Sensor) -> _Local:
-    """A sensor in a system of the bodies alone that it depends on."""
-    names, parts = _bodies(system, sensor), JointParts((), ())
-    if isinstance(sensor, JointForceSensor):
-        parts = joint_parts(system, sensor.joint)
-    bodies, columns, offset = [], [np.zeros(0, int)], 0
-    for name in names:
-        body = system.body(name)
-        bodies.append(replace(body, offset=offset))
-        columns.append(np.arange(body.all.start, body.all.stop))
-        offset += columns[-1].size
-    read = _reader(replace(system, bodies=tuple(bodies)), sensor, parts.alone())
-    of_bodies = np.concatenate(columns)
-    normal = [system.rows.index(f"{joint.name} normal") for joint in _contacts(system, sensor)]
-    rows, motors = (np.array(each, int) for each in (parts.rows + normal, list(parts.motors)))
-    return _Local(read, MotionSamples(of_bodies, of_bodies, of_bodies, rows, motors))
-
-
-def _contacts(system: System, sensor: Sensor) -> list[Joint]:
-    """Joints that slide along the beam of a strain gauge: their forces bend it where they are."""
-    return sliding_joints(system.mechanism, sensor.body) if isinstance(sensor, StrainGauge) else []
-
-
-def _bodies(system: System, sensor: Sensor) -> list[str]:
-    """Names of the bodies that a reading depends on, each once."""
-    joints = [system.mechanism.joint(name) for _, name, _ in joints_named(sensor)] + _contacts(system, sensor)
-    points = [*points_named(sensor).values(), *(point for joint in joints for point in (joint.a, joint.b))]
-    names = [*(point.body for point in points), getattr(sensor, "body", GROUND)]
-    return [name for name in dict.fromkeys(names) if name != GROUND]
-
-
-def _reader(system: System, sensor: Sensor, parts: JointParts) -> Callable[[MotionSamples], Numbers]:
-    """What a sensor of a system does."""
-    if isinstance(sensor, Encoder):
-        return lambda at: joint_coordinate(system, sensor.joint, at.q, at.v).value
-    if isinstance(sensor, Tachometer):
-        return lambda at: joint_coordinate(system, sensor.joint, at.q, at.v).rate
-    if isinstance(sensor, PointSensor):
-        return _of_point(system, sensor)
-    if isinstance(sensor, StrainGauge):
-        return _of_strain(system, sensor)
-    if isinstance(sensor, JointForceSensor):
-        return lambda at: _of_load(system, sensor, parts, at)
-    if isinstance(sensor, DeflectionSensor):
-        return _of_deflection(system, sensor)
-    raise TypeError(sensor)
-
-
-def _of_point(system: System, sensor: PointSensor) -> Callable[[MotionSamples], Numbers]:
-    """Component of a point's motion along an axis, which a body may carry."""
-    marker, (ex, ey) = system.marker(sensor.point), sensor.direction
-    frame = None if sensor.body == GROUND else system.body(sensor.body)
-
-    def read(at: MotionSamples) -> Numbers:
-        if isinstance(sensor, PositionSensor):
-            vector = marker_position(system, marker, at.q)
-            vector = vector if frame is None else vector - at.q[:, frame.position]
-        else:
-            motion = marker_motion(system, marker, at.q, at.v, at.a)
-            vector = motion.velocity if isinstance(sensor, VelocitySensor) else motion.acceleration
-        if frame is None:
-            return ex * vector[:, 0] + ey * vector[:, 1]
-        c, s = np.cos(at.q[:, frame.angle]), np.sin(at.q[:, frame.angle])
-        return (c * ex - s * ey) * vector[:, 0] + (s * ex + c * ey) * vector[:, 1]
-
-    return read
-
-
-def _of_strain(system: System, sensor: StrainGauge) -> Callable[[MotionSamples], Numbers]:
-    """Strain of a beam, N / E A - distance M / E I; without N where its coordinates do not stretch."""
-    described = system.mechanism.body(sensor.body)
-    assert isinstance(described, FlexibleBeam | AssumedModesBeam)
-    at_place = section_at(system, sensor.body, sensor.place(described.points))
-    if at_place is None:
-        return lambda at: np.zeros(len(at.q))
-    section, stiffness = at_place.section, at_place.material.youngs_modulus
-    distance = section.outer_fibre if sensor.distance is None else sensor.distance
-    assert distance is not None
-    bending, axial = distance / (stiffness * section.second_moment), 1.0 / (stiffness * section.area)
-
-    def read(at: MotionSamples) -> Numbers:
-        moment, force = at_place.loads(system, at.q, at.v, at.a, at.multipliers)
-        return (axial * force if at_place.part.force is not None else 0.0) - bending * moment
-
-    return read
-
-
-def _of_load(system: System, sensor: JointForceSensor, parts: JointParts, at: MotionSamples) -> Numbers:
-    """Component of a joint's force, or its moment."""
-    force, moment = load_in(system, sensor.joint, parts, at.q, at.multipliers, at.torques)
-    if sensor.axis == "moment":
-        return moment
-    if sensor.axis == "along":
-        joint = system.mechanism.joint(sensor.joint)
-        if "distance" in joint.holds:
-            return -np.sum(line_direction(system, joint, at.q) * force, axis=1)
-        angle = axis_angle(system, joint, at.q)
-        return np.cos(angle) * force[:, 0] + np.sin(angle) * force[:, 1]
-    ex, ey = unit_vector(sensor.axis)
-    return ex * force[:, 0] + ey * force[:, 1]
-
-
-def _of_deflection(system: System, sensor: DeflectionSensor) -> Callable[[MotionSamples], Numbers]:
-    """Displacement of a point in its body's frame, or the turn of the material there."""
-    marker = system.marker(sensor.point)
-    body = system.bodies[marker.body]
-    if sensor.axis == "angle":
-        return lambda at: at.q[:, body.flexible] @ marker.slope
-    row = 0 if sensor.axis == "x" else 1
-
-    def read(at: MotionSamples) -> Numbers:
-        u = at.q[:, body.flexible]
-        moved = u @ marker.N[row]
-        if row or marker.bending is None:
-            return moved
-        return moved - 0.5 * np.sum(u * (u @ marker.bending), axis=1)
-
-    return read
+    return [_Local(system, sensor) for sensor in given]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from paraflex.errors import InputError, suggestion
-from paraflex.mechanism.bodies import AssumedModesBeam, FlexibleBeam
+from paraflex.mechanism.bodies import FlexibleBeam
 from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.groups import Group, grouped, groups_of
 from paraflex.mechanism.joints import GROUND, Joint, PointRef, points_named
@@ -15,7 +15,7 @@ from paraflex.mechanism.members import Assembly, Members
 from paraflex.mechanism.poses import approximate_poses, placed_poses
 from paraflex.mechanism.quantities import check_numbers, finite, joints_named, known
 from paraflex.mechanism.rotors import check_actuators
-from paraflex.mechanism.sensors import JointForceSensor, PointSensor, Sensor, StrainGauge
+from paraflex.mechanism.sensors import Sensor
 
 
 def check_mechanism(mechanism: Members) -> None:
@@ -39,7 +39,7 @@ def check_mechanism(mechanism: Members) -> None:
     check_task(mechanism)
     check_loads(mechanism)
     for sensor in mechanism.sensors:
-        _check_measured(mechanism, sensor)
+        sensor.check(mechanism, f"sensor.{sensor.name}")
     check_actuators(mechanism)
 
 
@@ -185,50 +185,7 @@ def check_sensor(mechanism: Members, sensor: Sensor) -> None:
     group = groups_of(type(mechanism))["sensors"]
     _check_joints_of(sensor, group, {joint.name: joint for joint in mechanism.joints})
     _check_points_of(mechanism, group, sensor)
-    _check_measured(mechanism, sensor)
-
-
-def _check_measured(mechanism: Members, sensor: Sensor) -> None:
-    """Check that the body, the joint axis or the beam at which a sensor measures exists."""
-    field = f"sensor.{sensor.name}"
-    if isinstance(sensor, PointSensor):
-        known(sensor.body, mechanism.points, f"{field}.body", "body")
-    elif isinstance(sensor, JointForceSensor):
-        joint = mechanism.joint(sensor.joint)
-        if sensor.axis == "along" and not (joint.slides or "distance" in joint.holds):
-            raise InputError(
-                f"a {joint.kind} joint has no axis to measure along", field=f"{field}.axis", value=sensor.axis,
-                remedy='give "x", "y", "moment" or an angle in rad',
-            )  # fmt: skip
-    elif isinstance(sensor, StrainGauge):
-        _check_strain(mechanism, sensor, field)
-
-
-def _check_strain(mechanism: Members, sensor: StrainGauge, field: str) -> None:
-    """Check that a `StrainGauge` is on a beam, and that its distance from the neutral axis is known."""
-    known(sensor.body, mechanism.points, f"{field}.body", "body")
-    beam = None if sensor.body == GROUND else mechanism.body(sensor.body)
-    if not isinstance(beam, FlexibleBeam | AssumedModesBeam):
-        beams = [body.name for body in mechanism.bodies if isinstance(body, FlexibleBeam | AssumedModesBeam)]
-        raise InputError(
-            "strain is measured on beams", field=f"{field}.body", value=sensor.body,
-            remedy=suggestion(sensor.body, beams),
-        )  # fmt: skip
-    if isinstance(sensor.at, str):
-        known(sensor.at, beam.points, f"{field}.at", "point of the beam")
-    else:
-        finite(sensor.at, f"{field}.at")
-        if not 0.0 <= sensor.at <= beam.length:
-            raise InputError(
-                "the place lies beyond the beam's end", field=f"{field}.at", value=sensor.at,
-                remedy=f"choose it between 0 and the length {beam.length:g} m",
-            )  # fmt: skip
-    sections = beam.section if isinstance(beam.section, tuple) else (beam.section,)
-    if sensor.distance is None and any(section.outer_fibre is None for section in sections):
-        raise InputError(
-            "the outermost fibre of the section is not known", field=f"{field}.distance",
-            remedy="give the distance from the neutral axis in m, or the section's outer_fibre",
-        )  # fmt: skip
+    sensor.check(mechanism, f"sensor.{sensor.name}")
 
 
 def _two_bodies(mechanism: Members, a: PointRef, b: PointRef, field: str, what: str, remedy: str) -> None:

@@ -16,8 +16,8 @@ from paraflex.mechanism.bodies import Body, FlexibleBeam
 from paraflex.mechanism.cut import Cut
 from paraflex.mechanism.joints import PointRef, WeldJoint
 from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.segments import FIRST_END, LAST_END, frame_read, moved, rebuilt
-from paraflex.mechanism.sensors import Sensor, StrainGauge
+from paraflex.mechanism.segments import FIRST_END, LAST_END, moved, rebuilt
+from paraflex.mechanism.sensors import Sensor
 
 # Positions closer than this fraction of the beam coincide.
 _SAME = 1e-9
@@ -65,8 +65,8 @@ def _check(mechanism: Mechanism, beams: set[str]) -> None:
                 value=getattr(mechanism.body(joint.a.body), "frames", None), remedy="leave it out, or give it elements",
             )  # fmt: skip
     for sensor in mechanism.sensors:
-        frame = frame_read(sensor)
-        if frame in beams and not isinstance(sensor, StrainGauge):
+        frame = sensor.location.frame
+        if frame in beams and sensor.location.at is None:
             raise InputError(
                 f"reads in the frame of {frame}, which has several", field=f"sensor.{sensor.name}",
                 remedy=f"measure in the ground frame, or give {frame} one frame",
@@ -74,13 +74,15 @@ def _check(mechanism: Mechanism, beams: set[str]) -> None:
 
 
 def _on_part(sensor: Sensor, beams: Mapping[str, FlexibleBeam]) -> Sensor:
-    """Return a `StrainGauge` moved to the right part of its beam; at a cut to the part nearer to the last end."""
-    if not isinstance(sensor, StrainGauge) or sensor.body not in beams:
+    """Return a sensor in a section of a beam, moved to the right part; at a cut to the part nearer to the last end."""
+    location = sensor.location
+    if location.at is None or location.frame not in beams:
         return sensor
-    beam = beams[sensor.body]
-    place = sensor.place(beam.points)
+    beam = beams[location.frame]
+    place = location.along(beam.points)
     number = _part_at(beam, place)
-    return replace(sensor, body=_name(beam, number), at=place - number * beam.length / beam.frames)
+    part = {"body": _name(beam, number), "at": place - number * beam.length / beam.frames}
+    return replace(sensor, **part)
 
 
 def _name(beam: FlexibleBeam, number: int) -> str:

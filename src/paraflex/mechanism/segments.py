@@ -21,7 +21,6 @@ from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import Assembly
 from paraflex.mechanism.poses import approximate_poses
-from paraflex.mechanism.sensors import DeflectionSensor, Sensor
 
 T = TypeVar("T")
 
@@ -123,7 +122,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         places |= {PointRef(body.name, point): PointRef(names[i], point) for point, i in owners.items()}
 
     segmented = rebuilt(
-        replace(mechanism, sensors=tuple(one for one in mechanism.sensors if frame_read(one) not in counts)),
+        replace(mechanism, sensors=tuple(one for one in mechanism.sensors if one.location.frame not in counts)),
         bodies, joints, Cut(mechanism, carriers, places),
         name=f"{mechanism.name}, finite segments",
         springs=(*mechanism.springs, *springs), dampers=(*mechanism.dampers, *dampers),
@@ -155,11 +154,6 @@ def rebuilt(
         cut=cut,
         **kept | changed,
     )
-
-
-def frame_read(sensor: Sensor) -> str:
-    """Return the name of the body in or in whose frame a sensor measures; empty for a sensor without one."""
-    return sensor.point.body if isinstance(sensor, DeflectionSensor) else getattr(sensor, "body", "")
 
 
 def is_hinge(joint: Joint) -> bool:

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from functools import cached_property
+from typing import Any, ClassVar, Literal, Protocol
+
+import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.errors import InputError
+from paraflex.arrays import Numbers
+from paraflex.errors import InputError, suggestion
 from paraflex.limits import of_size
-from paraflex.mechanism.joints import GROUND, PointRef
-from paraflex.mechanism.quantities import AT_JOINT, finite, optional, said
+from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam
+from paraflex.mechanism.joints import GROUND, Joint, PointRef
+from paraflex.mechanism.quantities import AT_JOINT, finite, known, optional, said
 
 # Kinds of sensors by their names in files.
 SENSOR_KINDS: dict[str, type[Sensor]] = {}
@@ -32,22 +38,136 @@ def _axis(*words: str, angle: bool = True) -> Callable[[Any, str], None]:
     return check
 
 
+class Moving(Protocol):
+    """Quantities of a mechanism in motion at k instants, from which sensors read.
+
+    Vectors are in the ground frame. All may be complex, for derivatives by complex steps: use no absolute values, norms
+    or comparisons of them.
+    """
+
+    def coordinate(self, joint: str) -> Numbers:
+        """Angle [rad] or travel [m] of a joint (k,)."""
+        ...
+
+    def rate(self, joint: str) -> Numbers:
+        """Rate of a joint's angle [rad/s] or travel [m/s] (k,)."""
+        ...
+
+    def position(self, point: PointRef) -> Numbers:
+        """Position of a material point (k, 2) [m]."""
+        ...
+
+    def velocity(self, point: PointRef) -> Numbers:
+        """Velocity of a material point (k, 2) [m/s]."""
+        ...
+
+    def acceleration(self, point: PointRef) -> Numbers:
+        """Acceleration of a material point (k, 2) [m/s^2]."""
+        ...
+
+    def displacement(self, point: PointRef) -> Numbers:
+        """Elastic displacement along x and y [m] and rotation [rad] (k, 3) of a point in the frame of its body."""
+        ...
+
+    def origin(self, body: str) -> Numbers:
+        """Position of the origin of a body's frame (k, 2) [m]."""
+        ...
+
+    def angle(self, body: str) -> Numbers:
+        """Angle of a body's frame (k,) [rad]."""
+        ...
+
+    def strain(self, beam: str, at: float | str, distance: float | None) -> Numbers:
+        """Axial strain of a beam (k,) at a point or distance from its first end, and one from the neutral axis [m].
+
+        By default in the outermost fibre.
+        """
+        ...
+
+    def force(self, joint: str) -> Numbers:
+        """Force of a joint's first body on its second (k, 2) [N]."""
+        ...
+
+    def moment(self, joint: str) -> Numbers:
+        """Moment of a joint's first body on its second (k,) [N m]."""
+        ...
+
+    def axis(self, joint: str) -> Numbers:
+        """Unit vector (k, 2) of the axis of a sliding joint, or along the rod of a distance joint, tension positive."""
+        ...
+
+
+class Described(Protocol):
+    """Members of a mechanism by which a sensor is checked."""
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies."""
+        ...
+
+    @cached_property
+    def points(self) -> Mapping[str, Mapping[str, object]]:
+        """Named points by body, the ground among them."""
+        ...
+
+    def body(self, name: str) -> Body:
+        """Return the body of a name."""
+        ...
+
+    def joint(self, name: str) -> Joint:
+        """Return the joint of a name."""
+        ...
+
+
+@dataclass(frozen=True)
+class Location:
+    """Place of a sensor, a joint, a named point or a section of a beam, and the direction that it measures along.
+
+    Attributes
+    ----------
+    joint : str
+        Joint that it is at; empty for another place.
+    point : PointRef, optional
+        Point that it is at.
+    at : float or str, optional
+        Section of the beam `frame` that it is in: distance from the first end [m], or a named point.
+    axis : (float, float) or "own", optional
+        Unit vector in the frame; "own" for the axis of its joint, or of its beam there. None for an angle or a moment.
+    frame : str
+        Body in whose frame it measures.
+    """
+
+    joint: str = ""
+    point: PointRef | None = None
+    at: float | str | None = None
+    axis: tuple[float, float] | Literal["own"] | None = None
+    frame: str = GROUND
+
+    def along(self, points: Mapping[str, float]) -> float:
+        """Distance from the first end of the beam with these points [m]."""
+        assert self.at is not None
+        return points[self.at] if isinstance(self.at, str) else self.at
+
+
 @given_as("a sensor", "a sensor of any kind, say Encoder")
 @dataclass(frozen=True)
-class Sensor(CheckedFields):
+class Sensor(CheckedFields, ABC):
     """Ideal sensor without error or delay: the base class of all kinds.
 
-    A subclass such as `class Encoder(Sensor, kind="encoder", units=("rad", "m"))` defines a kind of sensor for files,
-    results and linear models.
+    A subclass such as `class Encoder(Sensor, kind="encoder", units=("rad", "m"))` defines a kind of sensor: its methods
+    `read` and `location`, and `check` and `unit` if the defaults do not apply, are all that files, runs, linear models,
+    drawings and controllers use.
 
     Attributes
     ----------
     name : str
-        Name of the sensor.
+        Name of the sensor, unique in its mechanism.
     kind : str
         Name of the kind in files.
     units : tuple of str
-        SI unit of the readings; for a sensor at a joint that at a joint which turns, then that at one which slides.
+        SI unit of readings; for a sensor at a joint that of an angle, then that of a travel.
+    rigid : bool
+        Whether the rigid motion alone gives the reading, such as an angle, so that a plan has it.
     """
 
     _table = "sensor"
@@ -55,15 +175,46 @@ class Sensor(CheckedFields):
     name: str
     kind: ClassVar[str]
     units: ClassVar[tuple[str, ...]]
+    rigid: ClassVar[bool] = True
 
-    def __init_subclass__(cls, *, kind: str = "", units: tuple[str, ...] = ()) -> None:
+    def __init_subclass__(cls, *, kind: str = "", units: tuple[str, ...] = (), rigid: bool | None = None) -> None:
         super().__init_subclass__()
+        cls.rigid = cls.rigid if rigid is None else rigid
         if kind:
             cls.kind, cls.units = kind, units
             SENSOR_KINDS[kind] = cls
 
+    @abstractmethod
+    def read(self, moving: Moving) -> Numbers:
+        """Return the readings (k,) for a mechanism in motion."""
+
+    @property
+    @abstractmethod
+    def location(self) -> Location:
+        """Place of the sensor and the direction that it measures along."""
+
+    @property
+    def fixed_point(self) -> tuple[PointRef, tuple[float, float]] | None:
+        """Point whose position along a fixed axis is the reading, and the axis; None for any other reading."""
+        return None
+
+    def check(self, mechanism: Described, field: str) -> None:
+        """Check that the mechanism has what is measured; names of joints and points are checked before.
+
+        Raises
+        ------
+        InputError
+            It does not; the message begins with `field`.
+        """
+
     def unit(self, slides: bool) -> str:
-        """Return the SI unit of the readings; `slides` is whether the coordinate of the joint is a travel."""
+        """Return the SI unit of readings.
+
+        Parameters
+        ----------
+        slides : bool
+            Whether the sensor's joint has a travel instead of an angle.
+        """
         return self.units[-1 if slides else 0]
 
 
@@ -73,12 +224,30 @@ class Encoder(Sensor, kind="encoder", units=("rad", "m")):
 
     joint: str = field(metadata=AT_JOINT)
 
+    def read(self, moving: Moving) -> Numbers:
+        """See `Sensor.read`."""
+        return moving.coordinate(self.joint)
+
+    @property
+    def location(self) -> Location:
+        """See `Sensor.location`."""
+        return Location(joint=self.joint, axis="own")
+
 
 @dataclass(frozen=True)
 class Tachometer(Sensor, kind="tachometer", units=("rad/s", "m/s")):
     """Rate of a joint's angle [rad/s] or travel [m/s], slopes of beams included."""
 
     joint: str = field(metadata=AT_JOINT)
+
+    def read(self, moving: Moving) -> Numbers:
+        """See `Sensor.read`."""
+        return moving.rate(self.joint)
+
+    @property
+    def location(self) -> Location:
+        """See `Sensor.location`."""
+        return Location(joint=self.joint, axis="own")
 
 
 @dataclass(frozen=True)
@@ -104,19 +273,45 @@ class PointSensor(Sensor):
     body: str = optional(GROUND, "the body in whose frame the axis is fixed, by default the ground")
 
     @property
-    def direction(self) -> tuple[float, float]:
-        """Unit vector of the axis in the frame."""
-        return unit_vector(self.axis)
+    def location(self) -> Location:
+        """See `Sensor.location`."""
+        return Location(point=self.point, axis=unit_vector(self.axis), frame=self.body)
+
+    def check(self, mechanism: Described, field: str) -> None:
+        """See `Sensor.check`."""
+        known(self.body, mechanism.points, f"{field}.body", "body")
+
+    def _component(self, vector: Numbers, moving: Moving) -> Numbers:
+        """Component of vectors (k, 2) along the axis."""
+        ex, ey = unit_vector(self.axis)
+        if self.body == GROUND:
+            return ex * vector[:, 0] + ey * vector[:, 1]
+        c, s = np.cos(moving.angle(self.body)), np.sin(moving.angle(self.body))
+        return (c * ex - s * ey) * vector[:, 0] + (s * ex + c * ey) * vector[:, 1]
 
 
 @dataclass(frozen=True)
 class PositionSensor(PointSensor, kind="position", units=("m",)):
     """Position of a point along an axis, from the origin of the frame in which the axis is fixed [m]."""
 
+    def read(self, moving: Moving) -> Numbers:
+        """See `Sensor.read`."""
+        place = moving.position(self.point)
+        return self._component(place if self.body == GROUND else place - moving.origin(self.body), moving)
+
+    @property
+    def fixed_point(self) -> tuple[PointRef, tuple[float, float]] | None:
+        """See `Sensor.fixed_point`."""
+        return (self.point, unit_vector(self.axis)) if self.body == GROUND else None
+
 
 @dataclass(frozen=True)
 class VelocitySensor(PointSensor, kind="velocity", units=("m/s",)):
     """Component of a point's absolute velocity along an axis [m/s]."""
+
+    def read(self, moving: Moving) -> Numbers:
+        """See `Sensor.read`."""
+        return self._component(moving.velocity(self.point), moving)
 
 
 @dataclass(frozen=True)
@@ -127,9 +322,13 @@ class AccelerationSensor(PointSensor, kind="acceleration", units=("m/s^2",)):
     gravity; this reading does not include gravity.
     """
 
+    def read(self, moving: Moving) -> Numbers:
+        """See `Sensor.read`."""
+        return self._component(moving.acceleration(self.point), moving)
+
 
 @dataclass(frozen=True)
-class StrainGauge(Sensor, kind="strain", units=("1",)):
+class StrainGauge(Sensor, kind="strain", units=("1",), rigid=False):
     """Axial strain of a beam, positive in tension: N / E A - distance M / E I, with M = E I w''.
 
     Attributes
@@ -152,13 +351,44 @@ class StrainGauge(Sensor, kind="strain", units=("1",)):
         finite,
     )
 
-    def place(self, points: Mapping[str, float]) -> float:
-        """Return the distance from the first end [m] of a beam with the given points."""
-        return points[self.at] if isinstance(self.at, str) else self.at
+    def read(self, moving: Moving) -> Numbers:
+        """See `Sensor.read`."""
+        return moving.strain(self.body, self.at, self.distance)
+
+    @property
+    def location(self) -> Location:
+        """See `Sensor.location`."""
+        return Location(at=self.at, axis="own", frame=self.body)
+
+    def check(self, mechanism: Described, field: str) -> None:
+        """See `Sensor.check`."""
+        known(self.body, mechanism.points, f"{field}.body", "body")
+        beam = None if self.body == GROUND else mechanism.body(self.body)
+        if not isinstance(beam, FlexibleBeam | AssumedModesBeam):
+            beams = [body.name for body in mechanism.bodies if isinstance(body, FlexibleBeam | AssumedModesBeam)]
+            raise InputError(
+                "strain is measured on beams", field=f"{field}.body", value=self.body,
+                remedy=suggestion(self.body, beams),
+            )  # fmt: skip
+        if isinstance(self.at, str):
+            known(self.at, beam.points, f"{field}.at", "point of the beam")
+        else:
+            finite(self.at, f"{field}.at")
+            if not 0.0 <= self.at <= beam.length:
+                raise InputError(
+                    "the place lies beyond the beam's end", field=f"{field}.at", value=self.at,
+                    remedy=f"choose it between 0 and the length {beam.length:g} m",
+                )  # fmt: skip
+        sections = beam.section if isinstance(beam.section, tuple) else (beam.section,)
+        if self.distance is None and any(section.outer_fibre is None for section in sections):
+            raise InputError(
+                "the outermost fibre of the section is not known", field=f"{field}.distance",
+                remedy="give the distance from the neutral axis in m, or the section's outer_fibre",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class JointForceSensor(Sensor, kind="joint_force"):
+class JointForceSensor(Sensor, kind="joint_force", rigid=False):
     """Component of the force [N], or the moment [N m], that the first body of a joint exerts on the second.
 
     It acts at the joint's point of the second body and includes everything in the joint: constraints, motors, springs,
@@ -181,14 +411,40 @@ class JointForceSensor(Sensor, kind="joint_force"):
         )
     )
 
+    def read(self, moving: Moving) -> Numbers:
+        """See `Sensor.read`."""
+        if self.axis == "moment":
+            return moving.moment(self.joint)
+        force = moving.force(self.joint)
+        if self.axis == "along":
+            return np.sum(moving.axis(self.joint) * force, axis=1)
+        ex, ey = unit_vector(self.axis)
+        return ex * force[:, 0] + ey * force[:, 1]
+
+    @property
+    def location(self) -> Location:
+        """See `Sensor.location`."""
+        if self.axis == "along":
+            return Location(joint=self.joint, axis="own")
+        return Location(joint=self.joint, axis=None if self.axis == "moment" else unit_vector(self.axis))
+
+    def check(self, mechanism: Described, field: str) -> None:
+        """See `Sensor.check`."""
+        joint = mechanism.joint(self.joint)
+        if self.axis == "along" and not (joint.slides or "distance" in joint.holds):
+            raise InputError(
+                f"a {joint.kind} joint has no axis to measure along", field=f"{field}.axis", value=self.axis,
+                remedy='give "x", "y", "moment" or an angle in rad',
+            )  # fmt: skip
+
     def unit(self, slides: bool) -> str:
         """Return the SI unit of the readings, see `Sensor.unit`."""
         return "N m" if self.axis == "moment" else "N"
 
 
 @dataclass(frozen=True)
-class DeflectionSensor(Sensor, kind="deflection"):
-    """Displacement of a material point in the frame of its body, relative to the undeformed body.
+class DeflectionSensor(Sensor, kind="deflection", rigid=False):
+    """Displacement of a material point from its undeformed position, in the frame of its body.
 
     Attributes
     ----------
@@ -202,6 +458,16 @@ class DeflectionSensor(Sensor, kind="deflection"):
     axis: Literal["x", "y", "angle"] = field(
         metadata=said('"x", "y" or "angle"', _axis("x", "y", "angle", angle=False))
     )
+
+    def read(self, moving: Moving) -> Numbers:
+        """See `Sensor.read`."""
+        return moving.displacement(self.point)[:, ("x", "y", "angle").index(self.axis)]
+
+    @property
+    def location(self) -> Location:
+        """See `Sensor.location`."""
+        axis = None if self.axis == "angle" else unit_vector(self.axis)
+        return Location(point=self.point, axis=axis, frame=self.point.body)
 
     def unit(self, slides: bool) -> str:
         """Return the SI unit of the readings, see `Sensor.unit`."""

@@ -9,14 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam
-from paraflex.mechanism.sensors import (
-    DeflectionSensor,
-    JointForceSensor,
-    PointSensor,
-    Sensor,
-    StrainGauge,
-    unit_vector,
-)
+from paraflex.mechanism.sensors import Location, Sensor
 from paraflex.plots.marks import round_arrow, straight_arrow
 from paraflex.plots.scene import Limits
 from paraflex.plots.signs import Arrow
@@ -48,7 +41,7 @@ def sensor_marks(posed: Posed, limits: Limits) -> list[SensorMark]:
 
 
 def _mark(posed: Posed, sensor: Sensor, limits: Limits) -> SensorMark:
-    place, axis = _place(posed, sensor), _axis(posed, sensor)
+    place, axis = _place(posed, sensor.location), _axis(posed, sensor.location)
     if axis is None:
         line, head = round_arrow(place[None], _RADIUS * limits.size, _FROM, np.array([_BY]), limits, _HEAD)
     else:
@@ -57,49 +50,39 @@ def _mark(posed: Posed, sensor: Sensor, limits: Limits) -> SensorMark:
     return SensorMark(sensor.kind.replace("_", " "), sensor.name, place, arrow)
 
 
-def _place(posed: Posed, sensor: Sensor) -> Array:
-    """Where a sensor is."""
-    if isinstance(sensor, StrainGauge):
-        return _along_beam(posed, sensor)[0]
-    if isinstance(sensor, PointSensor | DeflectionSensor):
-        return posed.place(sensor.point)
-    joint = _joint(posed, sensor)
-    return np.full(2, np.nan) if joint is None else posed.data["joint_position"].values[0, joint].astype(float)
+def _place(posed: Posed, location: Location) -> Array:
+    """Place of a sensor (2,) [m]; NaN where it is not known."""
+    if location.at is not None:
+        return _along_beam(posed, location)[0]
+    if location.point is not None:
+        return posed.place(location.point)
+    joint = [one.name for one in posed.mechanism.joints].index(location.joint)
+    return posed.data["joint_position"].values[0, joint].astype(float)
 
 
-def _axis(posed: Posed, sensor: Sensor) -> Array | None:
-    """Unit vector along which a sensor measures; None of one that measures an angle or a moment."""
-    if isinstance(sensor, StrainGauge):
-        return _along_beam(posed, sensor)[1]
-    if isinstance(sensor, PointSensor):
-        return _turned(sensor.direction, 0.0 if sensor.body == GROUND else posed.angles[sensor.body])
-    if isinstance(sensor, DeflectionSensor):
-        return None if sensor.axis == "angle" else _turned(unit_vector(sensor.axis), posed.angles[sensor.point.body])
-    if isinstance(sensor, JointForceSensor) and sensor.axis not in ("along", "moment"):
-        return _turned(unit_vector(sensor.axis), 0.0)
-    if isinstance(sensor, JointForceSensor) and sensor.axis == "moment":
+def _axis(posed: Posed, location: Location) -> Array | None:
+    """Unit vector along which a sensor measures; None for an angle or a moment."""
+    if location.axis is None:
         return None
-    joint = _joint(posed, sensor)
-    direction = np.nan if joint is None else float(posed.data["joint_direction"].values[0, joint])
+    if location.axis != "own":
+        return _turned(location.axis, 0.0 if location.frame == GROUND else posed.angles[location.frame])
+    if location.at is not None:
+        return _along_beam(posed, location)[1]
+    joint = [one.name for one in posed.mechanism.joints].index(location.joint)
+    direction = float(posed.data["joint_direction"].values[0, joint])
     return _turned((1.0, 0.0), direction) if np.isfinite(direction) else None
 
 
-def _joint(posed: Posed, sensor: Sensor) -> int | None:
-    """Number of a sensor's joint; None of a kind of its own that has none."""
-    names, name = [joint.name for joint in posed.mechanism.joints], getattr(sensor, "joint", None)
-    return names.index(name) if name in names else None
-
-
-def _along_beam(posed: Posed, gauge: StrainGauge) -> tuple[Array, Array]:
-    """Place of a strain gauge, and the direction of its beam there."""
+def _along_beam(posed: Posed, location: Location) -> tuple[Array, Array]:
+    """Place of a section of a beam, and the direction of the beam there."""
     data = posed.data
-    own = data["station_body"].values == gauge.body
+    own = data["station_body"].values == location.frame
     along, places = data["station_place"].values[own, 0], data["shape"].values[0, own].astype(float)
     order = np.argsort(along, kind="stable")
     along, places = along[order], places[order]
-    described = posed.mechanism.body(gauge.body)
+    described = posed.mechanism.body(location.frame)
     assert isinstance(described, FlexibleBeam | AssumedModesBeam)
-    at = gauge.place(described.points)
+    at = location.along(described.points)
     place = np.array([np.interp(at, along, places[:, k]) for k in range(2)])
     after = int(np.clip(np.searchsorted(along, at, side="right"), 1, len(along) - 1))
     step = places[after] - places[after - 1]
