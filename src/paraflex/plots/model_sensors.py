@@ -1,4 +1,4 @@
-"""Sensors of a mechanism before it runs: where they are, and what they measure along or turn with."""
+"""Marks of sensors in a model drawing: their positions and the axes or angles that they measure."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ from paraflex.results.posed import Posed
 
 Array = NDArray[np.float64]
 
-# Look of a sensor's place.
+# Look of a sensor's mark.
 SENSOR: dict[str, Any] = {"marker": "D", "markersize": 3.6, "markeredgewidth": 1.0, "linestyle": "none"}
-# Length of an axis' arrow, and radius of that of an angle, as parts of the picture's larger side; its angles [rad].
+# Length of the arrow of an axis and radius of that of an angle, as shares of the picture's larger side; start angle and
+# sweep of the latter [rad], and relative size of the heads.
 _AXIS, _RADIUS = 0.055, 0.02
 _FROM, _BY, _HEAD = -0.7, 1.6, 0.45
 
 
 @dataclass(frozen=True)
 class SensorMark:
-    """A sensor: its kind in words, its name, its place (2,), and the arrow of its axis or of the angle it measures."""
+    """Mark of a sensor: kind in words, name, position (2,), and the arrow of the axis or angle that it measures."""
 
     kind: str
     name: str
@@ -42,7 +43,7 @@ class SensorMark:
 
 
 def sensor_marks(posed: Posed, limits: Limits) -> list[SensorMark]:
-    """Marks of all sensors whose places are known."""
+    """Return the marks of all sensors whose positions are known."""
     marks = [_mark(posed, sensor, limits) for sensor in posed.mechanism.sensors]
     return [mark for mark in marks if np.isfinite(mark.place).all()]
 
@@ -58,7 +59,7 @@ def _mark(posed: Posed, sensor: Sensor, limits: Limits) -> SensorMark:
 
 
 def _place(posed: Posed, sensor: Sensor) -> Array:
-    """Where a sensor is."""
+    """Return the position (2,) of a sensor; NaN if it is unknown."""
     if isinstance(sensor, StrainGauge):
         return _along_beam(posed, sensor)[0]
     if isinstance(sensor, PointSensor | DeflectionSensor):
@@ -68,7 +69,7 @@ def _place(posed: Posed, sensor: Sensor) -> Array:
 
 
 def _axis(posed: Posed, sensor: Sensor) -> Array | None:
-    """Unit vector along which a sensor measures; None of one that measures an angle or a moment."""
+    """Return the unit vector along which a sensor measures; None if it measures an angle or a moment."""
     if isinstance(sensor, StrainGauge):
         return _along_beam(posed, sensor)[1]
     if isinstance(sensor, PointSensor):
@@ -85,13 +86,13 @@ def _axis(posed: Posed, sensor: Sensor) -> Array | None:
 
 
 def _joint(posed: Posed, sensor: Sensor) -> int | None:
-    """Number of a sensor's joint; None of a kind of its own that has none."""
+    """Return the index of a sensor's joint; None for a user-defined kind of sensor without a joint."""
     names, name = [joint.name for joint in posed.mechanism.joints], getattr(sensor, "joint", None)
     return names.index(name) if name in names else None
 
 
 def _along_beam(posed: Posed, gauge: StrainGauge) -> tuple[Array, Array]:
-    """Place of a strain gauge, and the direction of its beam there."""
+    """Return the position of a `StrainGauge` and the direction of its beam there."""
     data = posed.data
     own = data["station_body"].values == gauge.body
     along, places = data["station_place"].values[own, 0], data["shape"].values[0, own].astype(float)
