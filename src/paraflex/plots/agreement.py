@@ -1,4 +1,4 @@
-"""Several models of one mechanism in one figure: links, end-effector, distances (Figs. 22, 23 and beyond)."""
+"""Figures that compare models of one mechanism: links, end-effector, distances (Figs. 22, 23 and beyond)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Curves of two runs in common panels."""
+"""Figures that compare two runs by curves in common panels."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from paraflex.plots.themes import theme
 from paraflex.writing import whole_file, whole_folder
 
 FILM_FORMATS = (".mp4", ".gif", ".svg", ".png")
-# Shortest film at the default speed [s], and the speeds from which the default is chosen.
+# Shortest film at the default speed [s], the speeds from which that is chosen, and the largest number of pictures.
 _SHORTEST_FILM = 5.0
 _SPEEDS = tuple(step * 10.0**power for power in range(1, -7, -1) for step in (5.0, 2.0, 1.0))
 _MOST_FRAMES = 20_000

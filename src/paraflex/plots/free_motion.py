@@ -19,7 +19,7 @@ from paraflex.plots.workspace import finish_workspace, workspace_panel
 
 # A point that moves less than this fraction of the largest motion is at rest.
 _STILL_SHARE = 1e-3
-# Meaning of modal coordinates by the last part of their names.
+# Quantity of a coordinate and factor to the unit of its label, by the last part of its name.
 _KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1e3)}
 
 

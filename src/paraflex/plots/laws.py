@@ -48,7 +48,7 @@ def law_comparison(data: xr.Dataset) -> Figure:
         named = number == 0 or is_narrow()
         list_lines(panel, laws if named else [""] * len(laws))
         for k, mode in enumerate(modes):
-            # Modes stand beside one another within the line of a law.
+            # The marks of the modes are spread within the line of a law.
             places = np.arange(len(laws)) + (0.0 if len(modes) == 1 else _BAND * (k / (len(modes) - 1) - 0.5))
             _draw_mode(panel, unit.factor * values[k], places, _beyond(data, mode), k, f"mode {plain(mode)}")
         _scale(panel, unit.factor * values)

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 # Sizes as shares of the picture's larger side.
 PIN, TRIANGLE, RAIL, MOTOR = 0.008, 0.028, 0.02, 0.0125
-# Radius of a pin's dot beside the disc of a motor; small pictures have larger dots.
+# Radius of a pin's dot, smaller than the disc of a motor; small pictures have larger dots.
 DOT = 0.0056
 # Length of an arrow's head as a share of the picture, its half width relative to its length, and its largest share of a
 # short arrow.

@@ -43,7 +43,7 @@ class PlannedFigure:
 
 
 def _vibrates(found: Any) -> bool:
-    from paraflex.results.linear_motion import drawn_modes  # not for other results
+    from paraflex.results.linear_motion import drawn_modes  # imported for linear models only
 
     return any(True for _ in drawn_modes(found, rigid=False))
 

@@ -38,7 +38,7 @@ def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figu
     Parameters
     ----------
     curves : sequence of (str, int or None)
-        Names of methods, each with an order if the method has several; by default all methods.
+        Names of methods, each with an order if the method has several; by default all methods but IDA.
     """
     figure, axes = panels(1, 3)
     members: dict[str, int] = {}

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import matplotlib.style
 from matplotlib.axes import Axes
 
-# Okabe and Ito (2008), Color Universal Design; their yellow is left out, it is too light for a thin line.
+# Okabe and Ito (2008), Color Universal Design; their yellow is omitted because it is too light for a thin line.
 BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
 COLOURS = (BLUE, VERMILLION, GREEN, BLACK, "#CC79A7", "#E69F00", "#56B4E9")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1, 1)), (0, (9, 2)))

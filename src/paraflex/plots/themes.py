@@ -1,4 +1,4 @@
-"""Colours of drawings and films on light and on dark backgrounds."""
+"""Colours of drawings, films and reports on light and on dark backgrounds."""
 
 from __future__ import annotations
 
