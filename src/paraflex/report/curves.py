@@ -54,7 +54,7 @@ def energy_scale(data: xr.Dataset) -> float:
 
 
 def errors(data: xr.Dataset) -> xr.DataArray:
-    """Return the distance of the end-effector from its desired position [m]; dimensions are those of runs, then time."""
+    """Return the distance of the end-effector from its desired position [m], over the dimensions of runs and time."""
     gaps = (data["end_effector"] - data["end_effector_desired"]).transpose(..., "axis")
     return gaps.reduce(np.linalg.norm, "axis").assign_attrs(units="m")
 
