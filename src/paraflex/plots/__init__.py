@@ -1,21 +1,21 @@
-"""Figures of results, each a function from a dataset, or from numbers read from a file, to a Matplotlib figure.
+"""Figures of results: each function takes a dataset, or numbers read from a file, and returns a Matplotlib figure.
 
-What they have in common:
+The functions share these parameters:
 
 data, figures, table
-    Results of the kind that `paraflex plot --list` has the figure for: a dataset (from `paraflex.results` or
-    `studies.Verification.dataset`), the plain numbers of a study's result, or its table of designs; or the folder or
-    file that they were written to.
+    Results of a kind for which `paraflex plot --list` lists the figure: a dataset (from `paraflex.results` or
+    `studies.Verification.dataset`), the plain numbers of a study's result, or its table of designs; alternatively the
+    folder or file that holds them.
 mode, models, run
-    Which of the runs: an actuation mode, two models of a verification, the number of a run. A mode that may be left
-    out is then the one with most active motors.
+    Selection of runs: an actuation mode, two models of a verification, or the number of a run. The default of an
+    optional mode is the mode with most active motors.
 metrics
-    Of many designs; by default the first that vary.
+    Metrics of a study of many designs; by default the first metrics that vary.
 
-An `InputError` says that results are of another kind or hold nothing to show, or that there is no such mode, model, run
-or metric.
+An `InputError` is raised if the results are of another kind or hold nothing to show, or if there is no such mode,
+model, run or metric.
 
-The names below are imported when they are first used: most commands need one or two of them.
+The names below are imported on first use: most commands need one or two of them.
 """
 
 import lazy_loader

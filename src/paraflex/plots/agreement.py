@@ -1,4 +1,4 @@
-"""Several models of one mechanism in one figure: links, end-effector, distances (Figs. 22, 23 and beyond)."""
+"""Figures that compare models of one mechanism: links, end-effector, distances (Figs. 22, 23 and beyond)."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ _MODEL_NAMES = {
 }
 # Distances below this are rounding; they would stretch a logarithmic axis [m].
 _SMALLEST_DISTANCE = 1e-8
-# Links that a page holds in one column.
+# Largest number of links that fit on a page in one column.
 _MOST_NARROW = 6
 
 
 def printed(model: str) -> str:
-    """Label of a model in legends."""
+    """Return the label of a model in legends."""
     return _MODEL_NAMES.get(model, model)
 
 
 @drawn
 def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure:
-    """Angle and angular velocity of every link in two models (Fig. 22).
+    """Plot the angle and angular velocity of every link in two models (Fig. 22).
 
-    A link's angle is that of the line from its first end to its last, which every model has. In one column there are
-    those of the first six.
+    A link's angle is that of the line from its first end to its last, which every model has. A figure of one column
+    shows the first six links only.
     """
     runs = [select_run(select_model(data, model), mode) for model in models]
     columns = (("chord_angle", "angle"), ("chord_velocity", "angular_velocity"))
@@ -61,9 +61,9 @@ def compared_links(data: xr.Dataset, mode: str, models: Sequence[str]) -> Figure
 
 @drawn
 def compared_deflections(data: xr.Dataset, mode: str) -> Figure:
-    """Transverse tip displacement of links in every model that has it, one panel per link.
+    """Plot the transverse tip displacement of links in every model that has it, one panel per link.
 
-    Those of the two links whose tips move most in the reference, twins of a symmetric mechanism counted once.
+    The two links whose tips move most in the reference are shown; twins of a symmetric mechanism are counted once.
     """
     runs = {name: select_run(select_model(data, name), mode) for name in names_of(data, "model")}
     bodies = most_deflected(runs[str(data.attrs["reference"])])
@@ -80,12 +80,12 @@ def compared_deflections(data: xr.Dataset, mode: str) -> Figure:
 
 @drawn
 def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnification: float | None = None) -> Figure:
-    """Paths of the end-effector in two models, deviations from the desired one magnified (Fig. 23).
+    """Plot the paths of the end-effector in two models, with magnified deviations from the desired path (Fig. 23).
 
     Parameters
     ----------
     magnification : float, optional
-        Of the deviations; by default one at which they can be seen.
+        Magnification of the deviations; by default a value at which they are visible.
     """
     runs = [select_run(select_model(data, model), mode) for model in models]
     return deviated_paths(dict(zip(map(printed, models), runs, strict=True)), magnification, PAIR)
@@ -93,7 +93,7 @@ def compared_paths(data: xr.Dataset, mode: str, models: Sequence[str], magnifica
 
 @drawn
 def model_distances(data: xr.Dataset) -> Figure:
-    """Distance of the end-effector from its desired place, and from that of the reference, in every model."""
+    """Plot the distance of the end-effector from its desired position and from the reference model, for every model."""
     reference = str(data.attrs["reference"])
     modes = names_of(data, "mode")
     time = data["time"].values

@@ -1,7 +1,7 @@
-"""The list of all figures by kind of results: what they show, and where their functions are.
+"""Catalogue of all figures by kind of results: what they show, and the modules of their functions.
 
-`paraflex plot`, the `save_...` functions and the gallery of the documentation read it. A figure more is a function in
-this folder and a line here.
+`paraflex plot`, the `save_...` functions and the gallery of the documentation read it. A new figure is a function in
+this folder and an entry here.
 """
 
 from __future__ import annotations
@@ -15,31 +15,31 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# What a figure's function takes: all results; results and a mode; results, a mode and a pair of models; results and the
-# number of a run; a table of designs; nothing at all.
+# Arguments of a plotting function: all results; results and a mode; results, a mode and a pair of models; results and
+# the number of a run; a table of designs; no argument.
 Takes = Literal["results", "mode", "models", "run", "designs", "nothing"]
 
 
 @dataclass(frozen=True)
 class CatalogueFigure:
-    """A figure of a kind of results.
+    """Entry of the catalogue: a figure of one kind of results.
 
     Attributes
     ----------
     name : str
-        Of its function in `paraflex.plots`, and of its files.
+        Name of the plotting function in `paraflex.plots`, also the stem of the files that `paraflex plot` writes.
     module : str
-        Of `paraflex.plots` that the function is in.
+        Module of `paraflex.plots` that defines the function.
     shows : str
-        In a line.
+        Description in one line.
     takes : str
-        See `Takes`.
+        Arguments of the function, see `Takes`.
     written_as : str
-        The name of the file that the command which makes the results writes it to; empty where it does not.
+        Stem of the file that the command which makes the results writes; empty if that command does not write it.
     variables : tuple of str
-        Of a dataset, without which there is nothing to draw.
+        Variables of the dataset that the figure requires.
     points : str
-        The argument of the function that chooses what it shows by named points, "point" or "points"; else empty.
+        Parameter of the function that selects named points, "point" or "points"; empty if there is none.
     """
 
     name: str
@@ -52,7 +52,7 @@ class CatalogueFigure:
 
     @property
     def function(self) -> Callable[..., Figure]:
-        """Function of the figure; its module is imported now."""
+        """Plotting function of the figure; its module is imported on access."""
         return getattr(import_module(f"paraflex.plots.{self.module}"), self.name)
 
 
@@ -241,5 +241,5 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
 
 
 def homes() -> dict[str, str]:
-    """The module of `paraflex.plots` with each figure's function."""
+    """Return the module of `paraflex.plots` that defines each figure's function."""
     return {figure.name: figure.module for figures in CATALOGUE.values() for figure in figures}

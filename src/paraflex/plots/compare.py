@@ -1,4 +1,4 @@
-"""Curves of two runs in common panels."""
+"""Figures that compare two runs by curves in common panels."""
 
 from __future__ import annotations
 
@@ -21,37 +21,41 @@ from paraflex.plots.selection import one_run
 from paraflex.plots.style import PAIR, journal_style
 from paraflex.results.comparison import MotionPair, RunComparison
 
-# Panels of a figure: parts that differ most.
+# Largest number of panels of a figure.
 _MOST = 6
 _COMPONENTS = ("x", "y")
 
 
 @checked_arguments()
 def overlaid_motion(comparison: RunComparison, name: str, mode: str = "") -> Figure:
-    """A quantity over time in two runs, a panel for each of the parts that differ most.
+    """Plot a quantity of two runs over time, one panel for each of the parts that differ most.
 
     Parameters
     ----------
     comparison : RunComparison
-        From `paraflex.compare`.
+        Comparison of the two runs, from `paraflex.compare`.
     name : str
-        A variable that it compares: "end_effector", "torque", "angle", "deflection", "strain_energy", ...
+        Compared variable: "end_effector", "torque", "angle", "deflection", "strain_energy", ...
     mode : str
-        One that both runs have; empty for runs without a path.
+        Actuation mode that both runs have; empty (the default) for runs without a path.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
 
     Raises
     ------
     InputError
-        No such variable in this mode.
+        The variable is not compared in this mode.
     """
     pairs = [pair for pair in comparison.motions if (pair.name, pair.mode) == (name, mode)]
     if not pairs:
         there = dict.fromkeys(pair.name for pair in comparison.motions)
         raise InputError("not compared", field="name", value=name, remedy=f"one of {', '.join(there)}")
     runs = [one_run(data, mode or None) for data in comparison.data]
-    # What stands still or idles in both runs has no panel, unless all do.
+    # Parts that are at rest in both runs have no panel, unless all are.
     pairs = [pair for pair in pairs if peak([pair.first, pair.second]) > ROUNDING] or pairs
-    # So many that there is a panel for each, in the order of the mechanism.
+    # The parts that differ most, as many as there are panels, in the order of the mechanism.
     chosen = sorted(pairs, key=lambda pair: -np.nan_to_num(pair.difference))[:_MOST]
     curves = [each for pair in pairs if pair in chosen for each in _curves(pair, runs)][:_MOST]
     unit = display_unit(pairs[0].unit, np.concatenate([values for _, each in curves for values in each]))
@@ -70,7 +74,7 @@ def overlaid_motion(comparison: RunComparison, name: str, mode: str = "") -> Fig
 
 
 def save_overlays(comparison: RunComparison, folder: Path) -> list[Path]:
-    """Write figures of all compared motions of all modes, as PNG."""
+    """Write figures of all compared motions in all modes as PNG and return the files."""
     drawn = []
     for name, mode in dict.fromkeys((pair.name, pair.mode) for pair in comparison.motions):
         listed = CatalogueFigure(f"overlaid_{name}", "compare", "curves of two runs")
@@ -79,7 +83,7 @@ def save_overlays(comparison: RunComparison, folder: Path) -> list[Path]:
 
 
 def _curves(pair: MotionPair, runs: list[xr.Dataset]) -> list[tuple[str, list[NDArray[np.float64]]]]:
-    """Titles, and values of both runs: one of a number, two of a point or a force."""
+    """Return titles and the values of both runs: one pair for a scalar, two for a point or a force (x and y)."""
     title = pair.name.replace("_", " ") + (f" {symbol(pair.part)}" if pair.part else "")
     values = []
     for run in runs:

@@ -1,4 +1,4 @@
-"""Torques and readings of controllers."""
+"""Figures of controllers: their torques and readings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WORDS = {"rad": "angle", "m": "position", "rad/s": "rate", "m/s": "speed", "N m
 
 
 class _Panel(NamedTuple):
-    """What a panel shows: torques or readings of a controller, those with one unit."""
+    """Content of a panel: torques or readings of one controller that share a unit."""
 
     controller: ControllerData
     dim: str
@@ -34,7 +34,7 @@ class _Panel(NamedTuple):
 
 @drawn
 def controllers(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Torques of every controller, wanted and given, and its readings; at most the seven largest of each unit."""
+    """Plot the torques of every controller before and after limits, and its readings; at most seven of each unit."""
     run = one_run(data, mode)
     found = [each for one in controllers_of(run) for each in _panels(one)]
     if not found:
@@ -53,7 +53,7 @@ def controllers(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 
 def _panels(one: ControllerData) -> Iterator[_Panel]:
-    """Torques, then readings, each by unit; what a mode does not have is left out."""
+    """Yield the panels of a controller: torques, then readings, each by unit; signals that a mode lacks are omitted."""
     for dim, variable in ((OUTPUT, GIVEN), (INPUT, READINGS)):
         names = [name for name in names_of(one.data, dim)
                  if np.isfinite(one.data[variable].sel({dim: name}).values).any()]  # fmt: skip
@@ -62,13 +62,16 @@ def _panels(one: ControllerData) -> Iterator[_Panel]:
 
 
 def _largest(shown: _Panel, variable: str) -> list[str]:
-    """Names of the largest, in their own order."""
+    """Return the names of the signals with the largest peaks, in their original order."""
     values = shown.controller.data[variable].sel({shown.dim: shown.names}).transpose(..., shown.dim).values
     return [shown.names[k] for k in largest_columns(values)]
 
 
 def _draw_torques(panel: Axes, shown: _Panel) -> None:
-    """Torques as they act, after the delay and until the next sample, and those of the law at their samples."""
+    """Draw applied torques, held from the end of the delay to the next sample, and the law's own at their samples.
+
+    A limit is drawn as a line where an applied torque reaches it.
+    """
     one = shown.controller
     times = one.data[SAMPLE].values
     for k, name in enumerate(_largest(shown, GIVEN)):

@@ -1,4 +1,4 @@
-"""Derivatives of the metrics of a run: elasticities as bars."""
+"""Figure of the derivatives of a run's metrics: elasticities as bars."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from paraflex.plots.labels import metric_name, plain
 from paraflex.plots.layout import MM, is_narrow, lay_out, panels
 from paraflex.plots.style import COLOURS, STYLE, ZERO
 
-# Height of a metric's group of bars, and of one bar in it, [mm]; width of a letter of a metric's name, [em].
+# Gap between the groups of bars of two metrics and height of a bar [mm]; part of the width of a letter of a name [em].
 _GROUP_HEIGHT, _BAR, _LETTER = 2.4, 1.9, 0.2
 _EM = STYLE["font.size"] / 72.0 * 25.4
 
 
 @drawn
 def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
-    """Change of each metric in per cent per per cent of each parameter: a group of bars per metric."""
+    """Plot elasticities as bars: the change of each metric in per cent per one per cent change of each parameter."""
     if not 0 <= run < len(figures["runs"]):
         raise InputError("no such run", field="run", value=run, remedy=f"name one from 0 to {len(figures['runs']) - 1}")
     shown = figures["runs"][run]
     parameters, metrics = list(figures["parameters"]), list(shown["metrics"])
     figure, axes = panels(1, 1)
     panel = axes[0, 0]
-    # Groups from the top down, in them the parameters in order.
+    # Groups run from the top down, the parameters within a group likewise.
     pitch = len(parameters) * _BAR + _GROUP_HEIGHT
     places = -pitch * np.arange(len(metrics))
     for k, parameter in enumerate(parameters):
@@ -43,7 +43,7 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
     panel.margins(x=0.06)
     panel.autoscale(axis="x")
     panel.set_yticks([])
-    # Half of the width is the names of the metrics.
+    # The names of the metrics take half of the width, so the label must be short in one column.
     panel.set_xlabel("elasticity [% / %]" if is_narrow() else "change of the metric by change of the parameter [% / %]")
     panel.set_title(f"{figures['mechanism']}, {shown['path']}, {plain(shown['mode'])}", loc="left")
     lay_out(figure, axes, panel_height=pitch * len(metrics))
@@ -52,7 +52,7 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Figure:
 
 
 def _name_groups(panel: Any, places: Mapping[str, float]) -> None:
-    """Names of the metrics left of the panel, which makes room for them."""
+    """Write the names of the metrics left of the panel and shrink the panel to make room for them."""
     left, bottom, width, height = panel.get_position().bounds
     room = _EM * (1.0 + max(len(name) for name in places) * (0.36 + _LETTER)) / (panel.figure.get_figwidth() / MM)
     panel.set_position((left + room, bottom, width - room, height))

@@ -1,4 +1,4 @@
-"""Many designs as a table of parameters, metrics and status, read from the files of a study."""
+"""Table of many designs, with parameters, metrics and status, read from the files of a study."""
 
 from __future__ import annotations
 
@@ -20,29 +20,30 @@ from paraflex.seals import damaged
 
 Array = NDArray[np.float64]
 
-# Metrics by which designs are not chosen: of the solver, and those of which more may be better.
+# Metrics by which designs are not chosen: those of the solver, and those for which smaller is not always better.
 _NOT_JUDGED = tuple(metric.name for metric in METRICS.values() if metric.of_solver or not metric.judged)
 _OF_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
 _OF_MEMBERS = tuple(f"{metric.name}." for metric in METRICS.values() if metric.each in (MOTOR, JOINT))
 _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
 _FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
-# A metric that changes by less, as a share of its size, is the same for all designs.
+# A metric whose relative change is smaller counts as constant.
 _NOT_VARIED = 1e-9
 
 
 @dataclass(frozen=True)
 class DesignTable:
-    """Runs of many designs.
+    """Table of the runs of many designs.
 
     Attributes
     ----------
     parameters, metrics : mapping of str to (runs,) array
-        By name; NaN where a run has none.
+        Columns by name; NaN where a run has no value.
     units : mapping of str to str
-        Of metrics.
+        Units of the metrics.
     run, design : (runs,) array of int
-        Numbers of the run and of its design.
+        Numbers of each run and of its design.
     path, mode, status, reason : (runs,) array of str
+        Path and actuation mode of each run, its status, and the reason for a failure.
     """
 
     parameters: Mapping[str, Array]
@@ -57,18 +58,18 @@ class DesignTable:
 
     @cached_property
     def complete(self) -> NDArray[np.bool_]:
-        """Whether each run is complete."""
+        """Whether each run is complete, as an array (runs,)."""
         return self.status == "complete"
 
     def only(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> DesignTable:
-        """Some of the runs."""
+        """Return the table restricted to some rows, given as a mask or as indices."""
         columns = (self.parameters, self.metrics)
         parameters, metrics = ({name: values[rows] for name, values in column.items()} for column in columns)
         rest = {name: getattr(self, name)[rows] for name in _OF_A_RUN}
         return replace(self, parameters=parameters, metrics=metrics, **rest)
 
     def in_modes(self, modes: Sequence[str]) -> DesignTable:
-        """Runs in some actuation modes."""
+        """Return the table restricted to some actuation modes."""
         known = list(dict.fromkeys(self.mode.tolist()))
         for mode in modes:
             place_of(mode, known, "mode")
@@ -76,13 +77,21 @@ class DesignTable:
 
     @property
     def series(self) -> dict[tuple[str, str], DesignTable]:
-        """Complete runs of each path and mode."""
+        """Complete runs of each pair of path and mode."""
         done = self.only(self.complete)
         pairs = dict.fromkeys(zip(done.path.tolist(), done.mode.tolist(), strict=True))
         return {pair: done.only((done.path == pair[0]) & (done.mode == pair[1])) for pair in pairs}
 
     def judged_by(self, names: Sequence[str] | None, most: int) -> list[str]:
-        """The metrics asked for; else the first that differ: those by which designs are chosen, or others."""
+        """Return the requested metrics; by default at most `most` of those that vary.
+
+        Metrics by which designs are chosen take precedence over others.
+
+        Raises
+        ------
+        InputError
+            A requested metric is not in the table, or no metric varies.
+        """
         for name in names or ():
             if name not in self.metrics:
                 raise InputError(
@@ -91,7 +100,7 @@ class DesignTable:
                 )  # fmt: skip
         if names:
             return list(names)
-        # Metrics of single motors and joints only if there are no others.
+        # Metrics of single motors and joints are used only if there are no others.
         varying = [name for name in self.metrics if self._varies(name) and name.partition(".")[0] not in _OF_SOLVER]
         varying = [name for name in varying if _is_judged(name)] or varying
         chosen = ([name for name in varying if not name.startswith(_OF_MEMBERS)] or varying)[:most]
@@ -101,7 +110,7 @@ class DesignTable:
 
     @property
     def judged(self) -> list[str]:
-        """The metrics by which designs are chosen, less being better; the first of them if none differs among runs."""
+        """Metrics by which designs are chosen (smaller is better) and which vary; the first one if none varies."""
         if not self.complete.any():
             return []
         try:
@@ -112,22 +121,22 @@ class DesignTable:
         return [name for name in found if _is_judged(name)]
 
     def values(self, row: int) -> tuple[float, ...]:
-        """The numbers of a row's design, in the order of the parameters."""
+        """Return the parameter values of a row's design, in the order of the parameters."""
         return tuple(float(values[row]) for values in self.parameters.values())
 
     def label(self, row: int) -> str:
-        """Label of a run: its design's number, its mode where it has one, and its path if there are several."""
+        """Return the label of a run: number of its design, its mode if it has one, its path if there are several."""
         several = len(set(self.path.tolist())) > 1
         return " ".join(filter(None, [f"#{self.design[row]}", str(self.mode[row]), str(self.path[row]) * several]))
 
     @property
     def varied(self) -> list[str]:
-        """Parameters that differ among the runs; all of them if none does."""
+        """Parameters that vary among the runs; all of them if none varies."""
         spread = [name for name, values in self.parameters.items() if np.unique(values).size > 1]
         return spread or list(self.parameters)
 
     def labelled(self, metric: str) -> tuple[str, float]:
-        """Label of a metric's axis, and the factor of its values."""
+        """Return the axis label of a metric and the factor that converts its values to the unit of the label."""
         unit, factor = display_unit(self.units.get(metric, ""), self.metrics[metric])
         printed = metric_name(metric)
         return (f"{printed} [{unit}]" if unit not in ("", "1") else printed), factor
@@ -143,7 +152,7 @@ def _is_judged(column: str) -> bool:
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
-    """The table of a study in order of its runs, from the files of its folder that `tables_of` finds."""
+    """Read the table of a study from the files of its folder that `tables_of` finds, in the order of the runs."""
     table = read_tables(files)
     if not {*_FIRST_COLUMNS, *_LAST} <= set(table.column_names):
         raise InputError(
@@ -175,7 +184,7 @@ def _in_order(table: Any) -> DesignTable:
 
 
 def in_conflict(table: DesignTable, judged: Sequence[str]) -> list[str]:
-    """The first of some metrics, and the one with which it has the longest fronts; fewer if there are not two."""
+    """Return the first metric and the one with which its Pareto fronts are longest; fewer if there are not two."""
     if len(judged) < 2:
         return list(judged)
     first, *others = judged
@@ -188,7 +197,7 @@ def in_conflict(table: DesignTable, judged: Sequence[str]) -> list[str]:
 
 
 def undominated(x: Array, y: Array) -> NDArray[np.intp]:
-    """Indices, in order of x, of the points that no other point dominates in two numbers."""
+    """Return the indices of the points (x, y) that no other point dominates (smaller is better), sorted by x."""
     order = np.lexsort((y, x))
     least = np.minimum.accumulate(y[order])
     better = np.concatenate([[True], y[order][1:] < least[:-1]]) if order.size else np.zeros(0, dtype=bool)

@@ -1,4 +1,4 @@
-"""Drawings of a mechanism: links with actual or magnified deflections, joints, ground, springs, paths."""
+"""Drawing of a mechanism by Matplotlib: links with true or magnified deflections, joints, ground, springs, paths."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from paraflex.plots.themes import Theme, theme
 
 Array = NDArray[np.float64]
 
-# Bodies named under a picture; of more there is no room.
+# Largest number of bodies whose names fit under a picture.
 _MOST_NAMED = 9
 # Room above and below a drawing [mm].
 _HEAD, _FOOT = 5.0, 5.5
@@ -43,12 +43,12 @@ _HEAD, _FOOT = 5.0, 5.5
 
 # Width of links [pt], and diameters of a body at a single place, a pin and the end-effector.
 _LINK, _DOT, PIN_SIZE, _TIP = 3.4, 7.0, 5.4, 4.2
-# Share of the picture; Agg draws nothing of a line without length, nor of one that it snaps to a single pixel.
+# Shortest line as a share of the picture: Agg draws no line of zero length, nor one that it snaps to a single pixel.
 _SHORTEST_LINE = 2e-3
 
 
 class Sketch:
-    """A scene on Matplotlib's axes: fixed parts are drawn once, moving parts are updated for each picture."""
+    """Drawing of a scene on Matplotlib axes: fixed parts are drawn once, moving parts are updated for each picture."""
 
     def __init__(self, axes: Axes, shown: Scene, limits: Limits, look: Theme, width: float = 1.0) -> None:
         self.scene = shown
@@ -80,14 +80,14 @@ class Sketch:
 
     @property
     def artists(self) -> list[Artist]:
-        """Artists of the moving parts."""
+        """Artists of the moving parts, from the back to the front."""
         moving = [self._trail, self._stiff, self._plates, self.links, *self.marks.values(), self._head]
         return sorted(moving, key=lambda artist: artist.get_zorder())
 
     def show(self, i: int) -> None:
-        """Update all parts to the scene's time of a number."""
+        """Update all moving parts to the scene's time number `i`."""
         bodies = {name: figure_of(places[i]) for name, places in self.scene.bodies.items()}
-        # A body at a single place is a dot: a line so short that its round ends are all that is seen.
+        # A body at a single place is drawn as a dot: a line so short that only its round ends are visible.
         dot = [[0.0, 0.0], [_SHORTEST_LINE * self.limits.size, 0.0]]
         self.links.set_segments([places if len(places) > 1 else places + dot for places in bodies.values()])
         self.links.set_linewidth([self._width * (_LINK if len(one) > 1 else _DOT) for one in bodies.values()])
@@ -135,7 +135,7 @@ class Sketch:
 
 
 def bare(axes: Axes, limits: Limits) -> Axes:
-    """Axes without frame and ticks."""
+    """Set the limits of axes, hide their frame and ticks, and return them."""
     axes.set_xlim(limits.left, limits.right)
     axes.set_ylim(limits.bottom, limits.top)
     axes.set_axis_off()
@@ -145,7 +145,10 @@ def bare(axes: Axes, limits: Limits) -> Axes:
 def draw_scale_bar(
     figure: Figure, limits: Limits, look: Theme, corner: tuple[float, float], size: float, share: float = 1.0
 ) -> None:
-    """A bar of a round length that ends at a corner of the figure; `share` of its width shows the limits."""
+    """Draw a scale bar of a round length that ends at a corner of the figure.
+
+    `share` is the share of the figure's width that shows the limits.
+    """
     length, name = scale_bar(limits)
     right, bottom = corner
     left = right - share * length / (limits.right - limits.left)
@@ -164,12 +167,12 @@ def draw_load_keys(
     size: float,
     share: float = 1.0,
 ) -> None:
-    """Arrows of the largest force and torque with their sizes, in a row from a corner of the figure.
+    """Draw arrows of the largest force and torque with their magnitudes, in a row from a corner of the figure.
 
-    `share` is that of the figure's width which shows the limits.
+    `share` is the share of the figure's width that shows the limits.
     """
     x, y = corner
-    # Of the figure per metre, and letters as in `name_links`.
+    # Shares of the figure per metre; the width of letters is estimated as in `name_links`.
     scale = share / (limits.right - limits.left)
     up = scale * figure.get_figwidth() / figure.get_figheight()
     for kind, text in shown.load_keys.items():
@@ -185,7 +188,7 @@ def draw_load_keys(
 
 
 def caption(shown: Scene) -> str:
-    """Text on the magnification."""
+    """Return the text that states the magnification of deflections."""
     if shown.magnified == 1.0:
         return "true deflections"
     return "links drawn stiff" if shown.magnified == 0.0 else f"deflections × {shown.magnified:g}"
@@ -203,23 +206,23 @@ def mechanism_drawing(
     theme_name: str = "light",
     point: str | None = None,
 ) -> Figure:
-    """The mechanism at a time, with its end-effector's trail until then and its desired path.
+    """Draw the mechanism at one time, with the end-effector's trail up to that time and its desired path.
 
     Parameters
     ----------
     time : float, optional
-        [s]; half way by default.
+        Time of the drawing [s]; the middle of the run by default.
     magnify : float, optional
-        How many times deflections are drawn: joints stay where they are, links bend more. By default a round number at
-        which bending is seen.
+        Magnification of deflections: joints stay in place, links bend more. The default is a round number at which
+        bending is visible.
     model : str, optional
-        Of a verification; the reference by default.
+        Model of a verification; the reference model by default.
     width : float
-        [mm]
+        Width of the figure [mm].
     theme_name : str
-        "light" or "dark".
+        Theme of colours, "light" (default) or "dark".
     point : str, optional
-        "body.point" whose trail is drawn in place of the end-effector's.
+        Point "body.point" whose trail is drawn in place of the end-effector's.
     """
     look, width = theme(theme_name), page_width(width)
     run = select(data, mode, model)
@@ -247,11 +250,11 @@ def mechanism_drawing(
 
 
 def name_links(figure: Figure, shown: Scene, look: Theme, size: float, y: float) -> None:
-    """Names of the bodies in their colours, in a row."""
+    """Write the names of the bodies in their colours, in a row; none if there is no room for all of them."""
     names = list(shown.bodies)
     if len(names) > _MOST_NAMED:
         return
-    # Letters are two thirds of their size wide, as shares of the figure's width; three between names.
+    # The width of a letter is two thirds of its size, as a share of the figure's width; names are three letters apart.
     letter = size / 72.0 * 0.68 / figure.get_figwidth()
     widths = letter * np.array([len(name) + 3.0 for name in names])
     widths *= min(1.0, 0.94 / widths.sum())

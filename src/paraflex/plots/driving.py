@@ -1,4 +1,4 @@
-"""Efforts of the motors in the modes of a study, and their distance from a singularity."""
+"""Comparison of actuation modes: tracking errors, motor efforts, and condition number of the actuation matrix."""
 
 from __future__ import annotations
 
@@ -24,15 +24,18 @@ from paraflex.results.following import headline, ranked_by_motion
 
 @drawn
 def actuation_condition(data: xr.Dataset) -> Figure:
-    """Condition number of the actuation matrix along the path in every mode: large near a Type II singularity."""
-    # It belongs to the planned motion, which continues after a run has stopped.
+    """Plot the condition number of the actuation matrix along the path in every mode.
+
+    It is large near a Type II singularity.
+    """
+    # The condition number belongs to the planned motion, which continues after a run has stopped.
     whole = data.assign(end_effector=data["end_effector_desired"])
     return _of_all_modes(whole, data["actuation_condition"].transpose("mode", "time").values, "condition")
 
 
 @drawn
 def tracking_distance(data: xr.Dataset) -> Figure:
-    """Distance of the end-effector from its desired place in time, all modes in one panel."""
+    """Plot the distance of the end-effector from its desired position over time, all modes in one panel."""
     away = (data["end_effector"] - data["end_effector_desired"]).transpose("mode", "time", "axis").values
     distance = 1e3 * np.linalg.norm(away, axis=2)
     # Rounding errors would extend the logarithmic axis.
@@ -40,7 +43,7 @@ def tracking_distance(data: xr.Dataset) -> Figure:
 
 
 def _of_all_modes(data: xr.Dataset, values: NDArray[np.float64], quantity: str) -> Figure:
-    """A quantity (modes, samples) of all modes in one panel, on a logarithmic axis."""
+    """Plot a quantity (modes, samples) of all modes in one panel, on a logarithmic axis."""
     figure, axes = panels(1, 1)
     for k, name in enumerate(names_of(data, "mode")):
         draw_curves(axes[0, 0], select_run(data, name), {f"mode {plain(name)}": values[k]}, first=k)
@@ -52,7 +55,10 @@ def _of_all_modes(data: xr.Dataset, values: NDArray[np.float64], quantity: str) 
 
 @drawn
 def mode_comparison(data: xr.Dataset) -> Figure:
-    """RMS tracking error (of the motion, or the whole run), residual vibration and largest torque of every mode."""
+    """Plot the RMS tracking error, the residual vibration and the largest torque of every mode.
+
+    The tracking error is that of the motion or of the whole run, as the results define it.
+    """
     rms, of_motion = headline(data)[0], ranked_by_motion(data)
     peaks = data["peak_torque"].max("motor").values
     label = effort_label(data["torque"].attrs.get("units", "N m"))
@@ -63,7 +69,7 @@ def mode_comparison(data: xr.Dataset) -> Figure:
         (axes[0, 1], data["residual_vibration"].values, "residual vibration", GREEN),
     ):
         unit = display_unit("m", values)
-        # Modes differ by orders of magnitude, of which bars show only the largest.
+        # Modes differ by orders of magnitude; bars would show only the largest.
         panel.plot(unit.factor * values, np.arange(len(names)), "o", color=colour, markersize=4.0)
         _list_modes(panel, names)
         panel.set_title(title)
@@ -79,14 +85,16 @@ def mode_comparison(data: xr.Dataset) -> Figure:
 
 @drawn
 def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Worst condition number of the actuation matrix along a path, one bar per mode; pale if it cannot drive it.
+    """Plot the worst condition number of the actuation matrix along a path, one bar per mode.
+
+    Bars of modes that cannot drive the path are pale.
 
     Parameters
     ----------
     rows : sequence of mapping
-        What `paraflex modes --json` prints.
+        Rows of the output of `paraflex modes --json`.
     """
-    # None is an infinite one.
+    # An infinite condition number is written as None.
     known = [row for row in rows if np.isfinite(row.get("condition_max") or np.nan)]
     if not known:
         raise InputError("no condition numbers: the mechanism has no path", field="modes", remedy="name one: --path")

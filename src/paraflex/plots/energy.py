@@ -1,4 +1,4 @@
-"""Energies of a run, and their balance."""
+"""Figure of the energies of a run and their balance."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from paraflex.plots.style import ZERO
 # Names of the curves, in every figure of energies.
 ENERGIES = {"kinetic_energy": "kinetic energy", "strain_energy": "strain energy", "work": "work done on it"}
 
-# Share of the largest energy that rounding errors stay below.
+# Bound of rounding errors, as a share of the largest energy.
 _ROUNDING = 1e-12
 
 
 @drawn
 def energies(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Kinetic and strain energy and the work done on the mechanism; strain energy alone; imbalance of energy.
+    """Plot kinetic and strain energy and the work done on the mechanism; strain energy alone; the energy imbalance.
 
-    The imbalance is |kinetic + strain energy - those at the start - work|, at the samples. What is zero throughout has
-    no panel.
+    The imbalance is |kinetic + strain energy - their initial values - work|, at the samples. Strain energy and
+    imbalance have no panel if they are zero throughout.
     """
     run = one_run(data, mode)
     curves = {label: run[name].values for name, label in ENERGIES.items()}
@@ -39,7 +39,7 @@ def energies(data: xr.Dataset, mode: str | None = None) -> Figure:
     draw_curves(every, run, curves)
     every.axhline(0.0, **ZERO)
     if peak(strain) > 0.0:
-        # The same colour as above.
+        # `first` keeps the colour of the panel above.
         draw_curves(rest.pop(0), run, {"strain energy": strain}, first=1)
     if peak(imbalance) > 0.0:
         draw_curves(rest[0], run, {"imbalance": np.where(imbalance > 0.0, imbalance, np.nan)}, first=3)

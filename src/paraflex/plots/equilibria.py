@@ -26,18 +26,18 @@ from paraflex.results.statics_rows import given_coordinates, is_wide
 
 Array = NDArray[np.float64]
 
-# Natural frequencies drawn against travel.
+# Number of natural frequencies drawn against travel.
 _FREQUENCIES = 4
-# The largest displacement of a buckling shape, as a part of the picture's size.
+# Largest displacement of a buckling shape, as a share of the mechanism's size.
 _SWING = 0.12
 _TITLE = 5.0
 
 
 @drawn
 def force_travel(data: xr.Dataset) -> Figure:
-    """Force against travel of every coordinate that is loaded or moved; dashed where the equilibrium is unstable.
+    """Plot force against travel of every coordinate that is loaded or moved.
 
-    Rings are limit points.
+    Curves are dotted where the equilibrium is unstable; rings mark limit points.
     """
     given = _given(data)
     figure, axes = panels(1, len(given)) if not is_narrow() else panels(len(given), 1)
@@ -54,7 +54,7 @@ def force_travel(data: xr.Dataset) -> Figure:
 
 @drawn
 def stiffness_travel(data: xr.Dataset) -> Figure:
-    """Stiffness of every coordinate asked for, and the lowest natural frequencies, against the travel that is given."""
+    """Plot the stiffness of the requested coordinates and the lowest natural frequencies against the given travel."""
     _given(data)
     travel = data["given_travel"]
     unit = display_unit(travel.attrs["units"], travel.values)
@@ -88,7 +88,7 @@ def stiffness_travel(data: xr.Dataset) -> Figure:
 
 @drawn
 def deformed_shapes(data: xr.Dataset, theme_name: str = "light") -> Figure:
-    """The mechanism at the last step, and its links at all steps before it, pale; at their true places."""
+    """Draw the mechanism at the last step, and its links at all earlier steps pale; deflections are not magnified."""
     _given(data)
     look = theme(theme_name)
     figure, limits = _pictures([(data, "")], look)
@@ -98,7 +98,10 @@ def deformed_shapes(data: xr.Dataset, theme_name: str = "light") -> Figure:
 
 @drawn
 def buckling_shapes(data: xr.Dataset, theme_name: str = "light") -> Figure:
-    """How the mechanism buckles, as seen from the last stable equilibrium; displacements of one size, pale before."""
+    """Draw the buckling shapes of the last stable equilibrium, scaled to one size; the equilibrium itself is pale.
+
+    If no equilibrium with a buckling shape is stable, the first of them is taken.
+    """
     check_kind(data, "statics")
     seen = seen_buckling(data)
     if seen is None:
@@ -117,7 +120,7 @@ def buckling_shapes(data: xr.Dataset, theme_name: str = "light") -> Figure:
 
 
 def _with_shape(pair: xr.Dataset, shape: Array) -> xr.Dataset:
-    """Equilibria with other shapes, joints at the drawn points that they are at, where these are known."""
+    """Return a pair of equilibria with other shapes; each joint moves with the drawn point nearest to it."""
     out = pair.assign(shape=(pair["shape"].dims, shape))
     joints = pair["joint_position"].values.astype(float).copy()
     before = pair["shape"].values.astype(float)[0]
@@ -128,7 +131,7 @@ def _with_shape(pair: xr.Dataset, shape: Array) -> xr.Dataset:
 
 
 def _pictures(runs: list[tuple[xr.Dataset, str]], look: Theme) -> tuple[Figure, Limits]:
-    """The last step of each, links of those before pale, side by side."""
+    """Draw the last step of each dataset, with the links of earlier steps pale, side by side."""
     width = page_width(TWO_COLUMNS)
     columns = 1 if is_narrow() else min(len(runs), 3)
     samples = [as_samples(data) for data, _ in runs]
@@ -141,7 +144,7 @@ def _pictures(runs: list[tuple[xr.Dataset, str]], look: Theme) -> tuple[Figure, 
     for k, (shown, (_, title)) in enumerate(zip(scenes, runs, strict=True)):
         left, bottom = (k % columns) / columns, 1.0 - (k // columns + 1) / rows
         panel = bare(figure.add_axes((left, bottom, 1.0 / columns, wide * aspect / high / rows)), limits)
-        # Links at steps before the last.
+        # Links at earlier steps.
         for places in shown.bodies.values():
             for step in places[:-1]:
                 panel.plot(*step.T, color=look.faint, linewidth=0.7, zorder=1.0, clip_on=False)
@@ -152,7 +155,7 @@ def _pictures(runs: list[tuple[xr.Dataset, str]], look: Theme) -> tuple[Figure, 
 
 
 def _given(data: xr.Dataset) -> list[int]:
-    """Numbers of the coordinates that are moved or loaded."""
+    """Return the indices of the coordinates that are moved or loaded; raise InputError if there are none."""
     check_kind(data, "statics")
     found = given_coordinates(data)
     if not found:
@@ -162,7 +165,7 @@ def _given(data: xr.Dataset) -> list[int]:
 
 
 def _branch(panel: Axes, data: xr.Dataset, x: Array, y: Array, label: str, look: dict[str, Any]) -> None:
-    """A curve over the branch, dashed where it is unstable, limit points as rings."""
+    """Draw a curve over the branch, dotted where it is unstable, with rings at limit points."""
     parts = branch_parts(data)
     panel.plot(np.where(parts.stable, x, np.nan), y, label=label or None, color=look["color"],
                linestyle=look["linestyle"] if label and parts.unstable.any() else "-")  # fmt: skip

@@ -1,4 +1,4 @@
-"""Films of runs: mp4, gif, a sequence of PNG, or one animated SVG; several modes side by side."""
+"""Films of runs as MP4, GIF, a sequence of PNG files, or one animated SVG; several modes side by side."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from paraflex.plots.themes import theme
 from paraflex.writing import whole_file, whole_folder
 
 FILM_FORMATS = (".mp4", ".gif", ".svg", ".png")
-# A film of less is not worth looking at, one of more tires; speeds to choose from [s].
+# Shortest film at the default speed [s], the speeds from which that is chosen, and the largest number of pictures.
 _SHORTEST_FILM = 5.0
 _SPEEDS = tuple(step * 10.0**power for power in range(1, -7, -1) for step in (5.0, 2.0, 1.0))
 _MOST_FRAMES = 20_000
-# Places on the trail of a single picture.
+# Number of points on the trail of a single picture.
 _TRAIL = 400
 _SMALLEST_PICTURE, _LARGEST_PICTURE = 64, 7680
 _ELSEWHERE = "choose another place"
@@ -35,21 +35,22 @@ class FilmOptions:
     Attributes
     ----------
     magnify : float, optional
-        How many times deflections are drawn; by default a round number at which bending is seen.
+        Magnification of deflections; by default a round number at which bending is visible.
     fps : float
-        Pictures a second; GIFs count in hundredths of a second.
+        Pictures per second; the period of a GIF is rounded to a multiple of 0.01 s.
     speed : float, optional
-        Of the film against time: 0.1 is ten times slower. By default a round one at which it takes 5 s or more.
+        Speed of the film relative to real time: 0.1 is ten times slower. By default a round value at which the film
+        takes 5 s or more.
     size : (width, height), optional
-        [pixels]
+        Size of the pictures [pixels]; by default fitted to the mechanism.
     theme : str
-        "light" or "dark".
+        Theme of colours, "light" (default) or "dark".
     at : float, optional
-        Of a single picture [s]; half way by default.
+        Time of a single picture [s]; the middle of the run by default.
     model : str, optional
-        Of a verification; the reference by default.
+        Model of a verification; the reference model by default.
     point : str, optional
-        "body.point" whose trail is drawn; the end-effector by default.
+        Point "body.point" whose trail is drawn; the end-effector by default.
     """
 
     magnify: float | None = None
@@ -65,22 +66,28 @@ class FilmOptions:
 def plan_film(
     data: xr.Dataset, modes: Sequence[str] = (), options: FilmOptions | None = None, kind: str = ".mp4"
 ) -> Film:
-    """Scenes of a film, and their times.
+    """Compute the scenes of a film at the times of its pictures.
 
     Parameters
     ----------
     data : xarray.Dataset
-        Of a run, with a path or without, or of a verification.
+        Results of a run, with a path or without, or of a verification.
     modes : sequence of str
-        Side by side; the first by default.
+        Actuation modes drawn side by side; the first one by default.
     options : FilmOptions, optional
+        Options of the film; their defaults if omitted.
     kind : str
-        See `film_kind`: pictures of a GIF are a multiple of 0.01 s apart, of a still all lie before it.
+        Suffix of the film, see `film_kind`: the pictures of a GIF are a multiple of 0.01 s apart, the times of a still
+        picture end at its own.
+
+    Returns
+    -------
+    Film
 
     Raises
     ------
     InputError
-        An option that makes no sense, no such mode, model or point, or results without shapes.
+        An option is invalid, there is no such mode, model or point, or the results have no shapes.
     """
     options = options or FilmOptions()
     _check(options)
@@ -89,7 +96,7 @@ def plan_film(
     duration = last - first
     speed = options.speed
     if speed is None:
-        # The highest round speed at which a run is not over too soon.
+        # The highest round speed at which the film is not too short.
         speed = next((one for one in _SPEEDS if duration / one >= _SHORTEST_FILM), _SPEEDS[-1])
     fps = 100.0 / max(1, round(100.0 / options.fps)) if kind == ".gif" else options.fps
     if kind == ".png":
@@ -120,29 +127,34 @@ def animate(
     *,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Film:
-    """Write a film; it appears whole or not at all.
+    """Write a film of a run; the file appears whole or not at all.
 
     Parameters
     ----------
     data, modes, options
-        See `plan_film`.
+        Results, actuation modes and options, as for `plan_film`.
     file : str or Path
-        Its ending says the kind: .mp4, .gif, .svg; .png is one picture; without one a folder of PNG pictures, made if
-        it is not there. Files of the same names are written over.
+        File to write. The suffix selects the format: .mp4, .gif or .svg; .png is a single picture; a name without a
+        suffix is a folder of PNG pictures, created if needed. Files of the same names are overwritten.
     on_progress : callable, optional
-        Called with how many pictures are drawn, and of how many.
+        Function called with the number of pictures drawn so far and their total number.
+
+    Returns
+    -------
+    Film
+        The scenes that were drawn.
 
     Raises
     ------
     InputError
-        See `plan_film`; an ending that means nothing; no encoder for mp4.
+        Invalid arguments as for `plan_film`, an unknown suffix, or no encoder for MP4.
     OutputError
-        It cannot be written, or the encoder gave up.
+        The file cannot be written, or the encoder failed.
     """
     file = Path(file)
     kind = film_kind(file)
     if kind == ".mp4":
-        # Before any planning: there may be none.
+        # Checked before any planning: there may be no encoder.
         find_encoder()
     film = plan_film(data, modes, options, kind)
     report = on_progress or (lambda done, total: None)
@@ -155,7 +167,7 @@ def animate(
 
 
 def film_kind(file: Path) -> str:
-    """The kind of film by the suffix of a name; a name without a suffix is a folder of pictures."""
+    """Return the kind of film, the suffix of the file name; the empty suffix stands for a folder of pictures."""
     kind = file.suffix.lower()
     if kind in FILM_FORMATS or kind == "":
         return kind
@@ -184,7 +196,7 @@ def _check(options: FilmOptions) -> None:
 
 
 def _size(scenes: Sequence[Scene], size: tuple[int, int] | None) -> tuple[int, int]:
-    """Width and height in pixels, even as encoders want them; by default fitted to what is shown."""
+    """Return width and height in pixels, even as encoders require; by default fitted to the scenes."""
     if size is None:
         limits = common_limits(list(scenes))
         ratio = (limits.right - limits.left) / (limits.top - limits.bottom)

@@ -1,4 +1,4 @@
-"""Files of films: mp4, gif, one animated SVG, a sequence of PNG or one of them; a few pictures at a time in memory."""
+"""Files of films: MP4, GIF, one animated SVG, one or many PNG files; only a few pictures are in memory at a time."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from paraflex.plots.svg import Pen, animated, moving_elements
 Report = Callable[[int, int], None]
 
 _GIF_COLOURS, _NEAR = 128, 12
-# What a GIF ends with.
+# Trailer of a GIF file.
 _TRAILER = b";"
-# Key frames a second of an SVG; browsers go on evenly between them.
+# Key frames per second of an SVG, between which browsers interpolate linearly, and their largest number.
 _KEY_FRAMES, _MOST_KEYS = 25.0, 400
 
 
 def write_film(film: Film, kind: str, file: Path, report: Report) -> None:
-    """Write a film of a kind that `film_kind` names; pictures of a sequence go into the folder that `file` is."""
+    """Write a film of a kind that `film_kind` returns; for a sequence of pictures, `file` is an existing folder."""
     if kind == ".svg":
         file.write_text(_animated_svg(film), encoding="utf-8")
         report(len(film.time), len(film.time))
@@ -58,7 +58,7 @@ def write_film(film: Film, kind: str, file: Path, report: Report) -> None:
 
 
 def find_encoder() -> str:
-    """The program that makes mp4."""
+    """Return the path of the MP4 encoder (ffmpeg); raise InputError if there is none."""
     found = shutil.which("ffmpeg")
     if found:
         return found
@@ -75,7 +75,7 @@ def find_encoder() -> str:
 
 
 def _animated_svg(film: Film) -> str:
-    """One file that plays by itself in browsers: what stays from Matplotlib, what moves as values in time (SMIL)."""
+    """Return an SVG that plays in browsers: fixed parts from Matplotlib, moving parts as lists of values (SMIL)."""
     (width, height), time = film.size, film.time
     seconds = max(float(time[-1] - time[0]) / film.speed, 1e-3)
     count = min(time.size, _MOST_KEYS, round(seconds * _KEY_FRAMES) + 1)
@@ -93,7 +93,7 @@ def _animated_svg(film: Film) -> str:
         moving += moving_elements(at_times(shown, keys), sketch.limits, pen)
     named = ", ".join(plain(shown.mode) for shown in film.scenes if shown.mode)
     title = f"{film.scenes[0].mechanism}{', mode ' + named if named else ''}: {caption(film.scenes[0])}"
-    # SMIL cannot count: a line fills as time passes.
+    # SMIL cannot display a running time; a line fills instead.
     line = (
         f'<path d="M0 {height - 1.5}H{width}" stroke="{film.look.trail}" stroke-width="3" stroke-dasharray="{width}">'
     )
@@ -106,7 +106,10 @@ def _animated_svg(film: Film) -> str:
 
 
 def _still_svg(figure: Figure, moving: list[Artist]) -> str:
-    """A figure without what moves as SVG, from its `viewBox` on; its rules of style, which hold beyond it, left out."""
+    """Return a figure without its moving parts as SVG, from its `viewBox` on.
+
+    Its style rules are removed because they would apply to the whole document.
+    """
     for artist in moving:
         artist.set_visible(False)
     out = StringIO()
@@ -116,16 +119,16 @@ def _still_svg(figure: Figure, moving: list[Artist]) -> str:
 
 
 def _write_gif(film: Film, file: Path, report: Report) -> None:
-    """One palette for all pictures: what does not move keeps its colour, and files are small.
+    """Write a GIF with one palette for all pictures: fixed parts keep their colour, and the file is small.
 
-    Pillow's own writer of films holds every picture until the last is there; here two are held.
+    Pillow's own writer of animations keeps all pictures in memory; this one keeps two.
     """
     lasts = round(1000.0 / film.fps)
     pictures = _reduced(film, report)
     shown = next(pictures)
     with file.open("wb") as stream:
         stream.writelines(GifImagePlugin.getheader(shown, info={"loop": 0})[0])
-        # Where the part of it that is written lies, and how long it is seen [ms].
+        # Box of the part of the picture that is written, and the time for which it is shown [ms].
         box, duration = (0, 0, *shown.size), lasts
         for picture in pictures:
             changed = ImageChops.difference(picture, shown).getbbox()
@@ -146,12 +149,12 @@ def _reduced(film: Film, report: Report) -> Iterator[Image.Image]:
 
 
 def _palette(film: Film) -> Image.Image:
-    """Colours of the first, a middle and the last picture."""
+    """Return the palette of the colours of the first, the middle and the last picture."""
     chosen = np.array([0, len(film.time) // 2, len(film.time) - 1])
     scenes = tuple(at_times(shown, chosen) for shown in film.scenes)
     few = replace(film, scenes=scenes)
     palette = Image.fromarray(np.concatenate(list(frames(few)))).convert("RGB").quantize(_GIF_COLOURS)
-    # The ground is exactly what it is: nothing near it may stand in for it.
+    # The background keeps its exact colour: colours near it are replaced by it.
     colours = np.array(palette.getpalette(), dtype=np.int64).reshape(-1, 3)
     ground = np.array(list(bytes.fromhex(film.look.ground[1:])))
     colours[np.max(np.abs(colours - ground), axis=1) < _NEAR] = ground

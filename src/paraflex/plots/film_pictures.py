@@ -1,4 +1,4 @@
-"""Pictures of a film, one after the other, drawn by Matplotlib."""
+"""Pictures of a film, drawn one after the other by Matplotlib."""
 
 from __future__ import annotations
 
@@ -18,13 +18,31 @@ from paraflex.plots.scene import Scene, common_limits
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import Theme
 
-# Parts of the picture's height above and below the drawing.
+# Shares of the picture's height above and below the drawing.
 HEAD, FOOT = 0.105, 0.11
 
 
 @dataclass(frozen=True)
 class Film:
-    """A film that can be drawn: scenes of all its panels at the times of its pictures."""
+    """Film ready to be drawn: the scenes of all its panels at the times of its pictures.
+
+    Attributes
+    ----------
+    scenes : tuple of Scene
+        Scene of each panel.
+    size : (width, height)
+        Size of a picture [pixels].
+    fps : float
+        Pictures per second.
+    speed : float
+        Speed of the film relative to real time.
+    look : Theme
+        Colours.
+    plays : bool
+        Whether the film has several pictures (default) or is a still picture.
+    point : str, optional
+        Requested point "body.point" whose trail is drawn; None for the end-effector.
+    """
 
     scenes: tuple[Scene, ...]
     size: tuple[int, int]
@@ -36,18 +54,18 @@ class Film:
 
     @property
     def caption(self) -> str:
-        """Text on the magnification, the speed, and the point whose trail was asked for."""
+        """Text that states the magnification, the speed, and the requested point whose trail is drawn."""
         trail = f", trail of {plain(self.point)}" if self.point else ""
         return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "") + trail
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Time of the run in each picture [s]."""
+        """Times of the run in the pictures [s]."""
         return self.scenes[0].time
 
 
 def frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:
-    """Pictures (height, width, 4) from one on, one after the other: what stays is drawn once."""
+    """Yield the pictures (height, width, 4) of a film from number `start` on; fixed parts are drawn only once."""
     with journal_style():
         figure, sketches, texts = stage(film)
         canvas = FigureCanvasAgg(figure)
@@ -72,16 +90,16 @@ def frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:
 
 
 def clock(time: float, last: float) -> str:
-    """Time of a picture, with digits that do not jump."""
+    """Return the text of a time [s], with the same number of decimals throughout a film that ends at `last`."""
     digits = max(0, 2 - math.floor(math.log10(last))) if last > 0.0 else 3
     return f"t = {time:.{min(digits, 6)}f} s"
 
 
 def stage(film: Film) -> tuple[Figure, list[Sketch], list[Any]]:
-    """The figure, its sketches, and the texts that change: one a panel, then the clock."""
+    """Return the figure, the sketches of its panels, and the texts that change: one per panel, then the clock."""
     width, height = film.size
     count = len(film.scenes)
-    # Text and lines are of one size against the picture, whatever its pixels.
+    # Text and lines keep their size relative to the picture, whatever its number of pixels.
     dpi = min(height / 5.0, width / count / 4.6)
     figure = Figure(figsize=(width / dpi, height / dpi), dpi=dpi, facecolor=film.look.ground)
     limits = common_limits(list(film.scenes)).fitted(width / count / (height * (1.0 - HEAD - FOOT)))

@@ -1,4 +1,4 @@
-"""Figures of a run without a path, and of named points: angles, speeds and energies, coordinates, paths, motions."""
+"""Figures of runs without a path and of named points: angles, speeds, energies, coordinates, paths and motions."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from paraflex.plots.workspace import finish_workspace, workspace_panel
 
 # A point that moves less than this fraction of the largest motion is at rest.
 _STILL_SHARE = 1e-3
-# Meaning of modal coordinates by the last part of their names.
+# Quantity of a coordinate and factor to the unit of its label, by the last part of its name.
 _KINDS = {"x": ("position", 1e3), "y": ("position", 1e3), "phi": ("angle", 1.0), "eta": ("flexible", 1e3)}
 
 
 @drawn
 def motion_overview(data: xr.Dataset) -> Figure:
-    """Angle and angular velocity of the first bodies, and the energies."""
+    """Plot the angles and angular velocities of the first seven bodies, and the energies."""
     figure, axes = panels(3, 1)
     time = data["time"].values
     for panel, variable in ((axes[0, 0], "angle"), (axes[1, 0], "angular_velocity")):
@@ -43,9 +43,9 @@ def motion_overview(data: xr.Dataset) -> Figure:
 
 @drawn
 def coordinates(data: xr.Dataset) -> Figure:
-    """Generalised coordinates in time: places and angles of the bodies' frames, and flexible coordinates.
+    """Plot the generalised coordinates over time: positions and angles of body frames, and flexible coordinates.
 
-    A panel for each kind that moves, in it the seven that move most.
+    Each kind that changes has a panel with the seven coordinates that change most.
     """
     names = names_of(data, "coordinate")
     values = data["coordinate_value"].transpose("time", "coordinate").values
@@ -60,7 +60,7 @@ def coordinates(data: xr.Dataset) -> Figure:
         most = sorted(members, key=lambda k: -travel[k])[:MOST_LINES]
         for place, k in enumerate(sorted(most)):
             body, _, mode = names[k].rpartition(".")
-            # A body has one look in all panels of its frame's coordinates.
+            # A body has the same look in all panels of its frame's coordinates.
             label, look = symbol(body), bodies.index(body)
             if kind == "eta":
                 label, look = rf"{label}: $\eta_{{{mode.removeprefix('eta')}}}$", place
@@ -72,12 +72,12 @@ def coordinates(data: xr.Dataset) -> Figure:
 
 @drawn
 def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Figure:
-    """Paths of named points in the plane; if there are more than seven, those of the longest.
+    """Plot the paths of named points in the plane.
 
     Parameters
     ----------
     points : sequence of str
-        "body.point" each, in place of these.
+        Points "body.point" to plot; by default the end-effector and the points that travel most, up to seven.
     """
     places = 1e3 * data["point_position"].transpose("time", "point", "axis").values
     names = names_of(data, "point")
@@ -93,15 +93,16 @@ def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Figure:
 
 @drawn
 def point_motions(data: xr.Dataset, mode: str | None = None, points: Sequence[str] = ()) -> Figure:
-    """Distance from the start, speed and acceleration of named points in time, in magnitude.
+    """Plot the distance from the start, the speed and the magnitude of acceleration of named points over time.
 
     Parameters
     ----------
     data : xarray.Dataset
+        Results of a run.
     mode : str, optional
-        Of a run along a path.
+        Actuation mode of a run along a path.
     points : sequence of str
-        "body.point" each; by default the end-effector and those that travel most, up to seven.
+        Points "body.point" to plot; by default the end-effector and the points that travel most, up to seven.
     """
     run, names = one_run(data, mode), names_of(data, "point")
     shown = [point_number(run, point, "points") for point in points] or moving_points(run)
@@ -120,12 +121,15 @@ def point_motions(data: xr.Dataset, mode: str | None = None, points: Sequence[st
 
 
 def moving_points(run: xr.Dataset) -> list[int]:
-    """Named points that move, each place once, the end-effector first; at most seven, those of the longest way."""
+    """Return the indices of the named points that move, the end-effector first; at most seven, those that travel most.
+
+    Of coincident points only one is returned.
+    """
     places = run["point_position"].transpose("time", "point", "axis").values
     names = names_of(run, "point")
     travel = np.nan_to_num(np.nanmax(places, axis=0) - np.nanmin(places, axis=0)).max(axis=1)
-    # Points at one place share a line, by the end-effector's name where it is one of them; those that a program made
-    # have names of their own.
+    # Coincident points share a line, named after the end-effector if it is one of them. Names of generated points
+    # contain "._".
     followed = run.attrs.get("end_effector_point")
     shown: list[int] = []
     for k in sorted(range(len(names)), key=lambda k: (names[k] != followed, -travel[k])):

@@ -1,4 +1,4 @@
-"""Arguments of figures: results, or their folder or file, of the right kind."""
+"""Arguments of plotting functions: results of the right kind, or the folder or file that holds them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ P = ParamSpec("P")
 
 
 def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate[D | str | Path, P], Figure]:
-    """Decorate the function of a figure: it gets the common style, and takes results or their folder or file."""
+    """Decorate a plotting function: it draws in the common style and accepts results or their folder or file."""
     take: Callable[..., Figure] = checked_arguments(
         figures="give what the study's result has as plain numbers, or the folder it was written to",
         table="give the folder of a study of many runs",
@@ -44,7 +44,7 @@ def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate
 
 
 def _drawn(data: Any, field: str, draw: Callable[[], Figure]) -> Figure:
-    """A figure; an error if the results lack what it shows."""
+    """Draw a figure; raise InputError if plain numbers lack an entry that it needs."""
     try:
         return draw()
     except KeyError as error:
@@ -55,7 +55,10 @@ def _drawn(data: Any, field: str, draw: Callable[[], Figure]) -> Figure:
 
 
 def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
-    """Results, or those in a folder or file, of one of some kinds, each with its part for the figure."""
+    """Return results, read from a folder or file if need be, and check that their kind is one of `kinds`.
+
+    `kinds` maps each kind to the part of the results that the figure takes.
+    """
     if isinstance(data, xr.Dataset):
         if kind_of(data) not in kinds:
             raise wrong_kind(kind_of(data), kinds)
@@ -70,7 +73,7 @@ def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
 
 @cache
 def _kinds() -> dict[str, dict[str, str]]:
-    """For every figure the kinds of its results, each with the part that its function takes."""
+    """Return for every figure the kinds of its results, each with the part that its function takes."""
     found: dict[str, dict[str, str]] = {}
     for kind, figures in CATALOGUE.items():
         for figure in figures:

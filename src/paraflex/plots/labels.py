@@ -1,4 +1,4 @@
-"""Text and units of figures and pages: symbols of names, signs of modes, prefixes of units."""
+"""Texts and units of figures and pages: symbols of names, signs of modes, prefixes of units."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _GREEK = {
 }  # fmt: skip
 
 
-# A value in a figure below this, in whatever unit, is rounding.
+# Values of a figure below this, in any unit, are rounding errors.
 ROUNDING = 1e-12
 
 
 class Quantity(NamedTuple):
-    """Quantity of an axis: its name, its symbol (empty if it has none) and its unit."""
+    """Quantity of an axis: name, symbol (empty if it has none) and unit."""
 
     name: str
     symbol: str
     unit: str
 
 
-# Labels of all axes; {} is a direction.
+# Quantities of all axes; {} in a symbol stands for the direction.
 QUANTITIES = {
     "time": Quantity("time", "$t$", "s"),
     "angle": Quantity("angle", r"$\varphi$", "rad"),
@@ -62,18 +62,18 @@ QUANTITIES = {
 
 
 def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", short: bool = False) -> str:
-    """Name, symbol and unit of an axis: "torque τ [N m]"; numbers without a unit have no brackets.
+    """Return the label of an axis, "torque τ [N m]"; dimensionless quantities have no brackets.
 
     Parameters
     ----------
     quantity : str
-        One of `QUANTITIES`.
+        Key of `QUANTITIES`.
     unit : str, optional
-        That values are shown in, where it is not the quantity's own.
+        Unit of the shown values; by default the quantity's own.
     direction : str
-        "x" or "y", of a symbol that has one.
+        Direction "x" or "y" that is inserted into the symbol.
     short : bool
-        Whether the symbol is enough, if there is one: below a title that names the quantity.
+        Whether to omit the name if there is a symbol, as below a title that names the quantity.
     """
     described = QUANTITIES[quantity]
     mark = described.symbol.replace("{}", direction)
@@ -83,12 +83,12 @@ def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", s
 
 
 def metric_name(metric: str) -> str:
-    """Label of a metric: "RMS tracking error"; "peak torque of tau1" for a metric of one motor."""
+    """Return the label of a metric: "RMS tracking error"; "peak torque of tau1" for a metric of one motor."""
     return plain(metric_label(metric))
 
 
 def effort_label(units: str) -> str:
-    """Label of motors' efforts: torques, or forces of motors that slide."""
+    """Return the axis label of motor efforts: torques, forces of linear motors, or both."""
     if units in ("N m", "N"):
         return axis_label("torque" if units == "N m" else "force")
     return f"torque, force [{units}]"
@@ -101,12 +101,15 @@ _PREFIXES = {
     "N/m": (DisplayUnit("kN/mm", 1e-6), DisplayUnit("N/mm", 1e-3), DisplayUnit("N/m", 1.0)),
     "m/N": (DisplayUnit("mm/N", 1e3), DisplayUnit("µm/N", 1e6), DisplayUnit("nm/N", 1e9)),
 }
-# The largest value of a unit is at least so many: stresses are in MPa, moduli in GPa.
+# Smallest peak for which a unit is used; GPa, with a bound of its own, is for moduli, stresses are in MPa.
 _LEAST, _LEAST_OF = 0.1, {"GPa": 2.0}
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """The unit in which the largest of lengths, angles, stresses or stiffnesses has few digits; others stay."""
+    """Return the unit in which the largest length, angle, stress, stiffness or compliance has few digits.
+
+    Other units are returned unchanged.
+    """
     largest, choices = peak(values), display_units(unit)
     if largest == 0.0:
         return next(choice for choice in choices if choice.name not in _LEAST_OF)
@@ -115,23 +118,23 @@ def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
 
 
 def display_units(unit: str) -> tuple[DisplayUnit, ...]:
-    """All units in which a quantity of an SI unit may be shown, the largest first."""
+    """Return all units in which a quantity of an SI unit may be shown, the largest first."""
     return _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
 
 
 def peak(values: ArrayLike) -> float:
-    """Largest finite magnitude; zero where there is none."""
+    """Return the largest finite magnitude; zero if there is none."""
     magnitudes = np.abs(np.asarray(values, dtype=float))
     return float(np.max(magnitudes, initial=0.0, where=np.isfinite(magnitudes)))
 
 
 def three_digits(value: float) -> str:
-    """A value to three significant digits: 48.0, 0.377, 120; 0, also of rounding errors."""
+    """Format a value with three significant digits: 48.0, 0.377, 120; zero and rounding errors give 0."""
     return f"{value:#.3g}".rstrip(".") if not abs(value) < ROUNDING else "0"
 
 
 def power_of_ten(value: float) -> str:
-    """A power of ten with superscripts, "10⁻⁵"; anything else as a plain number."""
+    """Format a power of ten with superscripts, "10⁻⁵", and any other value as a plain number."""
     exponent = round(math.log10(value)) if value > 0.0 else 0
     if not math.isclose(value, 10.0**exponent, rel_tol=1e-9):
         return f"{value:g}"
@@ -139,12 +142,12 @@ def power_of_ten(value: float) -> str:
 
 
 def raised(exponent: int) -> str:
-    """An exponent in superscripts: "⁻⁵"."""
+    """Return an exponent in superscripts: "⁻⁵"."""
     return str(exponent).translate(_RAISED)
 
 
 def logarithmic_number(value: float) -> str:
-    """A number of a logarithmic axis: 0.001 to 5000 as they are, others as "10⁻⁵" or "2·10⁻⁵"."""
+    """Format a number of a logarithmic axis: plain from 0.001 up to below 10⁴, else as "10⁻⁵" or "2·10⁻⁵"."""
     if value <= 0.0 or 0.999e-3 <= value < 0.999e4:
         return f"{value:g}"
     exponent = math.floor(math.log10(value) + 1e-9)
@@ -153,7 +156,7 @@ def logarithmic_number(value: float) -> str:
 
 
 def symbol(name: str) -> str:
-    """A name in figures: "A1" and "tau1" as symbols with a subscript, others unchanged."""
+    """Return a name as shown in figures: "A1" and "tau1" as symbols with a subscript, others unchanged."""
     letters, number = _parted(name)
     if len(letters) != 1 and letters not in _GREEK:
         return plain(text_symbol(name))
@@ -162,7 +165,7 @@ def symbol(name: str) -> str:
 
 
 def text_symbol(name: str) -> str:
-    """A name on pages: "τ₁" for "tau1", "A₁" for "A1", others unchanged."""
+    """Return a name as shown on pages: "τ₁" for "tau1", "A₁" for "A1", others unchanged."""
     letters, number = _parted(name)
     if len(letters) == 1 or letters in _GREEK:
         return _GREEK.get(letters, letters) + number.translate(_LOWERED)
@@ -170,16 +173,16 @@ def text_symbol(name: str) -> str:
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """Letters and number of a name; none if it is of another kind."""
+    """Split a name into its letters and its number; both are empty if it has another form."""
     parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
     return (parts[1], parts[2]) if parts else ("", "")
 
 
 def plain(name: str) -> str:
-    """A name that Matplotlib does not read as mathematics."""
+    """Return a name with escaped dollar signs, so that Matplotlib does not parse it as mathematics."""
     return name.replace("$", r"\$")
 
 
 def is_signs(name: str) -> bool:
-    """Whether the name of a mode is the signs of its motors ("+-+-")."""
+    """Return whether the name of a mode consists of the signs of its motors ("+-+-")."""
     return bool(name) and set(name) <= {"+", "-"}

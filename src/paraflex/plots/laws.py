@@ -1,4 +1,4 @@
-"""Control laws in several actuation modes, side by side."""
+"""Figure that compares control laws in several actuation modes."""
 
 from __future__ import annotations
 
@@ -19,23 +19,26 @@ from paraflex.plots.selection import names_of
 from paraflex.plots.style import BLACK, COLOURS
 from paraflex.results.metrics import METRICS, VALIDITY
 
-# What laws are judged by first; panels are filled with others.
+# Metrics shown first; others fill the remaining panels.
 _FIRST = ("tracking_rms_motion", "tracking_rms", "residual_vibration", "peak_torque_max")
 _PANELS = 3
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-# Part of a line that the modes of a law share, and height of a mode's share [mm].
+# Share of a law's line over which its modes are spread, and height per mode [mm].
 _BAND, _SHARE = 0.6, 2.6
-# Where failures are marked, of the width of a panel.
+# Position of the marks of failures, as a share of the panel's width.
 _EDGE = 0.02
-# Values of a panel that differ by more are on a logarithmic axis.
+# Ratio of a panel's values above which its axis is logarithmic.
 _DECADE = 10.0
-# And by more than this so that panels between names have no room for numbers between powers of ten.
+# Ratio above which it is numbered at powers of ten only: narrow panels have no room for more.
 _WIDE = 40.0
 
 
 @drawn
 def law_comparison(data: xr.Dataset) -> Figure:
-    """Tracking error, residual vibration and largest torque of every law, by mode; "x" where a run has no end."""
+    """Plot the tracking error, residual vibration and largest torque of every control law, by mode.
+
+    An "x" marks a run that did not reach its end, an open mark a run beyond the validity of the model.
+    """
     shown = _metrics(data)
     laws, modes = names_of(data, "law"), names_of(data, "mode")
     figure, axes = panels(1, len(shown))
@@ -45,7 +48,7 @@ def law_comparison(data: xr.Dataset) -> Figure:
         named = number == 0 or is_narrow()
         list_lines(panel, laws if named else [""] * len(laws))
         for k, mode in enumerate(modes):
-            # Modes stand beside one another within the line of a law.
+            # The marks of the modes are spread within the line of a law.
             places = np.arange(len(laws)) + (0.0 if len(modes) == 1 else _BAND * (k / (len(modes) - 1) - 0.5))
             _draw_mode(panel, unit.factor * values[k], places, _beyond(data, mode), k, f"mode {plain(mode)}")
         _scale(panel, unit.factor * values)
@@ -58,7 +61,7 @@ def law_comparison(data: xr.Dataset) -> Figure:
 
 
 def _metrics(data: xr.Dataset) -> list[str]:
-    """Metrics with any positive number, those that laws are judged by first."""
+    """Return at most three metrics with finite values, those of `_FIRST` first."""
     there = [str(name) for name in data.data_vars if str(name).partition(".")[0] in METRICS and name != VALIDITY]
     order = [name for name in _FIRST if name in there] + [name for name in there if name not in _FIRST]
     found = [name for name in order if np.isfinite(data[name].values).any()][:_PANELS]
@@ -68,7 +71,7 @@ def _metrics(data: xr.Dataset) -> list[str]:
 
 
 def _beyond(data: xr.Dataset, mode: str) -> NDArray[np.bool_]:
-    """Which laws bend links beyond what the model can describe."""
+    """Return a mask of the laws under which links bend beyond the validity of the model."""
     if VALIDITY not in data:
         return np.zeros(data.sizes["law"], dtype=bool)
     return data[VALIDITY].sel(mode=mode).values > 1.0
@@ -101,7 +104,7 @@ def _scale(panel: Axes, values: NDArray[Any]) -> None:
 
 
 def _explain(panel: Axes, data: xr.Dataset) -> None:
-    """Entries of the legend for failures, and for models that do not hold."""
+    """Add legend entries for failures and for runs beyond the validity of the model."""
     mark: dict[str, Any] = {"linestyle": "none", "color": BLACK, "markersize": 4.0}
     if (data["status"] != "complete").any():
         panel.plot([], [], marker="x", label="not run to the end", **mark)

@@ -1,7 +1,7 @@
-"""Places of panels, labels and the legend, in millimetres of print.
+"""Layout of panels, labels and the legend, in millimetres of print.
 
-Matplotlib's constrained layout measures every text several times, which takes longer than drawing; and it does not
-put the axis labels of a column on one line.
+Matplotlib's constrained layout measures every text several times, which takes longer than drawing, and it does not
+align the axis labels of a column.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from paraflex.plots.style import STYLE
 ONE_COLUMN, TWO_COLUMNS = 84.0, 174.0  # Widths of a journal's columns [mm].
 COLUMNS = {"single": ONE_COLUMN, "double": TWO_COLUMNS}
 MM = 1.0 / 25.4  # [inch]
-# No figure is taller than the text of a page, if its panels can be as low as the least that can be read [mm].
+# Largest height of a figure, that of a page's text, and smallest height of a readable panel, which has priority [mm].
 _PAGE, _LOWEST = 225.0, 9.0
 
-# Room for the parts round a panel [mm].
+# Room for the parts around a panel [mm].
 _EDGE = 1.0
 _LEGEND_LINE = 4.2
 _TITLE = 4.4
@@ -39,10 +39,10 @@ _TIME_NUMBERS = 4.3
 _AXIS_LABEL = 3.8
 _RIGHT = 3.6  # half of a number such as 0.030
 
-# Widths of the letters of numbers [em] in DejaVu Sans, and its size on the axes [mm].
+# Widths of the characters of numbers in DejaVu Sans [em], and font size on the axes [mm].
 _DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838}
 _EM = STYLE["ytick.labelsize"] / 72.0 * 25.4
-# Width of a letter of a title, and by how much titles may be wider than their panels, where they are centred [mm].
+# Width of a letter of a title, and the excess by which a centred title may be wider than its panel [mm].
 _LETTER = 0.6 * STYLE["axes.titlesize"] / 72.0 * 25.4
 _OVERHANG = 4.0
 
@@ -51,7 +51,7 @@ _width: ContextVar[float | None] = ContextVar("_width", default=None)
 
 @contextmanager
 def column_width(style: str | None) -> Iterator[None]:
-    """Draw figures as wide as one column of a journal, "single", or two, "double"; None: at their own width."""
+    """Set the width of figures to one ("single") or two ("double") journal columns; None keeps their own width."""
     if style is not None:
         known(style, COLUMNS, "style", "style")
     before = _width.set(None if style is None else COLUMNS[style])
@@ -62,26 +62,26 @@ def column_width(style: str | None) -> Iterator[None]:
 
 
 def page_width(width: float) -> float:
-    """The width set by `column_width`, else the given one [mm]."""
+    """Return the width set by `column_width`, else the given one [mm]."""
     return _width.get() or width
 
 
 def figure_width(panel: Axes) -> float:
-    """Width of the figure that a panel is in [mm]."""
+    """Return the width of a panel's figure [mm]."""
     figure = panel.figure
     assert isinstance(figure, Figure)
     return figure.get_figwidth() / MM
 
 
 def is_narrow(width: float = TWO_COLUMNS) -> bool:
-    """Whether a figure of this width [mm] must be arranged in one column."""
+    """Return whether the panels of a figure of this width [mm] must be arranged in one column."""
     return page_width(width) < 0.75 * TWO_COLUMNS
 
 
 def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
-    """A figure of a width [mm] and its axes (rows, columns); `lay_out` places them.
+    """Create a figure of a width [mm] and its axes (rows, columns), to be placed by `lay_out`.
 
-    In `column_width` the width is that asked for.
+    A width set by `column_width` takes precedence.
     """
     width = page_width(width)
     figure = Figure(figsize=(width * MM, width * MM))
@@ -89,7 +89,7 @@ def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figu
 
 
 def panel_grid(count: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
-    """So many `panels` in rows of some columns, the first of `axes.flat`; the others are hidden."""
+    """Create `count` panels in rows of `columns`, the first ones of `axes.flat`; the others are hidden."""
     figure, axes = panels(-(-count // columns), columns, width=width)
     for panel in axes.flat[count:]:
         panel.set_visible(False)
@@ -106,7 +106,7 @@ def label_outer_time(axes: NDArray[Any]) -> None:
 
 
 def arranged(axes: NDArray[Any]) -> NDArray[Any]:
-    """Panels as placed: side by side, or below one another if a column of print is too narrow."""
+    """Return the panels as placed: unchanged, or one below the other if they do not fit side by side."""
     figure = axes[0, 0].figure
     width = figure.get_figwidth() / MM
     if axes.shape[1] == 1 or width > 0.75 * TWO_COLUMNS:
@@ -116,7 +116,7 @@ def arranged(axes: NDArray[Any]) -> NDArray[Any]:
         return axes
     for row in axes:
         for panel in row[1:]:
-            # One label for a row of panels becomes one for each.
+            # The label of a row of panels is repeated at each of them.
             panel.set_ylabel(panel.get_ylabel() or row[0].get_ylabel())
     return np.array([[panel] for panel in axes.flat if panel.get_visible()], dtype=object)
 
@@ -127,21 +127,21 @@ def _title_fits(panel: Axes, width: float) -> bool:
 
 
 def _letters(text: str) -> int:
-    """Letters of a text as printed, mathematics roughly."""
+    """Return the number of printed letters of a text; for mathematics it is an estimate."""
     return len(re.sub(r"\\[a-z]+", "x", text.replace(r"\$", "S")).translate(str.maketrans("", "", "${}_^")))
 
 
 def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figure:
-    """Place legend, panels and axis labels, and set the height of the figure.
+    """Place legend, panels and axis labels, set the height of the figure, and return the figure.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-        Completely drawn.
+        Figure with completely drawn panels.
     axes : array of matplotlib.axes.Axes (rows, columns)
-        Its panels.
+        Panels of the figure.
     panel_height : float
-        [mm]; less where the figure would be taller than a page.
+        Height of a panel [mm]; it is reduced if the figure would be taller than a page.
     """
     axes = arranged(axes)
     for panel in axes.flat:
@@ -169,7 +169,7 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
             panel.set_position((left / width, bottom / height, panel_width / width, panel_height / height))
             panel.yaxis.set_label_coords(-room / panel_width, 0.5)
             panel.xaxis.set_label_coords(0.5, -_TIME_NUMBERS / panel_height)
-            # Ticks are made in the current style.
+            # Accessing the ticks creates them in the current style.
             panel.xaxis.get_major_ticks()
             panel.yaxis.get_major_ticks()
             if panel_lines.get(panel):
@@ -180,7 +180,7 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
 
 
 def equal_scales_height(figure: Figure, panel: Axes) -> float:
-    """Height [mm] at which the one panel of a figure has equal scales on both axes and fills its width."""
+    """Return the height [mm] at which the only panel of a figure has equal scales on both axes and fills its width."""
     (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
     _, _, width = _columns(np.array([[panel]]), figure.get_figwidth() / MM)
     return width * (top - bottom) / (right - left)
@@ -189,7 +189,7 @@ def equal_scales_height(figure: Figure, panel: Axes) -> float:
 def _rows(
     axes: NDArray[Any], panel_height: float, legend_lines: int, own_lines: Sequence[int]
 ) -> tuple[list[float], float]:
-    """Tops of the rows of panels below the figure's top edge, and the figure's height [mm]."""
+    """Return the distances of the rows of panels from the figure's top edge, and the figure's height [mm]."""
     tops = []
     y = _EDGE + (legend_lines * _LEGEND_LINE + _EDGE if legend_lines else 0.0)
     for row, lines in zip(axes, own_lines, strict=True):
@@ -202,7 +202,7 @@ def _rows(
 
 
 def _columns(axes: NDArray[Any], width: float) -> tuple[list[float], list[float], float]:
-    """Left edges of the columns of panels, room for the numbers left of each, and width of a panel [mm]."""
+    """Return the left edges of the columns of panels, the room for numbers left of each, and a panel's width [mm]."""
     numbers = [_NUMBER_PAD + max(_number_width(panel.yaxis) for panel in column) for column in axes.T]
     margins = [
         _EDGE + room + (_AXIS_LABEL if any(panel.get_ylabel() for panel in column) else 0.0)
@@ -214,7 +214,7 @@ def _columns(axes: NDArray[Any], width: float) -> tuple[list[float], list[float]
 
 
 def _number_width(axis: Axis) -> float:
-    """Width of the widest number on an axis [mm]."""
+    """Return the width of the widest number on an axis [mm]."""
     low, high = sorted(axis.get_view_interval())
     places = axis.get_majorticklocs()
     texts = axis.get_major_formatter().format_ticks(places.tolist())
@@ -223,9 +223,10 @@ def _number_width(axis: Axis) -> float:
 
 
 def _entries(figure: Figure) -> tuple[dict[str, Any], dict[Axes, dict[str, Any]]]:
-    """Entries of the legend above all panels, and of those of single panels, in the order of drawing.
+    """Return the entries of the legend above all panels, and those of single panels, in the order of drawing.
 
-    Above all stands what one panel has all of, or every panel has; the rest stands where it is drawn.
+    If one panel has all entries, the common legend holds them all; otherwise it holds those that every panel has, and
+    the others stand above their panels.
     """
     entries: dict[Axes, dict[str, Any]] = {}
     for panel in figure.axes:
@@ -247,7 +248,7 @@ def _entries(figure: Figure) -> tuple[dict[str, Any], dict[Axes, dict[str, Any]]
 def _fitted_legend(
     holder: Figure | Axes, entries: Mapping[str, Any], room: float, loc: Literal["upper center", "lower center"]
 ) -> int:
-    """A legend at the middle of the upper edge, with as few lines as fit a width [pixels]; their number."""
+    """Add a legend at the middle of the upper edge, with as few lines as fit a width [pixels]; return their number."""
     for lines in range(1, len(entries) + 1):
         columns = math.ceil(len(entries) / lines)
         legend = holder.legend(list(entries.values()), list(entries), ncols=columns, bbox_to_anchor=(0.5, 1.0), loc=loc)

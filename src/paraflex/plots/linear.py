@@ -34,17 +34,17 @@ from paraflex.results.linear_summary import (
 
 Complex = NDArray[np.complex128]
 
-# Decades of a gain that are shown below its largest.
+# Decades of a gain shown below its largest value.
 _DECADES = 9.0
-# Sizes of the marks of zeros [pt], the modes' rings within one another where they coincide.
+# Size of the rings of zeros and its increment from mode to mode, so that coincident rings are nested [pt].
 _RING, _RING_STEP = 3.2, 0.9
 
 
 @drawn
 def singular_values(data: xr.Dataset) -> Figure:
-    """Largest and least gain of the motors of every mode to their own encoders, and to the end-effector.
+    """Plot the largest and smallest gain from the motors of every mode to their own encoders and to the end-effector.
 
-    Gains are singular values of the frequency response: zeros show where the least gain dips.
+    Gains are singular values of the frequency response; a dip of the smallest gain indicates zeros.
     """
     modes, (figure, axes, maps) = names_of(data, "mode"), _map_panels(data)
     for panel, name in zip(axes.flat, maps, strict=False):
@@ -65,14 +65,16 @@ def singular_values(data: xr.Dataset) -> Figure:
 def bode(
     data: xr.Dataset, mode: str | None = None, inputs: list[str] | None = None, outputs: list[str] | None = None
 ) -> Figure:
-    """Magnitude and phase of every motor of a mode to its own encoder, and to the end-effector's coordinates.
+    """Plot the frequency responses of a mode's motors to their own encoders and to the end-effector's coordinates.
+
+    Each column of panels shows magnitude and phase for one output.
 
     Parameters
     ----------
     inputs : list of str, optional
-        By default the motors of the mode; of a mode without motors all inputs.
+        Inputs; by default the motors of the mode, or all inputs for a mode without motors.
     outputs : list of str, optional
-        A column of panels for each; by default the own encoder of each motor, then the end-effector's coordinates.
+        Outputs; by default each motor's own encoder, then the end-effector's coordinates.
     """
     mode = default_mode(data) if mode is None else mode
     run = select_run(data, mode)
@@ -90,7 +92,7 @@ def bode(
             response = _channel(run, name, to)
             axes[0, column].plot(frequency, np.abs(response), label=symbol(name), **look_of(k))
             angle = np.degrees(np.angle(response))
-            # Between -360 and 0: a response that is real but for rounding has 0 or -180.
+            # The phase lies in (-360, 0]; a response that is real up to rounding has 0 or -180.
             phase = np.where(angle > 1e-6, angle - 360.0, angle)
             axes[1, column].plot(frequency, phase, label=symbol(name), **look_of(k))
         axes[0, column].set_title("to its own encoder" if not output else f"to {symbol(output)}")
@@ -110,10 +112,10 @@ def bode(
 
 @drawn
 def pole_zero_map(data: xr.Dataset) -> Figure:
-    """Poles (crosses, motors free) and zeros (rings) of all modes in the complex plane, on symmetrical log scales.
+    """Plot poles (crosses, motors free) and zeros (rings) of all modes in the complex plane, on symlog scales.
 
-    A panel for the motors to their own encoders, whose zeros are the poles with these motors held, and one for the
-    motors to the end-effector. The right half plane is shaded: zeros there are of non-minimum phase.
+    One panel shows the map from the motors to their own encoders, whose zeros are the poles with these motors held, the
+    other the map from the motors to the end-effector. The right half plane, with non-minimum-phase zeros, is shaded.
     """
     modes, (figure, axes, maps) = names_of(data, "mode"), _map_panels(data)
     most = 2.0 * np.pi * float(data["frequency"].values[-1])
@@ -146,9 +148,9 @@ def pole_zero_map(data: xr.Dataset) -> Figure:
 
 @drawn
 def poles_along_path(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Frequencies and real parts of the lowest poles of a mode along a motion, motors free and held.
+    """Plot frequencies and real parts of the lowest poles of a mode along a motion, motors free and held.
 
-    A colour for each branch, followed by its motion. Frozen at instants, they say nothing about stability.
+    Each branch, followed by its mode shape, has a colour. Poles of frozen-time models do not decide stability.
     """
     if "branch_real" not in data:
         raise InputError(
@@ -175,7 +177,7 @@ def poles_along_path(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 
 def _map_panels(data: xr.Dataset) -> tuple[Figure, NDArray[Any], list[str]]:
-    """A panel for the motors to their own encoders, and one to the end-effector; the names of these maps."""
+    """Create a panel for each map, to the own encoders and to the end-effector, and return the names of the maps."""
     maps = names_of(data, "map")
     if not maps:
         raise InputError(
@@ -199,7 +201,7 @@ def _over_frequency(panel: Axes, data: xr.Dataset) -> None:
 
 
 def _gain_axis(panel: Axes) -> None:
-    """A logarithmic axis, no lower than some decades below what is large at most frequencies."""
+    """Make the y axis logarithmic; its range excludes isolated dips and spans about `_DECADES` decades at most."""
     values = np.concatenate([np.abs(line.get_ydata()) for line in panel.get_lines()])  # type: ignore[arg-type]
     values = values[np.isfinite(values) & (values > 0.0)]
     mark_powers(panel)
@@ -214,7 +216,7 @@ def _within(values: Complex, most: float) -> Complex:
 
 
 def _linear_below(values: list[Complex]) -> float:
-    """Where symmetrical logarithmic axes become linear: a power of ten below all that is not zero."""
+    """Return the threshold below which symlog axes are linear: a power of ten below all non-zero magnitudes."""
     sizes = np.abs(np.concatenate(values))
     least = float(np.min(sizes[sizes > 1e-9 * sizes.max(initial=1.0)], initial=np.inf))
     return 10.0 ** np.floor(np.log10(least)) if np.isfinite(least) else 1.0

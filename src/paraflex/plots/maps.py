@@ -1,4 +1,4 @@
-"""Maps of designs: metrics over two parameters."""
+"""Maps of metrics over two parameters of many designs."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from paraflex.plots.scales import round_scale, scaled_label
 
 Array = NDArray[np.float64]
 
-# Panels beside one another, lines of a panel about, and colours between two of them.
+# Largest number of panels, approximate number of contour lines of a panel, and shades between two lines.
 _MOST_METRICS, _LINES, _BETWEEN = 3, 7, 4
-# A metric with a larger ratio of its values has lines at 1, 2 and 5 of each power of ten.
+# Ratio of a metric's values above which its lines are at 1, 2 and 5 times powers of ten.
 _SPREAD = 20.0
-# Fewer runs span no area worth a map.
+# Smallest number of runs for a map.
 _FEWEST = 4
-# Of the colour map, whose light end is too light for labels on it.
+# End of the used part of the colour map: its light end is too light for labels on it.
 _LIGHTEST = 0.9
 
 
 @drawn
 def response_map(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
-    """Lines of equal metrics over two parameters, on colours from dark, small, to light, large; dots are designs.
+    """Plot contours of metrics over the first two parameters that vary, from dark (small) to light (large).
 
-    The two are the first that vary; between designs, which need not be a grid, a metric is linear. Runs are those of
-    the first path and mode.
+    Dots are designs, which need not form a grid; metrics are interpolated linearly between them. Only runs of the first
+    path and mode are used.
 
     Parameters
     ----------
     metrics : sequence of str, optional
-        At most three; by default the first that varies.
+        At most three metrics; by default the first that varies.
     """
     names = table.varied
     series = list(table.series.values())
@@ -67,7 +67,7 @@ def response_map(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
 def _draw_map(panel: Axes, x: Array, y: Array, values: Array) -> None:
     known = np.isfinite(values)
     x, y, values = x[known] / round_scale(x), y[known] / round_scale(y), values[known]
-    # Triangles are of sides alike, whatever the units.
+    # Triangulate in normalised coordinates, so that the triangles do not depend on units.
     unit = [(each - each.min()) / (float(np.ptp(each)) or 1.0) for each in (x, y)]
     areas = Triangulation(x, y, Triangulation(*unit).triangles)
     spread = values.min() > 0.0 and values.max() > _SPREAD * values.min()
@@ -86,7 +86,7 @@ def _draw_map(panel: Axes, x: Array, y: Array, values: Array) -> None:
     )
     panel.plot(x, y, linestyle="", marker=".", markersize=2.0, color="white", alpha=0.8, clip_on=False)
     panel.margins(0.0)
-    # A number at the right end would stand out of the page.
+    # A number at the right end would extend beyond the figure.
     panel.xaxis.set_major_locator(MaxNLocator(5, prune="upper"))
 
 

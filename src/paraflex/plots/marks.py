@@ -1,4 +1,4 @@
-"""Symbols of a scene, in metres: supports, rails, blocks, pins, welds, springs and gears, and their looks."""
+"""Symbols of a scene in metres, with their looks: supports, rails, blocks, pins, welds, springs, gears and loads."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from paraflex.plots.scene import ARROW, BLOCK, TURN, DrawnJoint, DrawnLoad, Limi
 
 Array = NDArray[np.float64]
 
-# Sizes as parts of the picture's larger side.
+# Sizes as shares of the picture's larger side.
 PIN, TRIANGLE, RAIL, MOTOR = 0.008, 0.028, 0.02, 0.0125
-# Radius of a pin's dot beside the disc of a motor; small pictures have larger dots.
+# Radius of a pin's dot, smaller than the disc of a motor; small pictures have larger dots.
 DOT = 0.0056
-# Length of an arrow's head, and its half width of that; of shorter arrows it is so much of the arrow.
+# Length of an arrow's head as a share of the picture, its half width relative to its length, and its largest share of a
+# short arrow.
 _HEAD, _HALF_HEAD, _MOST_HEAD = 0.026, 0.36, 0.6
-# From where, and how far the arrow of the largest torque goes round its point [rad].
+# Start angle and sweep of the arrow of the largest torque around its point [rad].
 _TURN_FROM, _TURN_BY = -0.4, 1.5 * np.pi
-# Circle of a torque's arrow in the key against that in the picture.
+# Radius of a torque's arrow in the key relative to that in the picture.
 _KEY_TURN = 0.4
 _TEETH = 14
-# Points of a disc, and of an arc.
+# Numbers of points of a disc and of an arc.
 _ROUND, _ARC = 25, 40
 # A joint that moves by less than this fraction of the picture is drawn at rest.
 _STILL_SHARE = 1e-3
 
 
 class MarkLook(NamedTuple):
-    """Look of symbols: colours of a theme by use, empty for none; width of lines, and whether dashed."""
+    """Look of a symbol: names of theme colours for fill and stroke (empty for none), line width, whether dashed."""
 
     fill: str
     stroke: str
@@ -38,7 +39,7 @@ class MarkLook(NamedTuple):
     dashed: bool = False
 
 
-# Symbols from the back to the front; links are drawn before the first that moves.
+# Looks from the back to the front; links are drawn before the first symbol that moves.
 LOOKS = {
     "ground": MarkLook("", "earth", 1.2),
     "hatching": MarkLook("", "earth", 0.8),
@@ -56,7 +57,7 @@ LOOKS = {
 
 
 class Mark(NamedTuple):
-    """A symbol of one of the `LOOKS` at f times: a line (f, n, 2), with gaps where it is NaN, or a dot (f, 1, 2)."""
+    """Symbol with one of the `LOOKS` at f times: a line (f, n, 2), with gaps where it is NaN, or a dot (f, 1, 2)."""
 
     look: str
     name: str
@@ -64,7 +65,7 @@ class Mark(NamedTuple):
 
 
 def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
-    """Symbols of the ground, at one time."""
+    """Return the symbols of the ground, at one time."""
     # A joint that neither slides nor holds a point has no support.
     held = [joint for joint in shown.joints if joint.slides or {"pin", "weld"} & SYMBOLS.get(joint.kind, {}).keys()]
     found = [(joint.name, ground_of(joint, limits)) for joint in held if joint.grounded]
@@ -77,7 +78,7 @@ def still_marks(shown: Scene, limits: Limits) -> list[Mark]:
 
 
 def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
-    """Symbols of gears, springs, rails, joints and their motors, and arrows of loads."""
+    """Return the symbols of gears, springs, rails, joints and their motors, and the arrows of loads, back to front."""
     out = [Mark("gear", gear.name, line) for gear in shown.gears for line in gear.lines]
     out += [Mark("spring", name, zigzag(ends, limits)) for name, ends in shown.springs.items()]
     parts = [(joint, look, shape) for joint in shown.joints for look, shape in SYMBOLS.get(joint.kind, {}).items()]
@@ -91,30 +92,30 @@ def moving_marks(shown: Scene, limits: Limits) -> list[Mark]:
 
 
 def by_look(marks: Sequence[Mark]) -> dict[str, list[Mark]]:
-    """Marks of each look, from the back to the front."""
+    """Group marks by their look, from the back to the front."""
     found = {look: [mark for mark in marks if mark.look == look] for look in LOOKS}
     return {look: some for look, some in found.items() if some}
 
 
 def _joined(pieces: Sequence[Array] | Array) -> Array:
-    """Lines in succession, with gaps between them."""
+    """Concatenate lines with gaps (NaN) between them."""
     gap = np.full((1, 2), np.nan)
     return np.concatenate([part for piece in pieces for part in (piece, gap)])[:-1]
 
 
 def is_guide(joint: DrawnJoint, limits: Limits) -> bool:
-    """Whether a slider moves through a fixed block, instead of a block along a rail."""
+    """Return whether a joint is drawn as a fixed guide through which a slider moves, not as a block along a rail."""
     return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL_SHARE * limits.size)
 
 
 def triangle(place: Array, limits: Limits) -> Array:
-    """A support under a place, closed (4, 2)."""
+    """Return the closed triangle (4, 2) of a support under a point."""
     d = TRIANGLE * limits.size
     return place + d * np.array([[0.0, 0.0], [-0.6, -1.0], [0.6, -1.0], [0.0, 0.0]])
 
 
 def hatching(start: Array, end: Array, limits: Limits) -> Array:
-    """Strokes (n, 2, 2) of ground on the right of a line from start to end."""
+    """Return strokes (n, 2, 2) of ground on the right of a line from start to end."""
     d = 0.45 * RAIL * limits.size
     length = float(np.linalg.norm(end - start))
     along = (end - start) / length
@@ -125,14 +126,14 @@ def hatching(start: Array, end: Array, limits: Limits) -> Array:
 
 
 def support(place: Array, limits: Limits) -> tuple[list[Array], Array]:
-    """Lines of a support under a place, and the hatching (n, 2, 2) of its ground."""
+    """Return the lines of a support under a point, and the hatching (n, 2, 2) of its ground."""
     held, wide = triangle(place, limits), 0.35 * TRIANGLE * limits.size
     base = np.array([held[1] - [wide, 0.0], held[2] + [wide, 0.0]])
     return [held, base], hatching(base[0], base[1], limits)
 
 
 def ground_of(joint: DrawnJoint, limits: Limits) -> tuple[list[Array], Array]:
-    """Lines of a joint's ground, and its hatching (n, 2, 2): a rail if it slides, else a support."""
+    """Return the lines of a joint's ground and its hatching (n, 2, 2): a rail if a block slides, else a support."""
     size = limits.size
     if joint.slides and not is_guide(joint, limits):
         along = np.array([np.cos(joint.direction[0]), np.sin(joint.direction[0])])
@@ -143,7 +144,7 @@ def ground_of(joint: DrawnJoint, limits: Limits) -> tuple[list[Array], Array]:
         across = across if across[1] < 0.0 or (across[1] == 0.0 and across[0] > 0.0) else -across
         foot = middle + 0.5 * BLOCK[1] * size * across
         ends = [foot + (reach.min() - beyond) * along, foot + (reach.max() + beyond) * along]
-        # Strokes on the side that the block is not on.
+        # Strokes are on the side away from the block.
         if np.dot(np.array([along[1], -along[0]]), across) < 0.0:
             ends.reverse()
         return [np.array(ends)], hatching(ends[0], ends[1], limits)
@@ -151,7 +152,7 @@ def ground_of(joint: DrawnJoint, limits: Limits) -> tuple[list[Array], Array]:
 
 
 def block(joint: DrawnJoint, limits: Limits) -> Array:
-    """Corners (f, 5, 2) of a slider, or of the guide it slides through."""
+    """Return the corners (f, 5, 2) of a slider, or of the guide through which it slides."""
     a, b = 0.5 * np.array(BLOCK) * limits.size
     corners = np.array([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]])
     c, s = np.cos(joint.direction)[:, None], np.sin(joint.direction)[:, None]
@@ -160,7 +161,7 @@ def block(joint: DrawnJoint, limits: Limits) -> Array:
 
 
 def rail(joint: DrawnJoint, limits: Limits) -> Array:
-    """The ends (f, 2, 2) of a rail that a moving body carries, as long as the travel and a block beyond it."""
+    """Return the ends (f, 2, 2) of a rail carried by a moving body, 1.5 block lengths beyond the travel at each end."""
     assert joint.rail is not None
     along = np.stack([np.cos(joint.direction), np.sin(joint.direction)], axis=-1)
     travel = np.sum((joint.place - joint.rail) * along, axis=-1)
@@ -170,7 +171,7 @@ def rail(joint: DrawnJoint, limits: Limits) -> Array:
 
 
 def motor(joint: DrawnJoint, limits: Limits) -> Array:
-    """The disc (f, n, 2) of a motor round its pin, or the core of a block that is driven along its rail."""
+    """Return the disc (f, n, 2) of a motor around its pin, or the core of a block that is driven along its rail."""
     if joint.slides:
         return joint.place[:, None] + 0.5 * (block(joint, limits) - joint.place[:, None])
     angle = np.linspace(0.0, 2.0 * np.pi, _ROUND)
@@ -178,14 +179,17 @@ def motor(joint: DrawnJoint, limits: Limits) -> Array:
 
 
 def load_arrow(load: DrawnLoad, limits: Limits) -> tuple[Array, Array]:
-    """Line and head of a load's arrow: to its point along a force, round it with a torque; a point where it is zero."""
+    """Return line and head of a load's arrow: to its point for a force, around it for a torque.
+
+    The arrow shrinks to a point where the load is zero.
+    """
     if np.any(load.torque):
         return round_arrow(load.place, TURN * limits.size, _TURN_FROM, _TURN_BY * load.torque, limits)
     return straight_arrow(load.place - ARROW * limits.size * load.force, load.place, limits)
 
 
 def key_arrow(kind: str, limits: Limits) -> tuple[Array, Array]:
-    """Line (n, 2) and head (4, 2) of the arrow of the largest "force", or "torque" on a smaller circle."""
+    """Return line (n, 2) and head (4, 2) of the key arrow of the largest "force" or, on a smaller circle, "torque"."""
     middle = np.zeros((1, 2))
     if kind == "force":
         line, head = straight_arrow(middle - [ARROW * limits.size, 0.0], middle, limits)
@@ -195,7 +199,7 @@ def key_arrow(kind: str, limits: Limits) -> tuple[Array, Array]:
 
 
 def straight_arrow(tail: Array, tip: Array, limits: Limits, size: float = 1.0) -> tuple[Array, Array]:
-    """The line (f, 2, 2) of an arrow from tails to tips (f, 2), and its head (f, 4, 2) of a size."""
+    """Return the line (f, 2, 2) of an arrow from tails to tips (f, 2), and its head (f, 4, 2), scaled by `size`."""
     length = np.linalg.norm(tip - tail, axis=1, keepdims=True)
     along = (tip - tail) / np.where(length > 0.0, length, 1.0)
     head = np.minimum(size * _HEAD * limits.size, _MOST_HEAD * length)
@@ -205,7 +209,10 @@ def straight_arrow(tail: Array, tip: Array, limits: Limits, size: float = 1.0) -
 def round_arrow(
     centre: Array, radius: float, start: float, sweep: Array, limits: Limits, size: float = 1.0
 ) -> tuple[Array, Array]:
-    """The line (f, n, 2) of an arrow on circles round centres (f, 2), by angles (f,), and its head (f, 4, 2)."""
+    """Return the line (f, n, 2) of an arrow on circles around centres (f, 2), and its head (f, 4, 2).
+
+    The arrow runs from the angle `start` through the angles `sweep` (f,) [rad].
+    """
     head = np.minimum(size * _HEAD * limits.size, _MOST_HEAD * radius * np.abs(sweep))
     ends = start + sweep - np.sign(sweep) * head / radius
     angle = start + np.linspace(0.0, 1.0, _ARC) * (ends - start)[:, None]
@@ -217,25 +224,25 @@ def round_arrow(
 
 
 def _head(tip: Array, along: Array, length: Array) -> Array:
-    """Triangles (f, 4, 2) with tips (f, 2), directions (f, 2) and lengths (f, 1)."""
+    """Return triangles (f, 4, 2) with tips (f, 2), directions (f, 2) and lengths (f, 1)."""
     across = _HALF_HEAD * length * np.column_stack([-along[:, 1], along[:, 0]])
     foot = tip - length * along
     return np.stack([tip, foot + across, foot - across, tip], axis=1)
 
 
 def square(joint: DrawnJoint, limits: Limits) -> Array:
-    """Corners (f, 5, 2) of a weld."""
+    """Return the corners (f, 5, 2) of a weld."""
     d = 0.9 * PIN * limits.size
     return joint.place[:, None] + d * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
 
 
 def dot(joint: DrawnJoint, _: Limits) -> Array:
-    """The place (f, 1, 2) of a pin."""
+    """Return the position (f, 1, 2) of a pin."""
     return joint.place[:, None]
 
 
 def rod(joint: DrawnJoint, limits: Limits) -> Array:
-    """A line (f, n, 2) between pins round both ends of a rod; of a sign in a legend one of the size of a block."""
+    """Return the outline (f, n, 2) of a rod between the pins at its ends; in a legend it is as long as a block."""
     half = np.array([0.5 * BLOCK[0] * limits.size, 0.0])
     both = (joint.place + half, joint.place - half) if joint.rail is None else (joint.place, joint.rail)
     ends = np.stack(both, axis=1)
@@ -245,7 +252,7 @@ def rod(joint: DrawnJoint, limits: Limits) -> Array:
 
 
 def zigzag(ends: Array, limits: Limits) -> Array:
-    """A spring (f, n, 2) between two ends (f, 2, 2)."""
+    """Return the zigzag line (f, n, 2) of a spring between two ends (f, 2, 2)."""
     a, b = ends[:, 0], ends[:, 1]
     d = b - a
     length = np.linalg.norm(d, axis=1, keepdims=True)
@@ -256,8 +263,8 @@ def zigzag(ends: Array, limits: Limits) -> Array:
     return a[:, None] + along[:, None] * d[:, None] + swing[:, None] * across[:, None]
 
 
-# Shapes of what moves of a joint by their looks, by `Joint.symbol`; a joint that has none is not drawn. What slides and
-# turns, turns on a pin; what is welded to a block does neither.
+# Functions for the moving shapes of a joint by their looks, keyed by `Joint.symbol`; a joint without an entry is not
+# drawn. A joint that slides and turns has a pin on its block.
 SYMBOLS: dict[str, dict[str, Callable[[DrawnJoint, Limits], Array]]] = {
     "pin": {"pin": dot},
     "weld": {"weld": square},

@@ -1,4 +1,4 @@
-"""Readings of sensors."""
+"""Figure of the readings of sensors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from paraflex.results.sensors import sensor_groups
 
 @drawn
 def sensors(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Reading of every sensor in time, a panel for each unit; at most the seven largest of each."""
+    """Plot the readings of sensors over time, one panel for each unit; at most the seven largest of each."""
     run = one_run(data, mode)
     groups = sensor_groups(run)
     if not groups:

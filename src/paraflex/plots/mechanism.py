@@ -25,12 +25,12 @@ Points = NDArray[np.float64]
 POINT_STYLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
 _IN_LEGEND: dict[str, Any] = {"linestyle": "none", "marker": "^", "markerfacecolor": "none", "markeredgecolor": BLACK}
 _LOOK = replace(theme("light"), ink=BLACK, earth=BLACK, links=("#737373",))
-# Millimetres in a metre; samples of a run that show how far things slide.
+# Millimetres per metre, and number of samples of a run from which the travel of sliding joints is found.
 _MM, _POSES = 1e3, 61
-# Of lines, beside those of a film.
+# Line width relative to that of a film.
 _WIDTH = 0.68
 
-# Points this near to each other, or moving this little, share of the mechanism's size: constraints hold no better.
+# Distance below which points coincide or are at rest, as a share of the mechanism's size: constraints hold no better.
 _SAME = 1e-4
 
 
@@ -40,11 +40,11 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        In mm, with equal scales.
+        Axes in mm, with equal scales.
     data : xarray.Dataset
-        From `paraflex.results`; the run that got furthest is taken.
+        Results from `paraflex.results`; the run with most samples is drawn.
     clear_of : array (n, 2)
-        Places [mm] names keep away from, besides those of the mechanism.
+        Points [mm] that names keep clear of, in addition to those of the mechanism.
     """
     run = max((data.isel(mode=k) for k in range(data.sizes["mode"])), key=samples)
     if samples(run) == 0:
@@ -76,7 +76,7 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
 
 
 def _of_shapes(run: xr.Dataset) -> Scene:
-    """The start in mm, with rails as long as the travel of the run."""
+    """Return the scene of the start pose in mm, with rails as long as the travel of the run."""
     shown = scene(run, np.linspace(*run_times(run), _POSES))
     return replace(
         shown,
@@ -93,7 +93,7 @@ def _of_shapes(run: xr.Dataset) -> Scene:
 
 
 def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:
-    """Bodies as figures of their points, at one time."""
+    """Return a scene whose bodies are the figures formed by their points, at one time."""
     bodies: dict[str, list[int]] = {}
     for k, name in enumerate(names):
         bodies.setdefault(name.rpartition(".")[0], []).append(k)
@@ -105,13 +105,13 @@ def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> 
 
 
 def _sampled(outline: Points) -> Points:
-    """Points along a line (1, s, 2), close to one another."""
+    """Return closely spaced points along a line (1, s, 2)."""
     share = np.linspace(0.0, 1.0, 25)[:, None]
     return np.vstack([a + share * (b - a) for a, b in pairwise(outline[0])] + [outline[0, :1]])
 
 
 def _coincident(points: Points, size: float) -> list[list[int]]:
-    """Indices of points, those at one place together."""
+    """Return the indices of points, grouped by position."""
     groups: dict[int, list[int]] = {}
     for k, point in enumerate(points):
         first = int(np.argmax(np.linalg.norm(points - point, axis=1) <= _SAME * size))
@@ -120,7 +120,7 @@ def _coincident(points: Points, size: float) -> list[list[int]]:
 
 
 def _name_points(axes: Axes, points: Points, groups: list[list[int]], names: list[str], taken: Points) -> None:
-    """Write names beside points, each on the side with most room; points at one place share theirs."""
+    """Write names beside points, each on the side with most room; coincident points share a text."""
     size = float(np.ptp(points, axis=0).max())
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])

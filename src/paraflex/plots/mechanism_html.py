@@ -1,4 +1,4 @@
-"""A mechanism in notebooks: its members, and a sketch."""
+"""View of a mechanism in notebooks: its members and a sketch."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from paraflex.dynamics.constraints import constraint_count
 from paraflex.mechanism import Body, Mechanism, grouped, loops
 from paraflex.plots.svg import sketch
 
-# Bodies, joints or modes listed one by one.
+# Largest number of bodies, joints or modes listed one by one.
 _MOST_LISTED = 40
-# Groups with a table of their own; of others only the number is shown.
+# Groups that are listed elsewhere on the page; of the others only the number of members is shown.
 _LISTED_GROUPS = ("body", "joint", "motor", "assembly", "mode")
 
 
 @view.register(Mechanism)
 def mechanism_html(mechanism: Mechanism) -> str:
-    """Bodies, joints, motors, freedoms and a sketch of the first assembly."""
+    """Return the HTML view of a mechanism: bodies, joints, motors, freedoms and a sketch of the first assembly."""
     rows = [(body.name, _words(body), getattr(body, "length", None), ", ".join(body.points))
             for body in mechanism.bodies]  # fmt: skip
     joints = [(joint.name, joint.kind, f"{joint.a} – {joint.b}") for joint in mechanism.joints]
@@ -33,7 +33,7 @@ def mechanism_html(mechanism: Mechanism) -> str:
 
 
 def freedoms(mechanism: Mechanism) -> int:
-    """Degrees of freedom of the rigid mechanism by Grübler's count, which ignores redundant constraints."""
+    """Return the degrees of freedom of the rigid mechanism by Grübler's formula, which ignores redundancy."""
     return 3 * len(mechanism.bodies) - constraint_count(mechanism)
 
 
@@ -65,12 +65,12 @@ def _counted(mechanism: Mechanism) -> str:
 
 
 def _few(what: str, headings: tuple[str, ...], rows: list[tuple]) -> str:
-    """A table of the first rows, and the number of the others."""
+    """Return a table of the first rows, and the number of the others."""
     more = len(rows) - _MOST_LISTED
     return table(headings, rows[:_MOST_LISTED]) + (sentence(f"and {more} more {what}") if more > 0 else "")
 
 
 def _words(body: Body) -> str:
-    """The class of a body in words: "flexible beam"; held rigid, with a remark."""
+    """Return the class of a body in words, "flexible beam", with a remark if the body is held rigid."""
     text = re.sub(r"(?<!^)(?=[A-Z])", " ", type(body).__name__).lower()
     return f"{text}, held rigid" if getattr(body, "flexible", True) is False else text

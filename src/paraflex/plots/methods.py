@@ -1,4 +1,4 @@
-"""Wall time and steps of every method over its error."""
+"""Work-precision diagram of integration methods: wall time and steps over error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.scales import name_powers
 from paraflex.plots.style import BLACK, COLOURS, SHADE
 
-# A family shares mark and dashes; its members differ in colour.
+# Methods of a family share marker and dashes and differ in colour.
 _FAMILIES: Mapping[str, dict[str, Any]] = {
     "esdirk": {"marker": "o", "linestyle": "-"},
     "newmark": {"marker": "s", "linestyle": (0, (5, 1.5))},
@@ -24,7 +24,7 @@ _FAMILIES: Mapping[str, dict[str, Any]] = {
 
 
 def method_look(family: str, number: int) -> dict[str, Any]:
-    """Look of a method by its number in its family."""
+    """Return the look of a method by its number in its family."""
     colours = [BLACK, *(colour for colour in COLOURS if colour != BLACK)]
     return {
         "color": colours[number % len(colours)],
@@ -36,10 +36,10 @@ def method_look(family: str, number: int) -> dict[str, Any]:
 
 @drawn
 def work_precision(figures: Mapping[str, Any]) -> Figure:
-    """Wall time and accepted steps of every method over its error, both axes logarithmic.
+    """Plot wall time and accepted steps of every method over its error, on logarithmic axes.
 
-    Runs with fixed steps and those with error control are lines of their own; the former have open marks. What the
-    reference cannot tell is shaded.
+    Runs with fixed steps and runs with error control form separate lines; the former have open marks. Errors below the
+    uncertainty of the reference are shaded.
     """
     lines = _lines(figures["methods"])
     if not lines:
@@ -67,7 +67,7 @@ def work_precision(figures: Mapping[str, Any]) -> Figure:
 
 
 def _lines(methods: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], list[dict[str, Any]]]]:
-    """Title, look and complete runs of each line, in order of error, without runs of zero error."""
+    """Return title, look and complete runs of each line, by decreasing error and without runs of zero error."""
     members: dict[str, int] = {}
     lines = []
     for method in methods.values():

@@ -1,4 +1,4 @@
-"""The mechanism in its lowest undamped modes."""
+"""Figure of the lowest undamped mode shapes of a mechanism."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ from paraflex.results.linear_data import HOLDINGS
 from paraflex.results.linear_motion import SWING, DrawnMode, drawn_modes, modal_motion
 from paraflex.results.linear_summary import HELD_WORDS
 
-# Room for a panel's title, and for that of a row [mm].
+# Heights of the titles of a panel and of a row [mm].
 _TITLE, _ROW = 4.5, 5.0
-# Shapes are drawn magnified twice: beside what is magnified the undeformed mechanism is drawn.
+# Phase of the largest displacement [rad]. Shapes are magnified twice because a magnified scene includes the undeformed
+# mechanism.
 _QUARTER = np.array([np.pi / 2.0])
 
 
 @drawn
 def mode_shapes(data: xr.Dataset, mode: str | None = None, count: int = 4, theme_name: str = "light") -> Figure:
-    """Shapes of the lowest undamped modes that vibrate, motors free above and those of the mode held below.
+    """Draw the shapes of the lowest undamped modes that vibrate: motors free above, the mode's motors held below.
 
-    The undeformed mechanism is pale. Displacements are drawn linear, of one size.
+    The undeformed mechanism is pale. Displacements are linear and scaled to one size.
 
     Parameters
     ----------
     count : int
-        Shapes in a row.
+        Number of shapes with motors free, and of those with motors held.
     theme_name : str
-        "light" or "dark".
+        Theme of colours, "light" (default) or "dark".
     """
     mode = default_mode(data) if mode is None else mode
     place_of(mode, names_of(data, "mode"), "mode")
@@ -55,7 +56,7 @@ def mode_shapes(data: xr.Dataset, mode: str | None = None, count: int = 4, theme
 
 
 def _panels(rows: dict[str, list[DrawnMode]], scenes: dict[DrawnMode, Scene], mode: str, theme_name: str) -> Figure:
-    """A panel for each shape, a row for each way to hold the motors, or more where a column of print is narrow."""
+    """Draw a panel for each shape; motors free and motors held each have a row, or more rows if the page is narrow."""
     look, width = theme(theme_name), page_width(TWO_COLUMNS)
     columns = min(2 if is_narrow() else 4, max(map(len, rows.values())))
     (limits, aspect), wide = common_limits([*scenes.values()]).filling(0.4, 1.6), width / columns

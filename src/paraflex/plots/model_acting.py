@@ -1,4 +1,4 @@
-"""Arrows of what acts on a mechanism before it runs: loads with their sizes, and which way it is driven first."""
+"""Arrows of a model drawing: loads with their magnitudes, and the first movements of driven joints."""
 
 from __future__ import annotations
 
@@ -15,20 +15,32 @@ from paraflex.results.posed import Posed
 
 Array = NDArray[np.float64]
 
-# Shortest arrow of a load against that of the largest.
+# Length of the shortest arrow of a load relative to that of the largest.
 _SHORTEST = 0.35
-# From where and how far a torque's arrow goes, and that of a first turn, anticlockwise [rad].
+# Start angle and sweep of the arrow of a torque, then of a first rotation, anticlockwise [rad].
 _TURN_FROM, _TURN_BY = -0.4, 1.5 * np.pi
 _MOVE_FROM, _MOVE_BY = -0.15, np.pi + 0.3
-# Radius of the arrow of a first turn, how much larger the next at its place is, and half the length of that of a first
-# travel, as parts of the picture's larger side.
+# Radius of the arrow of a first rotation, increment of the radius for the next arrow at the same place, and half length
+# of the arrow of a first translation, as shares of the picture's larger side.
 _MOVE, _NEXT, _TRAVEL = 0.028, 0.012, 0.028
 _HEAD = 0.6
 
 
 @dataclass(frozen=True)
 class LoadArrow:
-    """A load's arrow, its name and size, where these may stand (k, 2), and whether it does not act at the start."""
+    """Arrow of a load.
+
+    Attributes
+    ----------
+    arrow : Arrow
+        Line and head of the arrow.
+    name, size : str
+        Name of the load, and its magnitude with unit.
+    later : bool
+        Whether the load does not act at the start.
+    named : (k, 2) array
+        Positions beside which the name may stand [m].
+    """
 
     arrow: Arrow
     name: str
@@ -39,14 +51,14 @@ class LoadArrow:
 
 @dataclass(frozen=True)
 class Acting:
-    """Arrows of the loads, and of first movements of motors and prescribed motions."""
+    """Arrows of loads, and of the first movements of motors and prescribed motions."""
 
     loads: tuple[LoadArrow, ...]
     moves: tuple[Arrow, ...]
 
 
 def acting_arrows(posed: Posed, shown: Scene, limits: Limits) -> Acting:
-    """Arrows of a mechanism at the pose it starts from."""
+    """Return the arrows of a mechanism at its start pose."""
     acting = [acting_load(load, posed.duration) for load in posed.mechanism.loads]
     largest = {kind: max((one.largest for one in acting if one.load.kind == kind), default=0.0) for kind in
                ("force", "torque")}  # fmt: skip
@@ -55,7 +67,7 @@ def acting_arrows(posed: Posed, shown: Scene, limits: Limits) -> Acting:
 
 
 def load_places(posed: Posed, size: float) -> Array:
-    """Tails (n, 2) of the arrows of forces, each as long as the longest, in a picture of a size [m]."""
+    """Return the tails (n, 2) of the arrows of forces, all of the largest length, in a picture of a size [m]."""
     tails = [np.zeros((0, 2))]
     for load in posed.mechanism.loads:
         shown = acting_load(load, posed.duration).shown
@@ -80,14 +92,14 @@ def _load_arrow(posed: Posed, one: ActingLoad, largest: float, limits: Limits) -
 
 
 def _moves(posed: Posed, shown: Scene, limits: Limits) -> list[Arrow]:
-    """Arrows of joints that begin to move; those at one place beside one another."""
+    """Return the arrows of joints that begin to move; arrows at the same place are nested."""
     arrows: list[Arrow] = []
     placed: list[Array] = []
     for joint in shown.joints:
         sign = posed.moves.get(joint.name, 0)
         if not sign or joint.name in posed.gaps:
             continue
-        # What is seen to move is not the ground.
+        # If the second body of the joint is the ground, the visible motion is that of the first.
         sign = -sign if posed.mechanism.joint(joint.name).b.on_ground else sign
         before = sum(bool(np.allclose(joint.place[0], place, atol=1e-6 * limits.size)) for place in placed)
         placed.append(joint.place[0])
@@ -105,7 +117,7 @@ def _turn(joint: DrawnJoint, sign: int, before: int, limits: Limits) -> Arrow:
 def _slide(joint: DrawnJoint, sign: int, before: int, limits: Limits) -> Arrow:
     along = np.array([[np.cos(joint.direction[0]), np.sin(joint.direction[0])]])
     across = along[:, ::-1] * [-1.0, 1.0]
-    # On the side that the ground is not drawn on.
+    # The arrow is on the side away from the ground.
     across = across if across[0, 1] > 0.0 or (across[0, 1] == 0.0 and across[0, 0] < 0.0) else -across
     middle = joint.place[:1] + (0.5 * BLOCK[1] + (before + 1) * _NEXT) * limits.size * across
     half = sign * _TRAVEL * limits.size * along

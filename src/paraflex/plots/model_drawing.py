@@ -1,4 +1,4 @@
-"""A mechanism as its file says it, before anything runs: names, joints by kind, drives, loads, sensors, path."""
+"""Drawing of a model before it runs: names, joints by kind, drives, loads, sensors and path."""
 
 from __future__ import annotations
 
@@ -29,40 +29,40 @@ from paraflex.results.posed import Posed
 Array = NDArray[np.float64]
 
 _MM_OF_POINT = 25.4 / 72.0
-# Room round the panel: left, right, below with the legend, above with the title [mm].
+# Room around the panel: left, right, below with the legend, above with the title [mm].
 _LEFT, _RIGHT, _BELOW, _ABOVE = 13.0, 2.5, 15.5, 8.0
 _FLATTEST, _TALLEST = 0.36, 0.85
-# Most bodies and joints named: beyond that names would hide what they name.
+# Largest numbers of members that are named: more names would hide the drawing.
 _MOST_BODIES, _MOST_JOINTS, _MOST_MOTORS, _MOST_SENSORS = 40, 60, 24, 40
 _TEXT = 7.5
-# Length of the arrow of weight as a part of the picture.
+# Length of the arrow of gravity as a share of the picture.
 _WEIGHT = 0.09
 _OPEN = "#c8102e"
 _GAP: dict[str, Any] = {"color": _OPEN, "linewidth": 1.3, "linestyle": (0, (3, 2)), "marker": "x", "markersize": 5.0}
 _PAYLOAD: dict[str, Any] = {"marker": "s", "markersize": 11.0, "markeredgewidth": 1.2, "linestyle": "none"}
 _START: dict[str, Any] = {"marker": "s", "markersize": 7.0, "markerfacecolor": "none", "linestyle": "none"}
-# Kinds of joints in the legend by their symbols.
+# Names of kinds of joints in the legend, by symbol.
 _KINDS = {
     "pin": "revolute", "weld": "weld", "slider": "prismatic", "slot": "slot", "sliding": "slides along a beam",
     "rod": "rod without mass",
 }  # fmt: skip
-# Width of dots and lines against those of a film.
+# Width of dots and lines relative to those of a film.
 _WIDTH = 0.62
-# Room of an entry of the legend but for its words [pt], and heights of further rows [mm].
+# Width of an entry of the legend without its text [pt], and height of each further row [mm].
 _ENTRY, _ROW = 30.0, 6.0
 
 
 def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str = "light") -> Figure:
-    """A mechanism at the pose it starts from.
+    """Draw a mechanism at its start pose.
 
     Parameters
     ----------
     posed : Posed
-        See `results.posed`.
+        Mechanism at its start pose, see `results.posed`.
     width : float
-        [mm]
+        Width of the figure [mm]; two columns of a journal by default.
     theme_name : str
-        "light" or "dark".
+        Theme of colours, "light" (default) or "dark".
     """
     look, mechanism = theme(theme_name), posed.mechanism
     with journal_style():
@@ -81,7 +81,7 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
         axes.plot(*np.array([*mechanism.ground.values()]).reshape(-1, 2).T, "+", color=look.earth, markersize=4.0)
         _draw_gaps(axes, posed)
         if posed.payload is not None:
-            # Above links, below the marks of joints and the end-effector.
+            # The payload is above links and below the marks of joints and the end-effector.
             axes.plot(*posed.payload, **_PAYLOAD, **_payload_colours(look), zorder=3.05)
             drawn.append(posed.payload[None])
         named = _body_names(shown, look) + _joint_names(posed, shown, look) + _other_names(posed, shown, limits, look)
@@ -105,11 +105,11 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
 
 
 def _scene(posed: Posed) -> Scene:
-    """The scene of the start; the trail is the end-effector alone."""
+    """Return the scene of the start pose; without an end-effector it has no trail."""
     shown = scene(posed.data, posed.data["time"].values, 1.0)
     ground = {joint.name: posed.mechanism.ground[ref.point] for joint in posed.mechanism.joints
               for ref in (joint.a, joint.b) if ref.on_ground}  # fmt: skip
-    # The support of an open joint is not where its body is.
+    # The ground point of an open joint is not at its body, so its support is drawn as an anchor.
     anchors = [np.array(ground[name]) for name in posed.gaps if name in ground]
     joints = [replace(joint, grounded=joint.grounded and joint.name not in posed.gaps) for joint in shown.joints]
     desired = [] if posed.desired is None else posed.desired
@@ -122,7 +122,7 @@ def _scene(posed: Posed) -> Scene:
 
 
 def _rows(words: list[str], width: float) -> int:
-    """Rows that the legend takes."""
+    """Return the number of rows of the legend."""
     return max(1, int(np.ceil(sum(0.58 * _TEXT * len(text) + _ENTRY for text in words) * _MM_OF_POINT / width)))
 
 
@@ -144,14 +144,14 @@ def _panel(limits: Limits, aspect: float, width: float, rows: int, look: Theme) 
 
 
 def _drawn_places(shown: Scene, limits: Limits) -> list[Array]:
-    """Lines that names keep clear of, at the start."""
+    """Return the lines of the start pose that names keep clear of."""
     bodies = [figure_of(places)[0] for places in shown.bodies.values()]
     marks = [mark.places[0] for mark in (*still_marks(shown, limits), *moving_marks(shown, limits))]
     return [*bodies, *marks]
 
 
 def _draw_path(axes: Axes, posed: Posed, look: Theme) -> list[Array]:
-    """Where the path begins, and heads of arrows along it; the path itself is the scene's."""
+    """Draw the start of the path and arrow heads along it, and return its points; the scene draws the path itself."""
     path = posed.desired
     if path is None:
         return []
@@ -162,7 +162,7 @@ def _draw_path(axes: Axes, posed: Posed, look: Theme) -> list[Array]:
 
 
 def _draw_acting(axes: Axes, acting: Acting, look: Theme) -> list[Array]:
-    """Arrows of loads, and of first movements."""
+    """Draw the arrows of loads and of first movements, and return their points."""
     for load in acting.loads:
         draw_arrow(axes, load.arrow, _load_looks(load.later, look))
     for arrow in acting.moves:
@@ -171,7 +171,7 @@ def _draw_acting(axes: Axes, acting: Acting, look: Theme) -> list[Array]:
 
 
 def _load_looks(later: bool, look: Theme) -> dict[str, Any]:
-    """Looks of a load's arrow: dashed and pale where it does not act at the start."""
+    """Return the look of a load's arrow: dashed and pale if the load does not act at the start."""
     looks: dict[str, Any] = {"color": look.trail, "linewidth": 1.6}
     return looks | ({"linestyle": (0, (2.5, 1.5)), "alpha": 0.55} if later else {})
 
@@ -181,7 +181,7 @@ def _move_looks(look: Theme) -> dict[str, Any]:
 
 
 def _draw_sensors(axes: Axes, sensors: list[SensorMark], look: Theme) -> list[Array]:
-    """Diamonds at sensors, with the axes that they measure along or the sense in which they count turns."""
+    """Draw a diamond at each sensor, with the axis along which or the sense in which it measures; return the points."""
     for one in sensors:
         draw_arrow(axes, one.arrow, {"color": look.sensor, "linewidth": 0.9})
         axes.plot(*one.place, **SENSOR, **_sensor_colours(look), zorder=4.3)
@@ -189,7 +189,7 @@ def _draw_sensors(axes: Axes, sensors: list[SensorMark], look: Theme) -> list[Ar
 
 
 def _draw_gravity(axes: Axes, mechanism: Mechanism, limits: Limits, look: Theme) -> list[Array]:
-    """An arrow in the upper right corner, with its size."""
+    """Draw the arrow of gravity in the upper right corner, with its magnitude, and return its points."""
     weight = np.array(mechanism.gravity, dtype=float)
     size = float(np.linalg.norm(weight))
     if not size:
@@ -206,7 +206,7 @@ def _draw_gravity(axes: Axes, mechanism: Mechanism, limits: Limits, look: Theme)
 
 
 def _draw_gaps(axes: Axes, posed: Posed) -> None:
-    """Both points of a joint that is open, or one and the axis it should be on, and the gap between them."""
+    """Draw the gap of each open joint: between its two points, or from one point to the axis on which it should lie."""
     directions = posed.data["joint_direction"].values[0]
     for joint, direction in zip(posed.mechanism.joints, directions, strict=True):
         if joint.name in posed.gaps:
@@ -231,13 +231,13 @@ def _body_names(shown: Scene, look: Theme) -> list[Name]:
 
 
 def _along(line: Array, share: float) -> Array:
-    """The place at a share of a line's length."""
+    """Return the point at a share of a line's length."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     return np.array([np.interp(share * travelled[-1], travelled, line[:, k]) for k in range(2)])
 
 
 def _joint_names(posed: Posed, shown: Scene, look: Theme) -> list[Name]:
-    """Names of joints with what acts at them; those with motors where there are too many."""
+    """Return the names of joints with the members that act at them; of too many joints only those with motors."""
     mechanism = posed.mechanism
     acting: dict[str, list[str]] = {}
     for word, members in (
@@ -259,7 +259,7 @@ def _joint_names(posed: Posed, shown: Scene, look: Theme) -> list[Name]:
 
 
 def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> list[Name]:
-    """The end-effector, the path, springs, gears, and points that no joint names."""
+    """Return the names of the end-effector, the path, springs, gears, and ground points without a joint."""
     mechanism, names = posed.mechanism, []
     if mechanism.end_effector is not None and shown.trail is not None:
         ref = mechanism.end_effector.point
@@ -279,7 +279,7 @@ def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> lis
 
 
 def _acting_names(acting: Acting, sensors: list[SensorMark], look: Theme) -> list[Name]:
-    """Loads with their sizes, and sensors."""
+    """Return the names of loads, with their magnitudes, and of sensors."""
     loads = [Name(f"{one.name} {one.size}", one.named, look.trail) for one in acting.loads]
     few = sensors if len(sensors) <= _MOST_SENSORS else []
     places = [np.vstack([one.place, one.arrow.line]) for one in few]
@@ -296,7 +296,7 @@ def _arrow(axes: Axes, tail: Any, head: Any, colour: str, scale: float, width: f
 def _entries(
     posed: Posed, shown: Scene, acting: Acting, sensors: list[SensorMark], limits: Limits, look: Theme
 ) -> list[tuple[str, Any]]:
-    """Words and signs of all that occurs, signs as they are drawn."""
+    """Return the entries of the legend, text and sign, for all elements that occur in the drawing."""
     entries: list[tuple[str, Any]] = []
     kinds = {joint.kind for joint in shown.joints}
     entries += [(words, joint_sign(kind, limits, look, _WIDTH)) for kind, words in _KINDS.items() if kind in kinds]
@@ -338,7 +338,7 @@ def _payload_colours(look: Theme) -> dict[str, Any]:
 
 
 def _title(figure: Figure, posed: Posed, look: Theme) -> None:
-    """Name, pose and, where the loops do not close, which joints are open."""
+    """Write the title: name, pose, and a remark if the loops do not close."""
     height = figure.get_figheight() / MM
     y = 1.0 - 4.0 / height
     figure.text(
@@ -357,7 +357,7 @@ def _title(figure: Figure, posed: Posed, look: Theme) -> None:
 
 
 def _left_out(posed: Posed) -> str:
-    """Which names a large mechanism is drawn without."""
+    """Return a remark on the groups of names that the drawing of a large mechanism omits."""
     what = [
         word
         for word, count, most in (

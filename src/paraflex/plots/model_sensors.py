@@ -1,4 +1,4 @@
-"""Sensors of a mechanism before it runs: where they are, and what they measure along or turn with."""
+"""Marks of sensors in a model drawing: their positions and the axes or angles that they measure."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from paraflex.results.posed import Posed
 
 Array = NDArray[np.float64]
 
-# Look of a sensor's place.
+# Look of a sensor's mark.
 SENSOR: dict[str, Any] = {"marker": "D", "markersize": 3.6, "markeredgewidth": 1.0, "linestyle": "none"}
-# Length of an axis' arrow, and radius of that of an angle, as parts of the picture's larger side; its angles [rad].
+# Length of the arrow of an axis and radius of that of an angle, as shares of the picture's larger side; start angle and
+# sweep of the latter [rad], and relative size of the heads.
 _AXIS, _RADIUS = 0.055, 0.02
 _FROM, _BY, _HEAD = -0.7, 1.6, 0.45
 
 
 @dataclass(frozen=True)
 class SensorMark:
-    """A sensor: its kind in words, its name, its place (2,), and the arrow of its axis or of the angle it measures."""
+    """Mark of a sensor: kind in words, name, position (2,), and the arrow of the axis or angle that it measures."""
 
     kind: str
     name: str
@@ -35,7 +36,7 @@ class SensorMark:
 
 
 def sensor_marks(posed: Posed, limits: Limits) -> list[SensorMark]:
-    """Marks of all sensors whose places are known."""
+    """Return the marks of all sensors whose positions are known."""
     marks = [_mark(posed, sensor, limits) for sensor in posed.mechanism.sensors]
     return [mark for mark in marks if np.isfinite(mark.place).all()]
 
@@ -51,7 +52,7 @@ def _mark(posed: Posed, sensor: Sensor, limits: Limits) -> SensorMark:
 
 
 def _place(posed: Posed, location: Location) -> Array:
-    """Place of a sensor (2,) [m]; NaN where it is not known."""
+    """Return the position (2,) of a sensor; NaN if it is unknown."""
     if location.at is not None:
         return _along_beam(posed, location)[0]
     if location.point is not None:
@@ -61,7 +62,7 @@ def _place(posed: Posed, location: Location) -> Array:
 
 
 def _axis(posed: Posed, location: Location) -> Array | None:
-    """Unit vector along which a sensor measures; None for an angle or a moment."""
+    """Return the unit vector along which a sensor measures; None if it measures an angle or a moment."""
     if location.axis is None:
         return None
     if location.axis != "own":
@@ -74,7 +75,7 @@ def _axis(posed: Posed, location: Location) -> Array | None:
 
 
 def _along_beam(posed: Posed, location: Location) -> tuple[Array, Array]:
-    """Place of a section of a beam, and the direction of the beam there."""
+    """Return the position of a section of a beam and the direction of the beam there."""
     data = posed.data
     own = data["station_body"].values == location.frame
     along, places = data["station_place"].values[own, 0], data["shape"].values[0, own].astype(float)

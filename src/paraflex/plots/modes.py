@@ -1,4 +1,4 @@
-"""All modes side by side in time: motor torques and tracking errors (Figs. 12, 18)."""
+"""Figures of all actuation modes side by side over time: motor torques and tracking errors (Figs. 12, 18)."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from paraflex.plots.selection import names_of, samples, select_run
 from paraflex.plots.style import BLUE, VERMILLION, ZERO, keep_flat, look_of
 from paraflex.results.following import headline, ranked_by_motion
 
-# Of a mode and the names of its passive motors, as many as fit above a panel.
+# Letters of a mode's name and its passive motors that fit above a panel.
 _TITLE_LETTERS = 22
 
 
 @drawn
 def motor_torques(data: xr.Dataset) -> Figure:
-    """Torque of every motor, a panel for each mode; the panels of a row share their scale (Fig. 12).
+    """Plot the torque of every motor over time, one panel per mode; the panels of a row share their scale (Fig. 12).
 
-    A motor without torque throughout is left out of a panel and named as passive above it.
+    A motor whose torque is zero throughout is omitted from the panel and listed as passive above it.
     """
     names = names_of(data, "mode")
     figure, axes = _mode_panels(len(names))
@@ -57,7 +57,7 @@ def motor_torques(data: xr.Dataset) -> Figure:
 
 @drawn
 def tracking_errors(data: xr.Dataset) -> Figure:
-    """Actual less desired place of the end-effector in x and y, a panel for each mode (Fig. 18)."""
+    """Plot the tracking error of the end-effector in x and y, actual minus desired, one panel per mode (Fig. 18)."""
     names = names_of(data, "mode")
     figure, axes = _mode_panels(len(names))
     time = data["time"].values
@@ -76,7 +76,7 @@ def tracking_errors(data: xr.Dataset) -> Figure:
 
 
 def _outcome(run: xr.Dataset) -> str:
-    """RMS tracking error of a run, or the time at which it stopped."""
+    """Return the RMS tracking error of a run, or the time at which it stopped, in words."""
     rms = float(headline(run)[0])
     if math.isfinite(rms):
         unit = display_unit("m", rms)
@@ -87,6 +87,6 @@ def _outcome(run: xr.Dataset) -> str:
 
 
 def _mode_panels(count: int) -> tuple[Figure, NDArray[Any]]:
-    """A panel for each mode, at most three side by side; unused ones are hidden."""
+    """Create a panel for each mode, at most three side by side; unused panels are hidden."""
     columns = 2 if count == 4 or (is_narrow() and count > 1) else min(count, 3)
     return panel_grid(count, columns, width=ONE_COLUMN if columns == 1 else TWO_COLUMNS)

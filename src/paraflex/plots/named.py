@@ -1,4 +1,4 @@
-"""Places of names beside what they name, clear of one another and of what is drawn."""
+"""Placement of names in a drawing, clear of one another and of the drawn lines."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Width of a letter and height of a line, in sizes of the letters; bold letters are wider.
+# Widths of a regular and of a bold letter, and height of a line, in font sizes.
 _LETTER, _BOLD, _LINE = 0.62, 0.69, 1.3
-# Directions and distances from what is named [pt] in which room is looked for.
+# Number of directions, and distances from the anchor [pt], in which candidate positions are tried.
 _DIRECTIONS = 16
 _DISTANCES = (4.0, 7.0, 12.0, 18.0, 26.0, 38.0)
-# From here on a line leads from the name to what it names [pt].
+# Distance from which a line connects the name to its anchor [pt].
 _FAR = 12.0
-# Costs of a name over another, over a place that is drawn, beyond the panel, and of each point of distance.
+# Costs of covering another name, of covering a drawn point, of leaving the panel, and of each point [pt] of distance.
 _ON_NAME, _ON_PLACE, _OUTSIDE, _AWAY = 400.0, 6.0, 1000.0, 0.35
-# Of three places in a row one is drawn over [pt].
+# Spacing of the sampled points of drawn lines [pt].
 _STEP = 3.0
 
 
 @dataclass(frozen=True)
 class Name:
-    """A name, the places (n, 2) in data that it may stand beside, the best first, and its looks."""
+    """Name to be placed: text, anchors (n, 2) in data coordinates, the preferred one first, and look."""
 
     text: str
     places: Array
@@ -35,7 +35,7 @@ class Name:
 
 
 def place_names(axes: Axes, names: Sequence[Name], drawn: Sequence[Array], size: float) -> None:
-    """Write names of a size [pt], each where it covers least of the others and of the lines drawn (n, 2)."""
+    """Write names of a size [pt], each where it covers least of the previous names and of the drawn lines (n, 2)."""
     figure = axes.figure
     assert figure is not None
     per_point = figure.dpi / 72.0
@@ -58,10 +58,13 @@ def place_names(axes: Axes, names: Sequence[Name], drawn: Sequence[Array], size:
 
 
 def _candidates(anchors: Array, half: Array) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Centres (c, 2) round anchors (n, 2), how far each box is from its anchor (c,), and which that is (c,) [pt]."""
+    """Return candidate centres (c, 2) around anchors (n, 2), gaps (c,) between box and anchor [pt], and anchors (c,).
+
+    The anchors of the candidates are given by their indices.
+    """
     angle = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
     towards = np.column_stack([np.cos(angle), np.sin(angle)])
-    # From the centre of a box to its edge in each direction.
+    # Distance from the centre of a box to its edge in each direction.
     with np.errstate(divide="ignore"):
         edge = np.min(half / np.abs(np.where(np.abs(towards) > 1e-9, towards, 1e-12)), axis=1)
     parts = [(anchors[:, None] + (edge + gap)[:, None] * towards) for gap in _DISTANCES]
@@ -72,7 +75,7 @@ def _candidates(anchors: Array, half: Array) -> tuple[Array, Array, NDArray[np.i
 
 
 def _covered(centres: Array, half: Array, taken: Array, boxes: Array, panel: Array) -> Array:
-    """Cost (c,) of what boxes round centres cover."""
+    """Return the cost (c,) of what the boxes around the centres cover."""
     low, high = centres - half, centres + half
     inside = np.all((taken > low[:, None] - 1.0) & (taken < high[:, None] + 1.0), axis=2).sum(axis=1)
     wide = np.minimum(high[:, None, 0], boxes[:, 2]) - np.maximum(low[:, None, 0], boxes[:, 0])
@@ -83,7 +86,7 @@ def _covered(centres: Array, half: Array, taken: Array, boxes: Array, panel: Arr
 
 
 def _sampled(line: Array) -> Array:
-    """Places along a line (n, 2), close to one another [pt]."""
+    """Return closely spaced points along a line (n, 2) [pt]."""
     line = line[np.isfinite(line).all(axis=1)]
     if len(line) < 2:
         return line

@@ -1,4 +1,4 @@
-"""Convergence of a search, targets of an identification, and Sobol indices of a metric."""
+"""Figures of searches: convergence, targets of an identification, and Sobol indices."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from paraflex.plots.style import BLUE, VERMILLION, ZERO
 _FAINT = "0.6"
 # Height of a panel [mm].
 _PANEL = 50.0
-# Designs far above the best are drawn at the upper edge, as they would hide the convergence.
+# Designs far above the best are drawn at the upper edge; otherwise they would hide the convergence.
 _HIGHEST = 3.0
 
 
 @drawn
 def convergence(figures: Mapping[str, Any]) -> Figure:
-    """The objective, or root mean square residual, of every design, and the least so far.
+    """Plot the objective, or the root mean square residual, of every design, and the smallest value so far.
 
-    Designs that do not run stand below the axis, those that pass a limit are crosses.
+    Designs that fail to run are marked below the others; designs that exceed a limit are crosses.
     """
     history = [(number + 1, value, held) for number, value, held in figures["history"]]
     ran = [each for each in history if each[1] is not None]
@@ -57,7 +57,7 @@ def convergence(figures: Mapping[str, Any]) -> Figure:
 
 @drawn
 def targets_reached(figures: Mapping[str, Any]) -> Figure:
-    """Every target: values at the start and at the best design, relative to it."""
+    """Plot the ratio of reached to target value for every non-zero target, at the start and at the best design."""
     targets = [each for each in figures["targets"] if each["value"] != 0.0]
     if not targets:
         raise InputError("no targets to compare with", field="figures", remedy="give figures of an identification")
@@ -78,7 +78,7 @@ def targets_reached(figures: Mapping[str, Any]) -> Figure:
 
 @drawn
 def sobol_bars(figures: Mapping[str, Any]) -> Figure:
-    """First-order and total indices of every parameter, intervals of 95 %; one panel per metric, path and mode."""
+    """Plot first-order and total Sobol indices of every parameter with 95 % intervals, per metric, path and mode."""
     panels_of: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
     for row in figures["indices"]:
         if row["first"] is not None:
@@ -99,7 +99,7 @@ def sobol_bars(figures: Mapping[str, Any]) -> Figure:
 
 
 def _draw_best(panel: Axes, ran: list, last: int) -> None:
-    """The least of the designs within all limits, as a line of steps."""
+    """Draw the smallest value so far among the designs within all limits, as a step line."""
     numbers, least = [], []
     for number, value, held in ran:
         if held and (not least or value < least[-1]):
@@ -124,7 +124,7 @@ def _draw_bars(panel: Axes, rows: list[Mapping[str, Any]]) -> None:
 
 
 def _target_name(target: Mapping[str, Any], targets: list) -> str:
-    """Distinctive name of a target: its mode, and path and metric if they differ."""
+    """Return a distinctive name of a target: its mode, and its metric and path if these differ among targets."""
     differing = [key for key in ("metric", "path") if len({each[key] for each in targets}) > 1]
     names = [metric_name(target[key]) if key == "metric" else target[key] for key in differing]
     return " ".join(filter(None, [plain(target["mode"]), *names])) or metric_name(target["metric"])

@@ -1,4 +1,4 @@
-"""All numbers of every design, as lines over parallel axes."""
+"""Parallel coordinates of many designs."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from paraflex.plots.style import VERMILLION
 
 Array = NDArray[np.float64]
 
-# Metrics shown unless asked for, axes and lines at most, and the height of an axis [mm].
+# Number of metrics by default, largest numbers of axes and of lines, and height of an axis [mm].
 _METRICS, _AXES, _LINES, _AXIS_HEIGHT = 3, 10, 2000, 10.0
-_LIGHTEST = 0.85  # Of the colour map, whose light end is too light on paper.
+_LIGHTEST = 0.85  # End of the used part of the colour map: its light end is too light on paper.
 
 
 @drawn
 def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
-    """Every design as a line over axes of its numbers, in the colour of the first metric; the least is thick.
+    """Plot every design as a line across parallel axes of parameters and metrics, coloured by the first metric.
 
-    The axes lie below one another, each from the least to the largest of its numbers. Shown are designs of the first
-    path and mode that ran, at most 2,000 of them, evenly chosen.
+    The axes lie one below the other, each from the smallest to the largest value. The design with the smallest first
+    metric is a thick line. Only complete runs of the first path and mode are shown, at most 2,000, evenly chosen.
 
     Parameters
     ----------
     metrics : sequence of str, optional
-        By default the first three that vary.
+        Metrics to show; by default the first three that vary.
     """
     chosen = table.judged_by(metrics, _METRICS)
     pair, runs = next(iter(table.series.items()))
@@ -51,7 +51,7 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
     figure, axes = panels(1, 1)
     _draw_designs(axes[0, 0], places, places[:, len(parameters)], labels[len(parameters)].partition(" [")[0])
     _draw_axes(axes[0, 0], labels, low, high)
-    # In the middle: beside the names there is no room for it in one column.
+    # The title is centred: above the names there is no room for it in one column.
     axes[0, 0].set_title(
         ", ".join(filter(None, [f"{len(values)} designs", "" if is_narrow() else plain(pair[0]), plain(pair[1])]))
     )
@@ -59,11 +59,11 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
 
 
 def _draw_designs(panel: Axes, places: Array, judged: Array, judge: str) -> None:
-    """One line per design, that with the least of the judging metric last and thick."""
+    """Draw one line per design; the one with the smallest judging metric is drawn last and thick."""
     order = np.argsort(-judged, kind="stable")
     shown = order[np.unique(np.linspace(0, order.size - 1, min(order.size, _LINES)).astype(int))]
     rows = np.arange(places.shape[1])
-    # From dark to light, also in grey.
+    # The colour map runs from dark to light, in grey as well.
     colours = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, _LIGHTEST, 256)))
     lines = [np.column_stack([places[k], rows]) for k in shown]
     width = 0.7 if len(lines) < 200 else 0.35

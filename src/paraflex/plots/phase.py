@@ -1,4 +1,4 @@
-"""Phase diagrams: of the end-effector's motion (Fig. 17), and of bodies'."""
+"""Phase diagrams of the end-effector's motion (Fig. 17) and of the rotation of bodies."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from paraflex.plots.runs import END_EFFECTOR, START, draw_actual, draw_desired
 from paraflex.plots.selection import moving_directions, names_of, of_point, one_run, point_label, select_run
 from paraflex.plots.style import BLUE, keep_flat
 
-# Bodies that have a panel.
+# Largest number of bodies with a panel.
 _MOST_PANELS = 8
 
 
 @drawn
 def phase_diagrams(data: xr.Dataset, mode: str, point: str | None = None) -> Figure:
-    """Velocity over displacement and acceleration over velocity in x and y, desired and actual (Fig. 17).
+    """Plot velocity over displacement and acceleration over velocity in x and y, desired and actual (Fig. 17).
 
     Parameters
     ----------
     point : str, optional
-        "body.point" in place of the end-effector; it has no desired motion.
+        Point "body.point" in place of the end-effector; it has no desired motion.
     """
     run = of_point(select_run(data, mode), point)
     planned = "end_effector_desired" in run
@@ -37,7 +37,7 @@ def phase_diagrams(data: xr.Dataset, mode: str, point: str | None = None) -> Fig
             draw_actual(panel, run, x.values, y.values, label=point_label(run, point))
             if planned:
                 draw_desired(panel, x_desired.values, y_desired.values)
-            # All there is to see of a direction at rest; small, as it lies on the curves.
+            # The start mark is all that is visible of a direction at rest; it is small because it lies on the curves.
             panel.plot(x_desired[0], y_desired[0], **START)[0].set_markersize(2.5)
             panel.margins(0.06)
             keep_flat(panel, peak(across[2] * run[across[0] + suffix]), "x")
@@ -52,7 +52,7 @@ def phase_diagrams(data: xr.Dataset, mode: str, point: str | None = None) -> Fig
 
 @drawn
 def link_phases(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Angular velocity over angle of every body, at most eight."""
+    """Plot angular velocity over angle of every body, at most eight."""
     run = one_run(data, mode)
     bodies = names_of(run, "body")[:_MOST_PANELS]
     columns = 2 if is_narrow() or len(bodies) in (2, 3, 4) else min(len(bodies), 4)

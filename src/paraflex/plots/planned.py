@@ -1,4 +1,4 @@
-"""The figures that can be drawn of some results, one for each mode, run or metric as needed."""
+"""Selection of the figures that can be drawn of some results, one for each mode, run or point as needed."""
 
 from __future__ import annotations
 
@@ -20,14 +20,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PlannedFigure:
-    """A figure to be drawn: its line of the catalogue, its distinctive name, and its arguments.
+    """Figure to be drawn, with its arguments bound.
 
     Attributes
     ----------
     figure : CatalogueFigure
+        Entry of the catalogue.
     of : str
-        The mode, or path and mode, that it shows; empty for all there are.
+        Mode, or path and mode, or point that the figure shows; empty if it shows all.
     draw : callable
+        Function without arguments that draws the figure.
     """
 
     figure: CatalogueFigure
@@ -36,17 +38,17 @@ class PlannedFigure:
 
     @property
     def stem(self) -> str:
-        """Stem of its files."""
+        """Stem of the figure's files."""
         return f"{self.figure.name}_{self.of}" if self.of else self.figure.name
 
 
 def _vibrates(found: Any) -> bool:
-    from paraflex.results.linear_motion import drawn_modes  # not for other results
+    from paraflex.results.linear_motion import drawn_modes  # imported for linear models only
 
     return any(True for _ in drawn_modes(found, rigid=False))
 
 
-# Required content of results for a figure, besides its variables.
+# Conditions on the results for a figure, in addition to its variables.
 _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "convergence": lambda found: any(value is not None for _, value, _ in found.get("history", ())),
     "targets_reached": lambda found: any(target["value"] != 0.0 for target in found.get("targets", ())),
@@ -65,12 +67,12 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
 
 
 def figures_of(source: Source) -> list[CatalogueFigure]:
-    """The figures that can be drawn of some results."""
+    """Return the figures that can be drawn of some results."""
     return [figure for figure in CATALOGUE[source.kind] if _can_be_drawn(figure, source)]
 
 
 def find_figure(source: Source, name: str) -> CatalogueFigure:
-    """A figure by its name, or by the name of its file."""
+    """Return a figure by its name or by the stem of its file; raise InputError if there is none."""
     there = figures_of(source)
     for figure in there:
         if name in (figure.name, figure.written_as):
@@ -89,23 +91,29 @@ def drawings(
     metrics: Sequence[str] = (),
     points: Sequence[str] = (),
 ) -> list[PlannedFigure]:
-    """A figure of results: one, or one for each mode, run or point.
+    """Plan a figure of some results: one drawing, or one for each mode, run or point.
 
     Parameters
     ----------
     source : Source
+        Results to be drawn.
     figure : CatalogueFigure
+        Figure to be drawn.
     modes : sequence of str
-        Actuation modes that are shown; by default all, or of figures that show one, that with most active motors.
+        Actuation modes to show; by default all, or the mode with most active motors for a figure of one mode.
     metrics : sequence of str
-        Of figures of many designs; by default the first that vary.
+        Metrics, for figures of many designs; by default the first that vary.
     points : sequence of str
-        Named points that are shown; by default the end-effector, or those that travel most.
+        Named points to show; by default the end-effector, or those that travel most.
+
+    Returns
+    -------
+    list of PlannedFigure
 
     Raises
     ------
     InputError
-        No such mode or point, or points for a figure that shows none.
+        There is no such mode or point, or the figure does not show points.
     """
     figures = _of_modes(source, figure, modes, metrics)
     if not points:
@@ -131,7 +139,7 @@ def _of_points(planned: PlannedFigure, named: str, **points: Any) -> PlannedFigu
 def _of_modes(
     source: Source, figure: CatalogueFigure, modes: Sequence[str], metrics: Sequence[str]
 ) -> list[PlannedFigure]:
-    """A figure of results: one, or one for each mode or run."""
+    """Plan a figure of some results: one drawing, or one for each mode or run."""
 
     def planned(of: str, *given: Any) -> PlannedFigure:
         return PlannedFigure(figure, of, partial(figure.function, *given))
@@ -168,7 +176,7 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
 
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:
-    """The modes asked for, else all; none for results without modes."""
+    """Return the requested modes, by default all; an empty list for results without modes."""
     if source.kind in ("tracking", "verification", "linear", "laws"):
         known = names_of(source.data, "mode")
     elif source.kind == "sensitivity":

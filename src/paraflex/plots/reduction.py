@@ -1,4 +1,4 @@
-"""Figures of reduced linear models: gains over those of the full model, errors over frequency."""
+"""Figures of reduced linear models: gains beside those of the full model, errors over frequency and along a path."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from paraflex.results.linear_data import HOLDINGS
 from paraflex.results.reduction_along import OWN, STATIC, basis_name
 from paraflex.results.reduction_data import FULL
 
-# Decades of a gain that are shown below its largest.
+# Decades of a gain shown below its largest value.
 _DECADES = 7.0
-# Smaller errors along a path are drawn as this one.
+# Smallest error along a path that is drawn; smaller ones are drawn as this one.
 _LEAST = 1e-9
-# What places along a motion are measured in.
+# Axis labels of positions along a motion, by unit.
 AXES = {"m": "along the path [m]", "s": "along the motion [s]"}
-# Outputs with a panel.
+# Largest number of outputs with a panel.
 _PANELS = 6
 
 
 @drawn
 def reduced_responses(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Largest gain of a mode's inputs to every output: of the full model, and of reduced ones over it."""
+    """Plot the largest gain from a mode's inputs to every output over frequency, for full and reduced models."""
     check_kind(data, "reduction")
     run = one_run(data, mode)
     outputs = names_of(data, "output")[:_PANELS]
@@ -58,7 +58,7 @@ def reduced_responses(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 @drawn
 def reduction_errors(data: xr.Dataset) -> Figure:
-    """Error to the worst output over frequency, a panel for each method and a line for each mode."""
+    """Plot the error of the worst output over frequency, one panel for each method and one line for each mode."""
     check_kind(data, "reduction")
     names, modes = names_of(data, "reduction"), names_of(data, "mode")
     figure, axes = panels(len(names), 1) if is_narrow() else panels(1, len(names))
@@ -79,7 +79,10 @@ def reduction_errors(data: xr.Dataset) -> Figure:
 
 @drawn
 def held_frequency_by_states(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Lowest frequency of a mode with its motors held, by method and number of states, and that of the full model."""
+    """Plot the lowest frequency of a mode with its motors held over the number of states, for every method.
+
+    A line marks the frequency of the full model.
+    """
     check_kind(data, "reduction")
     run = one_run(data, mode)
     figure, axes = panels(1, 1)
@@ -101,7 +104,7 @@ def held_frequency_by_states(data: xr.Dataset, mode: str | None = None) -> Figur
 
 @drawn
 def bases_along_path(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Errors along the path with bases of each pose, of one pose, and between some: responses and frequencies."""
+    """Plot errors of responses and frequencies along the path: bases of each pose, of one pose, and interpolated."""
     check_kind(data, "reduction")
     if "along_error" not in data:
         raise InputError("these reduced models are of one pose", field="data", remedy="reduce along a path: --along 21")
@@ -125,7 +128,7 @@ def bases_along_path(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 
 def _bases_looks(data: xr.Dataset) -> dict[tuple[str, str], dict[str, Any]]:
-    """How the lines of bases look: a colour for each, dashed where static shapes are those of other poses too."""
+    """Return the looks of the lines of bases: a colour for each, dashed if static shapes are of other poses too."""
     looks: dict[tuple[str, str], dict[str, Any]] = {}
     coloured = [colour for colour in COLOURS if colour != BLACK]
     for k, name in enumerate(names_of(data, "basis")):

@@ -1,4 +1,4 @@
-"""Responses of designs: metrics over parameters, and the Pareto front of two metrics."""
+"""Figures of many designs: metrics over parameters, and the Pareto front of two metrics."""
 
 from __future__ import annotations
 
@@ -21,23 +21,24 @@ from paraflex.plots.style import look_of
 Array = NDArray[np.float64]
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")
-# Panels beside and below one another.
+# Largest numbers of columns and rows of panels.
 _MOST_PARAMETERS, _MOST_METRICS = 3, 3
-# Most values of a parameter with a median each; more values are divided into as many groups.
+# Largest number of parameter values with a median each; more values are divided into this number of groups.
 _MEDIAN_GROUPS = 12
 
 
 @drawn
 def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
-    """Metrics over parameters: one row per metric, one column per parameter, a mark per run, coloured by path and mode.
+    """Plot metrics over parameters: one row per metric, one column per parameter, one mark per run.
 
-    The runs of a study of one parameter are joined; of more the median over the others is, at each value, or in twelve
-    groups of as many runs.
+    Colours distinguish paths and modes. If one parameter varies, its runs are joined by a line; otherwise the line is
+    the median over the other parameters, at each value or in twelve groups of equally many runs.
 
     Parameters
     ----------
     metrics : sequence of str, optional
-        By default the first three that vary; in one column of print the first, where there are several parameters.
+        Metrics to show; by default the first three that vary, or only the first in a figure of one column with several
+        parameters.
     """
     columns = table.varied[:_MOST_PARAMETERS]
     rows = table.judged_by(metrics, 1 if is_narrow() and len(columns) > 1 else _MOST_METRICS)
@@ -71,7 +72,7 @@ def _draw_response(panel: Axes, x: Array, y: Array, number: int, name: str, *, a
 
 
 def _medians(x: Array, y: Array) -> tuple[Array, Array]:
-    """Medians of values in order of x: at each x, or in groups of equal size."""
+    """Return medians of values sorted by x, at each x or in groups of equal size."""
     values = np.unique(x)
     groups = [x == value for value in values] if values.size <= _MEDIAN_GROUPS else None
     if groups is None:
@@ -81,7 +82,7 @@ def _medians(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _series_name(pair: tuple[str, str], table: DesignTable) -> str:
-    """Distinctive name of the runs of a path and mode."""
+    """Return a distinctive name of the runs of a path and mode."""
     path, mode = pair
     several = len(set(table.path.tolist())) > 1
     return ", ".join([plain(path)] * several + [f"mode {plain(mode)}"] * bool(mode)) or "runs"
@@ -89,12 +90,12 @@ def _series_name(pair: tuple[str, str], table: DesignTable) -> str:
 
 @drawn
 def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Figure:
-    """Two metrics of every design, and the designs that no other design dominates.
+    """Plot two metrics of every design, and the Pareto front of the designs that no other design dominates.
 
     Parameters
     ----------
     metrics : sequence of str, optional
-        Two; by default the first that varies, and that with which most designs are on the front.
+        Two metrics; by default the first that varies, and the one for which most designs are on the front.
     """
     chosen = table.judged_by(metrics, 2) if metrics else in_conflict(table, table.judged_by(None, len(table.metrics)))
     if len(chosen) != 2:

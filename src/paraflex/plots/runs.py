@@ -1,4 +1,4 @@
-"""Curves of desired and actual motion, and panels over time."""
+"""Building blocks of figures of runs: curves of desired and actual motion, and panels over time."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ DESIRED: dict[str, Any] = {
 _MARK: dict[str, Any] = {"color": BLACK, "linestyle": "none", "markersize": 4.5}
 STOPPED: dict[str, Any] = _MARK | {"marker": "x", "markeredgewidth": 1.2, "zorder": 3.0, "label": "the run stopped"}
 START: dict[str, Any] = _MARK | {"marker": "s", "zorder": 4.0, "label": "start"}
-# Most lines that are distinguishable in one panel.
+# Largest number of lines that are distinguishable in one panel.
 MOST_LINES = 7
-# Most panels below one another in one column.
+# Largest number of panels in one column.
 _MOST_ROWS = 4
-# Variables of the end-effector's motion, what they are, and what their values are multiplied by.
+# Variables of the end-effector's motion, their quantities, and the factors to the units of their labels.
 END_EFFECTOR = (
     ("end_effector", "position", 1e3),
     ("end_effector_velocity", "velocity", 1.0),
@@ -35,9 +35,9 @@ END_EFFECTOR = (
 
 
 def draw_actual(axes: Axes, run: xr.Dataset, x: ArrayLike, y: ArrayLike, **look: Any) -> None:
-    """A curve of a run, with a mark at its end if the run ended before the last sample.
+    """Draw a curve of a run, with a mark at its end if the run ended before the last sample.
 
-    Its label names the mode; `look` replaces that or any other of the line's properties.
+    The label names the mode; `look` overrides it and any other property of the line.
     """
     xs, ys = np.asarray(x), np.asarray(y)
     actual: dict[str, Any] = {"color": BLUE, "linestyle": "-", "label": f"actual, {run_label(run)}"}
@@ -48,9 +48,9 @@ def draw_actual(axes: Axes, run: xr.Dataset, x: ArrayLike, y: ArrayLike, **look:
 
 
 def draw_curves(axes: Axes, run: xr.Dataset, curves: Mapping[str, NDArray[np.float64]], *, first: int = 0) -> None:
-    """Quantities (k,) of a run in time by their labels, each with its own colour and dashes.
+    """Draw quantities (k,) of a run over time by their labels, each with its own colour and dashes.
 
-    Those that are nowhere a number are left out. `first` is the number of the first look.
+    Quantities without finite values are omitted. `first` is the number of the first look.
     """
     time, last = run["time"].values, samples(run) - 1
     for number, (label, values) in enumerate(curves.items(), start=first):
@@ -61,17 +61,17 @@ def draw_curves(axes: Axes, run: xr.Dataset, curves: Mapping[str, NDArray[np.flo
 
 
 def draw_desired(axes: Axes, x: ArrayLike, y: ArrayLike) -> None:
-    """The curve a run should follow."""
+    """Draw the curve that a run should follow."""
     axes.plot(x, y, **DESIRED)
 
 
 def listed_panels(count: int) -> tuple[Figure, NDArray[Any]]:
-    """So many panels below one another, the first of `axes.flat`; in two columns where one is too long."""
+    """Create `count` panels in one column, or in two if one is too long; they are the first of `axes.flat`."""
     return panel_grid(count, 1 if count <= _MOST_ROWS else 2)
 
 
 def largest_columns(values: NDArray[np.float64]) -> list[int]:
-    """Columns of values (samples, n) with the largest peaks, no more than are distinguishable, in their own order."""
+    """Return the columns of values (samples, n) with the largest peaks, at most `MOST_LINES`, in their own order."""
     order = np.argsort([-peak(each) for each in values.T], kind="stable")
     return sorted(order[:MOST_LINES].tolist())
 
@@ -82,13 +82,16 @@ def shade_rest(axes: Axes, data: xr.Dataset) -> None:
     end = float(data.attrs.get("motion_end", time[-1]))
     axes.set_xlim(time[0], time[-1])
     if end < time[-1]:
-        # In one column the longer words would leave the legend one entry a line.
+        # In one column the longer text would force the legend to one entry per line.
         label = "after the motion" if is_narrow(figure_width(axes)) else "after the end of the desired motion"
         axes.axvspan(end, time[-1], color=SHADE, linewidth=0.0, zorder=0.0, label=label)
 
 
 def finish_over_time(figure: Figure, axes: NDArray[Any], data: xr.Dataset, panel_height: float) -> Figure:
-    """Lay out panels over time [mm], shade the time after the motion, and name the time axis once per column."""
+    """Lay out panels over time, `panel_height` in mm.
+
+    The time after the desired motion is shaded, and the time axis is labelled once per column.
+    """
     for panel in axes.flat:
         shade_rest(panel, data)
     label_outer_time(axes)
@@ -96,7 +99,7 @@ def finish_over_time(figure: Figure, axes: NDArray[Any], data: xr.Dataset, panel
 
 
 def largest_over_time(data: xr.Dataset, run: xr.Dataset, values: NDArray[np.float64], dim: str, label: str) -> Figure:
-    """One panel of quantities (time, dim) of a run; if there are too many, those with the largest peaks."""
+    """Plot quantities (time, dim) of a run in one panel; if there are too many, those with the largest peaks."""
     peaks = np.array([peak(each) for each in values.T])
     largest = [k for k in largest_columns(values) if peaks[k] > 0.0]
     names = names_of(run, dim)
@@ -109,5 +112,5 @@ def largest_over_time(data: xr.Dataset, run: xr.Dataset, values: NDArray[np.floa
 
 
 def shown_of(shown: int, all_of_them: int, what: str) -> str:
-    """Title of a panel that has not room for all: "7 of 8, the fastest joints"; empty if it has."""
+    """Return the title of a panel that shows a selection, "7 of 8, the fastest joints"; empty if it shows all."""
     return f"{shown} of {all_of_them}, the {what}" if shown < all_of_them else ""

@@ -1,4 +1,4 @@
-"""Figures as files: those written with the results of a command, and single ones for print."""
+"""Writing of figures: those that accompany the results of a command, and single figures for print."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from paraflex.plots.style import journal_style
 from paraflex.results.kinds import kind_of
 from paraflex.writing import portable_name, whole_file
 
-# Files that do not depend on when they were written.
+# Metadata without dates, so that files do not depend on when they are written.
 _METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 FIGURE_FORMATS = tuple(_METADATA)
 
@@ -28,30 +28,30 @@ FIGURE_FORMATS = tuple(_METADATA)
 def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mode: str | None = None) -> list[Path]:
     """Write the figures that a command adds to its results, as PNG (200 dpi) and SVG.
 
-    Files are named by what they show, like `desired_path.png`; those of a run along a path are the paper's Figs. 11 to
-    18, of a verification its Figs. 22 and 23 of every mode and the distances of all models; of others see
-    `paraflex plot --list`. There are none where nothing can be shown: of a search in which no design ran, of metrics
-    that do not vary.
+    Files are named after their content, such as `desired_path.png`. Those of a run along a path are the paper's Figs.
+    11 to 18, those of a verification its Figs. 22 and 23 for every mode and the distances of all models; for other
+    results see `paraflex plot --list`. Figures without content are omitted, such as those of a search in which no
+    design ran or of metrics that do not vary.
 
     Parameters
     ----------
     results : xarray.Dataset or mapping
-        From `paraflex.results`, or a study's result in plain numbers: its `to_dict()`.
+        Dataset from `paraflex.results`, or the plain numbers of a study's result (its `to_dict()`).
     folder : str or Path
-        Made if it is not there; files of the same names are written over.
+        Output folder; it is created if needed, and files of the same names are overwritten.
     mode : str, optional
-        Of the figures that show one mode; by default the one with most active motors where modes are named by the
-        signs of their motors, else the first.
+        Mode of the figures that show a single mode; by default the one with most active motors if modes are named by
+        the signs of their motors, else the first.
 
     Returns
     -------
     list of Path
-        The files written.
+        Written files.
 
     Raises
     ------
     InputError
-        No such mode, or numbers of no result.
+        There is no such mode, or the numbers are not those of a result.
     OutputError
         The folder cannot be written.
     """
@@ -86,20 +86,27 @@ def write_figures(
     Parameters
     ----------
     drawn : sequence of PlannedFigure
+        Figures to draw.
     folder : Path
-        Made if it is not there.
+        Output folder; it is created if needed.
     formats : sequence of str
-        From FIGURE_FORMATS.
+        File formats from FIGURE_FORMATS; PDF by default.
     style : str, optional
-        "single" or "double": the width of one or two columns; by default what suits each figure.
+        Width of the figures, "single" or "double" column; by default each figure has its own width.
     dpi : float
-        Dots an inch, of PNG.
+        Resolution of PNG files [dots per inch].
     force : bool
-        Whether files of the same names are written over.
+        Whether files of the same names are overwritten; by default they raise an error.
 
     Returns
     -------
     list of Path
+        Written files.
+
+    Raises
+    ------
+    InputError
+        A format is unknown, or a file exists and `force` is False.
     """
     for name in formats or ("",):
         if name not in FIGURE_FORMATS:
@@ -133,6 +140,6 @@ def _write(figure: Figure, files: Iterable[Path], dpi: float | None = None) -> l
 
 
 def write_figure(figure: Figure, file: Path | TextIO, format_name: str, dpi: float | None = None) -> None:
-    """Write a figure in one of FIGURE_FORMATS, the same bytes whenever that is."""
+    """Write a figure in one of FIGURE_FORMATS; its bytes do not depend on the date."""
     with journal_style():
         figure.savefig(file, format=format_name, metadata=_METADATA[format_name], dpi="figure" if dpi is None else dpi)

@@ -1,6 +1,6 @@
-"""Logarithmic axes with powers of ten, and axes of names.
+"""Scales of axes: logarithmic axes numbered by powers of ten, and axes that list names.
 
-Numbers are plain text: the layout knows how wide digits are.
+Numbers are plain text because the layout computes their width from that of the digits.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from numpy.typing import ArrayLike
 
 from paraflex.plots.labels import logarithmic_number, peak, plain, power_of_ten
 
-# Height of a line of a list of names [mm].
+# Height of a line in a list of names [mm].
 LIST_LINE = 5.5
 
 
 def round_scale(values: ArrayLike) -> float:
-    """A power of a thousand that leaves few zeros in very large or small numbers; 1 for all others."""
+    """Return a power of a thousand that leaves few zeros in very large or small numbers; 1 for all others."""
     size = peak(values)
     return 1.0 if size == 0.0 or 1e-3 <= size < 1e5 else 1e3 ** math.floor(math.log10(size) / 3.0)
 
 
 def scaled_label(name: str, scale: float) -> str:
-    """The name of an axis with its scale, where that is not 1."""
+    """Return the name of an axis, with its scale unless that is 1."""
     return plain(name) + (f" [{power_of_ten(scale)}]" if scale != 1.0 else "")
 
 
 def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y", *, wide: float = 200.0) -> None:
-    """Make an axis logarithmic, with numbers at powers of ten; also at 2 and 5 below a ratio `wide` of its values."""
+    """Make an axis logarithmic with numbers at powers of ten; also at 2 and 5 times these up to a data ratio `wide`."""
     axis = panel.yaxis if direction == "y" else panel.xaxis
     (panel.set_yscale if direction == "y" else panel.set_xscale)("log")
     low, high = axis.get_minpos(), axis.get_data_interval()[1]
@@ -50,6 +50,6 @@ def name_powers(axis: Axis) -> None:
 
 
 def list_lines(panel: Axes, names: Sequence[str]) -> None:
-    """Name the lines of a panel with a list, from the top down."""
+    """Label the lines of a panel with names, from the top down."""
     panel.set_yticks(range(len(names)), [plain(name) for name in names])
     panel.set_ylim(len(names) - 0.4, -0.6)

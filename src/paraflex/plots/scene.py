@@ -1,6 +1,7 @@
-"""Description of a drawn mechanism, in metres: links, joints, ground, springs and paths at given times.
+"""Description of a drawn mechanism, in metres: links, joints, ground, springs, loads and paths at given times.
 
-Matplotlib (`plots/drawing.py`), files of SVG (`plots/svg.py`) and the player of the reports (`report/film.py`) draw it.
+Scenes are drawn by Matplotlib (`plots/drawing.py`), as SVG (`plots/svg.py`) and by the player of reports
+(`report/film.py`).
 """
 
 from __future__ import annotations
@@ -21,24 +22,24 @@ from paraflex.results.kinds import kind_of
 
 Array = NDArray[np.float64]
 
-# Variables of joints, and the same where bodies are as in shape_base.
+# Variables of joints, and their counterparts for the bodies of shape_base.
 JOINT_BASES = {"joint_position": "joint_base", "joint_direction": "joint_direction_base"}
-# Points of a circle.
+# Number of points of a circle.
 _CIRCLE = 61
-# Length and width of what slides, as parts of the picture's larger side.
+# Length and width of a sliding block, as shares of the picture's larger side.
 BLOCK = (0.034, 0.022)
-# Length of the arrow of the largest force, and radius of those of torques, as parts of the picture's larger side.
+# Length of the arrow of the largest force, and radius of those of torques, as shares of the picture's larger side.
 ARROW, TURN = 0.12, 0.045
 _MARGIN = 0.07
-# Shares of the width that a scale bar may take.
+# Largest share of the width that a scale bar takes.
 _SCALE_BAR = 0.28
-# A point that moves by less is at rest [m].
+# Path length below which a point is at rest [m].
 _STILL_POINT = 1e-6
-# What deflections are drawn by default: at most this share of the mechanism's size, and not magnified where the largest
-# of these leaves them below the second.
+# Magnifications of deflections. The default draws deflections at most as large as the first share of the mechanism's
+# size, and does not magnify them if the largest magnification leaves them below the second share.
 MAGNIFICATIONS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 _SHOWN_BENDING, _UNSEEN_BENDING = 0.08, 0.005
-# Kinds of results in which nothing moves: what they are, and what draws them.
+# Kinds of results without motion: problem and remedy of the error.
 _MOTIONLESS = {
     "linear": ("these are linear models, not a run",
                "their report.html shows mode shapes in motion, paraflex plot draws mode_shapes"),
@@ -48,12 +49,12 @@ _MOTIONLESS = {
     "laws": ("a comparison of control laws keeps no motions",
              "paraflex plot draws law_comparison; paraflex run --controller NAME keeps the motion of one law"),
 }  # fmt: skip
-# Shares of all places in percent between which a run is that does not come apart.
+# Percentiles of all positions between which a run lies that does not diverge.
 _RUN_SHARES = (0.2, 99.8)
 
 
 class Limits(NamedTuple):
-    """Limits of a picture [m]."""
+    """Limits of a picture in the plane [m]."""
 
     left: float
     right: float
@@ -62,16 +63,19 @@ class Limits(NamedTuple):
 
     @property
     def size(self) -> float:
-        """The larger side."""
+        """Larger side [m]."""
         return max(self.right - self.left, self.top - self.bottom)
 
     def filling(self, flattest: float, tallest: float) -> tuple[Limits, float]:
-        """The limits extended to fill a panel, and its height by its width, between the flattest and the tallest."""
+        """Return the limits extended to fill a panel, and the panel's ratio of height to width.
+
+        The ratio is that of the limits, clipped to the range from `flattest` to `tallest`.
+        """
         aspect = float(np.clip((self.top - self.bottom) / (self.right - self.left), flattest, tallest))
         return self.fitted(1.0 / aspect), aspect
 
     def fitted(self, ratio: float) -> Limits:
-        """The limits extended to the proportions of a panel of that width by height."""
+        """Return the limits extended to a panel with this ratio of width to height."""
         width, height = self.right - self.left, self.top - self.bottom
         wide, high = max(ratio * height - width, 0.0) / 2.0, max(width / ratio - height, 0.0) / 2.0
         return Limits(self.left - wide, self.right + wide, self.bottom - high, self.top + high)
@@ -79,10 +83,23 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True)
 class DrawnJoint:
-    """A joint at the f times of a scene: its kind, whether it is on the ground, places (f, 2), directions (f,).
+    """Joint at the f times of a scene.
 
-    `driven` is whether a motor is there; `rail` a point (f, 2) of the moving body that carries its axis, None where the
-    ground does or a beam is the axis; of a rod its other end.
+    Attributes
+    ----------
+    name, kind : str
+        Name of the joint, and name of its symbol.
+    grounded : bool
+        Whether the joint is on the ground.
+    place : (f, 2) array
+        Positions [m].
+    direction : (f,) array
+        Directions of the joint's axis [rad]; NaN without an axis.
+    driven : bool
+        Whether a motor acts at the joint.
+    rail : (f, 2) array, optional
+        Point of the moving body that carries the axis [m]; None if the ground carries it or a beam is the axis. For a
+        rod it is the other end.
     """
 
     name: str
@@ -100,14 +117,14 @@ class DrawnJoint:
 
 
 class DrawnGear(NamedTuple):
-    """A gear or similar member at f times: pitch circles and lines (f, n, 2), or a line from joint to joint."""
+    """Gear or similar member at f times: pitch circles and lines (f, n, 2), or a line from joint to joint."""
 
     name: str
     lines: tuple[Array, ...]
 
 
 class DrawnLoad(NamedTuple):
-    """A load at f times: where it acts (f, 2), its force (f, 2) and torque (f,) as shares of the run's largest."""
+    """Load at f times: its position (f, 2), force (f, 2) and torque (f,), the latter relative to the run's largest."""
 
     name: str
     place: Array
@@ -117,38 +134,42 @@ class DrawnLoad(NamedTuple):
 
 @dataclass(frozen=True)
 class Scene:
-    """A run in pictures, at f times.
+    """Description of a run at the f times of its pictures.
 
     Attributes
     ----------
     mechanism, mode : str
-        The mode is empty where there is none.
+        Names of the mechanism and of the actuation mode; the latter is empty if there is none.
     time : (f,) array
-        [s]
+        Times of the pictures [s].
     magnified : float
-        How many times deflections are drawn.
+        Magnification of deflections.
     bodies : mapping of str to (f, s, 2) array
-        Deflections magnified [m].
+        Stations of each body with magnified deflections [m].
     stiff : mapping of str to (f, s, 2) array
-        The same drawn stiff between joints; empty where nothing is magnified.
+        Stations of each body without deflection between joints [m]; empty if the magnification is 1.
     joints : tuple of DrawnJoint
+        Joints.
     springs : mapping of str to (f, 2, 2) array
-        Both ends.
+        Both ends of each spring [m].
     gears : tuple of DrawnGear
+        Gears and similar members.
     anchors : tuple of (2,) arrays
-        Where springs hang on the ground.
+        Points at which springs are attached to the ground [m].
     followed : int or None
-        The station whose trail is drawn, of all bodies'.
+        Index of the station whose trail is drawn, among the stations of all bodies.
     trail : (f, 2) array or None
-        Of the end-effector.
+        Path of that station, by default the end-effector [m].
     desired : (d, 2) array or None
-        The whole path it should follow.
+        Entire desired path of the end-effector [m].
     reached : float
-        When the run ended; later pictures hold its last one [s].
+        Time at which the run ended [s]; later pictures repeat the last state.
     limits : Limits
+        Limits of the picture.
     loads : tuple of DrawnLoad
+        Loads.
     load_keys : mapping of str to str
-        What the arrows of the largest "force" and "torque" say, where there are such loads.
+        Texts beside the key arrows of the largest "force" and "torque", if there are such loads.
     """
 
     mechanism: str
@@ -171,7 +192,7 @@ class Scene:
 
 
 def run_times(data: xr.Dataset) -> tuple[float, float]:
-    """First time of a run and the last time reached by any of its modes [s]."""
+    """Return the first time of a run and the last time reached by any of its modes [s]."""
     check_shapes(data)
     kept = np.isfinite(data["shape"].values[..., 0, 0]).reshape(-1, data.sizes["time"]).any(axis=0)
     time = data["time"].values
@@ -179,7 +200,7 @@ def run_times(data: xr.Dataset) -> tuple[float, float]:
 
 
 def check_shapes(data: xr.Dataset) -> None:
-    """Check that results have the variables for drawings."""
+    """Check that results have the shapes that drawings need; raise InputError otherwise."""
     if kind_of(data) in _MOTIONLESS:
         problem, remedy = _MOTIONLESS[kind_of(data)]
         raise InputError(problem, field="results", remedy=remedy)
@@ -191,7 +212,7 @@ def check_shapes(data: xr.Dataset) -> None:
 
 
 def select(data: xr.Dataset, mode: str | None, model: str | None = None) -> xr.Dataset:
-    """One run: of a mode where there are modes, of a model where there are models (by default the reference)."""
+    """Select one run by its mode (default the first) and by its model (default the reference), where these exist."""
     check_shapes(data)
     if "model" in data.dims:
         names = names_of(data, "model")
@@ -211,18 +232,27 @@ def select(data: xr.Dataset, mode: str | None, model: str | None = None) -> xr.D
 
 
 def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None = None) -> Scene:
-    """A run at given times, deflections magnified.
+    """Describe a run at given times with magnified deflections.
 
     Parameters
     ----------
     run : xarray.Dataset
-        From `select`.
+        Single run, from `select`.
     times : (f,) array
-        [s]; after the end of a run that stopped its last picture is held.
+        Times of the pictures [s]; after the end of a run its last state is repeated.
     magnify : float
-        1 is the truth, 0 draws links stiff.
+        Magnification of deflections: 1 (default) draws them as they are, 0 draws undeformed links.
     point : str, optional
-        "body.point" whose trail is drawn; see `followed_station`.
+        Point "body.point" whose trail is drawn; see `followed_station` for the default.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InputError
+        The magnification is negative or not finite, the run has no sample, or there is no such point.
     """
     if not (np.isfinite(magnify) and magnify >= 0.0):
         raise InputError(
@@ -247,7 +277,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
     seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
     loads = _loads(run, drawn, time, times, at)
     reach = np.concatenate([one.reshape(-1, 2) for one in seen])
-    # With the tails of the arrows of forces.
+    # The limits include the tails of the arrows of forces.
     size = limits_of(reach).size
     reach = np.concatenate([reach, *(load.place - ARROW * size * load.force for load in loads)])
     return Scene(
@@ -272,7 +302,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
 
 
 def _magnified_joints(run: xr.Dataset, name: str, magnify: float) -> Array:
-    """Places or directions of joints, which move with the bodies from their base; in older results they do not."""
+    """Return positions or directions of joints, magnified like the bodies; those of older results are unchanged."""
     values = run[name].values.astype(float)
     base = JOINT_BASES[name]
     return values + (magnify - 1.0) * (values - run[base].values.astype(float)) if base in run else values
@@ -281,7 +311,7 @@ def _magnified_joints(run: xr.Dataset, name: str, magnify: float) -> Array:
 def _joints(
     run: xr.Dataset, drawn: Array, places: Array, directions: Array, at: Callable[[Array], Array]
 ) -> tuple[DrawnJoint, ...]:
-    """Joints of a run; results of earlier versions do not say which have motors, and rails on moving bodies."""
+    """Return the joints of a run; results of earlier versions have no data on motors and rails on moving bodies."""
     names, count = run["joint"].values, run.sizes["joint"]
     driven = run["joint_driven"].values if "joint_driven" in run else np.zeros(count, dtype=bool)
     rails = run["joint_rail"].values if "joint_rail" in run else np.full(count, -1)
@@ -296,7 +326,10 @@ def _joints(
 
 
 def default_magnification(runs: Sequence[xr.Dataset]) -> float:
-    """The largest of MAGNIFICATIONS at which no deflection of runs exceeds 8 % of the mechanism's size; else 1."""
+    """Return the largest of MAGNIFICATIONS at which no deflection exceeds 8 % of the mechanism's size.
+
+    It is 1 if there is none, or if deflections remain invisible (below 0.5 %) at the largest magnification.
+    """
     bent, size = 0.0, 0.0
     for run in runs:
         shape, base = (run[name].values.reshape(-1, 2).astype(float) for name in ("shape", "shape_base"))
@@ -310,7 +343,7 @@ def default_magnification(runs: Sequence[xr.Dataset]) -> float:
 
 
 class _Sampler:
-    """Linear interpolation between samples; constant beyond the last."""
+    """Linear interpolation between samples, constant beyond the first and the last."""
 
     def __init__(self, time: Array, times: Array) -> None:
         self.first = np.clip(np.searchsorted(time, times, side="right") - 1, 0, max(time.size - 2, 0))
@@ -324,9 +357,9 @@ class _Sampler:
 
 
 def followed_station(run: xr.Dataset, point: str | None = None) -> int | None:
-    """The station whose trail is drawn: that of a point, by default the end-effector.
+    """Return the station whose trail is drawn: that of a given point, by default the end-effector.
 
-    Else that of the longest way, free points before joints.
+    Without an end-effector it is the point with the longest path, free points before joints; None if nothing moves.
     """
     points = names_of(run, "point")
     stations = run["point_station"].values
@@ -366,7 +399,7 @@ def _springs(run: xr.Dataset, drawn: Array) -> dict[str, Array]:
 
 
 def _gears(run: xr.Dataset, joints: Array, directions: Array) -> tuple[DrawnGear, ...]:
-    """Gears between joints at these places (f, joints, 2) in these directions (f, joints)."""
+    """Return the gears between joints with given positions (f, joints, 2) and directions (f, joints)."""
     if "gear_joint" not in run:
         return ()
     names, related = run["gear"].values, run["gear_joint"].values.astype(int)
@@ -379,7 +412,7 @@ def _gears(run: xr.Dataset, joints: Array, directions: Array) -> tuple[DrawnGear
 def _loads(
     run: xr.Dataset, drawn: Array, time: Array, times: Array, at: Callable[[Array], Array]
 ) -> tuple[DrawnLoad, ...]:
-    """Loads of a run as shares of its largest force and torque; results of earlier versions have none."""
+    """Return the loads of a run relative to its largest force and torque; results of earlier versions have none."""
     if "load_force" not in run:
         return ()
     force, torque = np.nan_to_num(run["load_force"].values), np.nan_to_num(run["load_torque"].values)[..., None]
@@ -393,16 +426,16 @@ def _loads(
 
 
 def _strongest(values: Array, time: Array, times: Array, at: Callable[[Array], Array]) -> Array:
-    """Values (k, n, c) at the times of pictures, each the largest of the samples nearer to it than to the others.
+    """Return values (k, n, c) at the times of the pictures, the largest of the samples nearest to each picture.
 
-    A blow between two pictures is seen in one of them.
+    An impulse between two pictures is thus visible in one of them.
     """
     out = at(values)
     nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), time)
     inside = np.flatnonzero((time >= times[0]) & (time <= times[-1]))
     sizes = np.linalg.norm(values, axis=-1)
     for n in range(values.shape[1]):
-        # Of several samples of a picture the last one written is the largest.
+        # Samples are written in ascending order, so that the largest one of each picture remains.
         ascending = inside[np.argsort(sizes[inside, n], kind="stable")]
         largest = out[:, n].copy()
         largest[nearest[ascending]] = values[ascending, n]
@@ -412,7 +445,7 @@ def _strongest(values: Array, time: Array, times: Array, at: Callable[[Array], A
 
 
 def _load_keys(run: xr.Dataset) -> dict[str, str]:
-    """Sizes of the longest arrows, by whether they are of forces or of torques."""
+    """Return the texts that state the magnitudes of the largest "force" and "torque", if there are such loads."""
     if "load_force" not in run:
         return {}
     keys = {}
@@ -428,14 +461,14 @@ def _load_keys(run: xr.Dataset) -> dict[str, str]:
 
 
 def pitch_lines(ends: Array, directions: Array, radii: Array) -> tuple[Array, ...]:
-    """Pitch circles (f, n, 2) of wheels and pitch lines of racks; if radii are NaN, a line from joint to joint.
+    """Return pitch circles (f, n, 2) of wheels and pitch lines of racks; if a radius is NaN, a line between the joints.
 
     Parameters
     ----------
     ends, directions : (f, 2, 2) and (f, 2) arrays
-        Of the two joints.
+        Positions [m] and directions [rad] of the two joints.
     radii : (2,) array
-        See `results.drawing.pitch_radii`.
+        Pitch radii [m], infinite for a rack, see `results.drawing.pitch_radii`.
     """
     if np.isnan(radii).any():
         return (ends,)
@@ -446,7 +479,7 @@ def pitch_lines(ends: Array, directions: Array, radii: Array) -> tuple[Array, ..
 
 
 def _pitch_line(ends: Array, directions: Array, radii: Array, rack: int) -> Array:
-    """The line (f, 2, 2) that a pinion rolls on, past what touches and to the joint of its rack."""
+    """Return the pitch line (f, 2, 2) of a rack, beyond the contact with the pinion and up to the rack's joint."""
     along = np.stack([np.cos(directions[:, rack]), np.sin(directions[:, rack])], axis=-1)
     right, radius = along[:, ::-1] * [1.0, -1.0], radii[1 - rack]
     touching = ends[:, 1 - rack] + np.sign(radii[rack]) * radius * right
@@ -456,7 +489,7 @@ def _pitch_line(ends: Array, directions: Array, radii: Array, rack: int) -> Arra
 
 
 def _with_rails(places: Array, joints: tuple[DrawnJoint, ...]) -> Array:
-    """Places, and the ends of the joints' rails."""
+    """Return positions together with the ends of the joints' rails."""
     size = limits_of(places).size
     rails = [
         joint.place + sign * 1.2 * BLOCK[0] * size * np.column_stack([np.cos(joint.direction), np.sin(joint.direction)])
@@ -468,15 +501,15 @@ def _with_rails(places: Array, joints: tuple[DrawnJoint, ...]) -> Array:
 
 
 def limits_of(places: Array) -> Limits:
-    """Limits that contain all of these places, with a margin."""
+    """Return limits that contain all finite positions, with a margin; far outliers are cut off."""
     places = places[np.isfinite(places).all(axis=1)]
-    # A run that comes apart does not rule the picture.
+    # A diverging run must not determine the limits.
     usual = np.percentile(places, _RUN_SHARES, axis=0)
     far = np.max(np.ptp(usual, axis=0))
     low, high = np.maximum(places.min(axis=0), usual[0] - far), np.minimum(places.max(axis=0), usual[1] + far)
     size = float(np.max(high - low)) or 1.0
     room = _MARGIN * size
-    # Ground symbols hang below; a flat mechanism is not drawn in a slit.
+    # Room for ground symbols below, and a minimum width and height for flat mechanisms.
     low, high = low - room, high + room
     for axis, least in ((0, 0.5), (1, 0.4)):
         lacking = max(least * size - float(high[axis] - low[axis]), 0.0)
@@ -486,13 +519,13 @@ def limits_of(places: Array) -> Limits:
 
 
 def common_limits(scenes: list[Scene]) -> Limits:
-    """Limits that contain several scenes."""
+    """Return limits that contain several scenes."""
     left, right, bottom, top = np.array([one.limits for one in scenes]).T
     return Limits(float(left.min()), float(right.max()), float(bottom.min()), float(top.max()))
 
 
 def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
-    """The same scene at a few of its times."""
+    """Return the scene restricted to some of its times, given by their indices."""
     return replace(
         shown,
         time=shown.time[chosen],
@@ -515,19 +548,19 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
 
 
 def figure_of(places: Array) -> Array:
-    """The stations (..., s, 2) of a body that are joined by lines: for a closed figure, up to where it closes."""
+    """Return the stations (..., s, 2) of a body that are joined by lines; a closed figure ends where it closes."""
     first = places.reshape(-1, *places.shape[-2:])[0]
     back = np.flatnonzero(np.all(first[1:] == first[0], axis=1))
     return places[..., : back[0] + 2, :] if back.size and back[0] > 1 else places
 
 
 def is_plate(places: Array) -> bool:
-    """Whether the stations (s, 2) of `figure_of` are a closed figure."""
+    """Return whether the stations (s, 2) from `figure_of` form a closed figure."""
     return len(places) > 3 and bool(np.all(places[0] == places[-1]))
 
 
 def scale_bar(limits: Limits) -> tuple[float, str]:
-    """A round length that fits into the picture [m], and its name."""
+    """Return a round length [m] for the scale bar of a picture, and its text."""
     most = _SCALE_BAR * (limits.right - limits.left)
     power = 10.0 ** np.floor(np.log10(most))
     length = float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= most))

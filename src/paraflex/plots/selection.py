@@ -1,4 +1,4 @@
-"""The runs of some results that a figure shows: by mode or by model."""
+"""Selection of the runs and points of a dataset that a figure shows."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# An end-effector whose speed along an axis is this share of that along the other rests there, but for rounding.
+# Ratio of speeds along the two axes below which the end-effector is at rest along one of them, up to rounding.
 _STILL = 1e-9
 
 
 def place_of(name: str, names: Sequence[str], what: str, field: str = "") -> int:
-    """The place of a mode or model among those of results."""
+    """Return the index of a name, such as that of a mode or model; raise InputError if it is not among `names`."""
     if name not in names:
         remedy = "one of " + ", ".join(names)
         raise InputError(f"no such {what} in these results", field=field or what, value=name, remedy=remedy)
@@ -27,22 +27,25 @@ def place_of(name: str, names: Sequence[str], what: str, field: str = "") -> int
 
 
 def names_of(data: xr.Dataset | xr.DataArray, dim: str) -> list[str]:
-    """Names along a dimension: of modes, models, bodies, motors."""
+    """Return the names along a dimension, such as those of modes, models, bodies or motors."""
     return [str(name) for name in data[dim].values]
 
 
 def select_run(data: xr.Dataset, mode: str) -> xr.Dataset:
-    """The run of one mode."""
+    """Return the run of one mode."""
     return data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
 
 
 def select_model(data: xr.Dataset, model: str) -> xr.Dataset:
-    """The runs of one model."""
+    """Return the runs of one model."""
     return data.isel(model=place_of(model, names_of(data, "model"), "model"))
 
 
 def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
-    """The best floating-frame model and the most independent other one, as compared in Figs. 22 and 23."""
+    """Return the best floating-frame model and the most independent other one, as compared in Figs. 22 and 23.
+
+    None if there is no such pair.
+    """
     names = names_of(data, "model")
     ours = next((name for name in ("second-order", "linear") if name in names), None)
     other = next((name for name in ("segments", "mujoco", "exudyn") if name in names), None)
@@ -50,13 +53,13 @@ def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
 
 
 def default_mode(data: xr.Dataset) -> str:
-    """The mode with most active motors if modes are named by their signs; else the first."""
+    """Return the mode with most active motors if modes are named by signs, else the first mode."""
     names = names_of(data, "mode")
     return max(names, key=lambda name: name.count("+")) if all(map(is_signs, names)) else names[0]
 
 
 def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
-    """The run of a mode, by default of `default_mode`; for results without modes the only one."""
+    """Return the run of a mode, by default of `default_mode`; for results without modes the only run."""
     if "mode" not in data.dims:
         if mode is not None:
             raise InputError(
@@ -67,7 +70,7 @@ def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
 
 
 def point_number(data: xr.Dataset, point: str, field: str = "point") -> int:
-    """The number of a named point of results; of those that a program made none is proposed."""
+    """Return the index of a named point of results; the error message does not propose generated points."""
     names = names_of(data, "point")
     if point in names:
         return names.index(point)
@@ -75,12 +78,14 @@ def point_number(data: xr.Dataset, point: str, field: str = "point") -> int:
 
 
 def of_point(run: xr.Dataset, point: str | None) -> xr.Dataset:
-    """A run with a named point in place of the end-effector, and no desired motion unless it is that.
+    """Return a run with a named point in place of the end-effector.
+
+    The desired motion is removed unless the point is the end-effector itself.
 
     Raises
     ------
     InputError
-        No such point, or results of an earlier version, without velocities of points.
+        There is no such point, or the results are of an earlier version, without motions of points.
     """
     if point is None or point == run.attrs.get("end_effector_point"):
         return run
@@ -96,24 +101,24 @@ def of_point(run: xr.Dataset, point: str | None) -> xr.Dataset:
 
 
 def point_label(run: xr.Dataset, point: str | None) -> str:
-    """Label of the actual motion of the end-effector, or of a point, in legends."""
+    """Return the legend label of the actual motion of the end-effector, or of a point."""
     return f"{'actual' if point is None else plain(point)}, {run_label(run)}"
 
 
 def run_label(run: xr.Dataset) -> str:
-    """Label of a run's mode in legends."""
+    """Return the legend label of a run's mode."""
     return f"mode {plain(str(run['mode'].item()))}"
 
 
 def samples(run: xr.Dataset) -> int:
-    """Number of samples of a run up to the last one that it reached."""
+    """Return the number of samples that a run reached."""
     moving = run["end_effector"] if "end_effector" in run else run["angle"]
     missing = ~np.isfinite(moving.values).all(axis=-1)
     return int(np.argmax(missing)) if missing.any() else missing.size
 
 
 def moving_directions(run: xr.Dataset) -> list[str]:
-    """The axes along which the end-effector moves, or should: all where it rests."""
+    """Return the axes along which the end-effector moves or should move; all axes if it is at rest."""
     names = names_of(run, "axis")
     parts = [np.nan_to_num(run[name].transpose("time", "axis").values)
              for name in ("end_effector_velocity", "end_effector_velocity_desired") if name in run]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Signs of a legend as they are drawn in its picture, and arrows."""
+"""Legend signs that look as in the drawing, and arrows."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from paraflex.plots.themes import Theme
 
 Array = NDArray[np.float64]
 
-# Length and radius of arrows in a legend, as parts of the picture's larger side, and the size of their heads.
+# Length and radius of arrows in a legend, as shares of the picture's larger side, and relative size of their heads.
 _LONG, _ROUND, _HEAD = 0.04, 0.014, 0.55
-# From where and how far a round arrow in a legend goes [rad].
+# Start angle and sweep of a round arrow in a legend [rad].
 _FROM, _BY = -0.3, 1.3 * np.pi
 
 
 @dataclass(frozen=True)
 class Arrow:
-    """An arrow: its line (n, 2), its head (4, 2), and whether it goes round a point [m]."""
+    """Arrow: line (n, 2) and head (4, 2) [m], and whether it goes around a point."""
 
     line: Array
     head: Array
@@ -41,18 +41,18 @@ class Arrow:
 
     @property
     def outline(self) -> Array:
-        """Places (n, 2) that it covers."""
+        """Points (n, 2) of line and head [m]."""
         return np.vstack([self.line, self.head])
 
 
 class Sign(NamedTuple):
-    """Places (n, 2) of lines [m], each with its looks for Matplotlib; of a single place a dot."""
+    """Sign of a legend: lines (n, 2) [m], each with its Matplotlib properties; a single point is drawn as a dot."""
 
     pieces: tuple[tuple[Array, Mapping[str, Any]], ...]
 
 
 def joint_sign(kind: str, limits: Limits, look: Theme, width: float, *, driven: bool = False) -> Sign:
-    """The symbol of a kind of joint, or of a motor at one; lines of dots are so wide as in a `Sketch` of that width."""
+    """Return the sign of a kind of joint, or of a motor at one; dots are scaled like those of a `Sketch` of `width`."""
     joint = DrawnJoint("", kind, False, np.zeros((1, 2)), np.array([np.nan if kind in ("pin", "weld") else 0.0]))
     shapes = dict(SYMBOLS[kind]) | ({"motor": motor} if driven else {})
     pieces: list[tuple[Array, Mapping[str, Any]]] = []
@@ -67,7 +67,7 @@ def joint_sign(kind: str, limits: Limits, look: Theme, width: float, *, driven: 
 
 
 def arrow_sign(arrow: Arrow, limits: Limits, looks: Mapping[str, Any]) -> Sign:
-    """An arrow like another, as long as fits into a legend."""
+    """Return the sign of an arrow, straight or round like the given one, in the size of the legend."""
     if arrow.round:
         line, head = round_arrow(np.zeros((1, 2)), _ROUND * limits.size, _FROM, np.array([_BY]), limits, _HEAD)
     else:
@@ -77,7 +77,7 @@ def arrow_sign(arrow: Arrow, limits: Limits, looks: Mapping[str, Any]) -> Sign:
 
 
 def draw_arrow(axes: Axes, arrow: Arrow, looks: Mapping[str, Any]) -> None:
-    """Draw an arrow; `looks` are colour, width of its line, and dashes and opacity where it has them."""
+    """Draw an arrow; `looks` holds its colour and line width, and optionally dashes and opacity."""
     for places, look in _arrow_pieces(arrow, looks):
         axes.add_patch(PathPatch(Path(places), zorder=3.7, clip_on=False, **look))
 
@@ -90,7 +90,7 @@ def _arrow_pieces(arrow: Arrow, looks: Mapping[str, Any]) -> tuple[tuple[Array, 
 
 
 class _SignHandler(HandlerBase):
-    """Draws a sign in a legend at the scale of the picture."""
+    """Legend handler that draws a sign at the scale of the picture."""
 
     def __init__(self, scale: float) -> None:
         super().__init__()
@@ -100,7 +100,7 @@ class _SignHandler(HandlerBase):
         self, legend: Legend, orig_handle: Any, xdescent: float, ydescent: float, width: float, height: float,
         fontsize: float, trans: Transform,
     ) -> list[Artist]:  # fmt: skip
-        """See Matplotlib."""
+        """Create the artists of a sign, as Matplotlib's `HandlerBase.create_artists` requires."""
         middle = Affine2D().scale(self.scale).translate(0.5 * width - xdescent, 0.5 * height - ydescent) + trans
         out: list[Artist] = []
         for places, look in orig_handle.pieces:
@@ -111,7 +111,7 @@ class _SignHandler(HandlerBase):
 
 
 def sign_legend(figure: Figure, axes: Axes, entries: Sequence[tuple[str, Any]], **settings: Any) -> None:
-    """A legend below a figure, of words with signs or Matplotlib's own artists."""
+    """Add a legend below a figure, whose entries are texts with signs or with Matplotlib artists."""
     left, right = axes.get_xlim()
     scale = 72.0 * figure.get_figwidth() * axes.get_position().width / (right - left)
     figure.legend(

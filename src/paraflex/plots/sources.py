@@ -1,4 +1,4 @@
-"""Results on disk, recognised by their content: kind of results, and data for figures."""
+"""Recognition of results on disk by their content: kind of results, and data for figures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from paraflex.seals import NETCDF, PARQUET, check_regular, unreadable
 from paraflex.writing import read_values
 
 _OURS = "name a folder or file that paraflex wrote"
-# Files of results; the first one found determines the kind of a folder.
+# Files of results that determine the kind of a folder.
 _RESULT_FILES = (
     "results.nc", "verify.nc", "linear.nc", "statics.nc", "reduced.nc", "laws.nc", "compare-methods.json",
     "sensitivity.json", "indices.json", "result.json",
@@ -25,19 +25,20 @@ _BEGINNINGS = {NETCDF: "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", PAR
 
 @dataclass(frozen=True)
 class Source:
-    """Results that figures can be drawn from.
+    """Results from which figures can be drawn.
 
     Attributes
     ----------
     kind : str
+        Kind of results:
         "tracking", "motion", "verification", "linear", "statics", "reduction", "laws", "methods", "sweep",
         "optimisation", "identification", "indices", "sensitivity" or "modes".
     data : xarray.Dataset, mapping, list or DesignTable
-        As the functions of `paraflex.plots` take it.
+        Data in the form that the functions of `paraflex.plots` take.
     folder : Path
-        That holds it.
+        Folder that holds the results.
     designs : DesignTable or None
-        All runs of a study of many.
+        Table of all runs, for a study of many designs.
     """
 
     kind: str
@@ -47,7 +48,7 @@ class Source:
 
 
 def open_source(path: str | Path) -> Source:
-    """Results of any command, from their folder or one of their files."""
+    """Open the results of any command from their folder or one of their files."""
     path = Path(path)
     if not path.exists():
         raise InputError("no such file or folder", field="RESULTS", value=str(path), remedy=_OURS)
@@ -105,12 +106,12 @@ def _json(file: Path) -> Source:
 
 
 def kind_of_numbers(found: Any) -> str:
-    """Kind of results with these plain numbers; empty if no figures can be drawn of them."""
+    """Return the kind of results with these plain numbers; empty if no figures can be drawn of them."""
     return next((kind for kind, is_it in _JSON.items() if is_it(found)), "")
 
 
 def _designs(folder: Path) -> DesignTable | None:
-    """The table of a folder's runs; None if there are none."""
+    """Return the table of a folder's runs; None if there are none."""
     files = tables_of(folder)
     table = read_designs(files) if files else None
     return table if table is not None and table.complete.size else None

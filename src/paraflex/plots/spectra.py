@@ -1,4 +1,4 @@
-"""Numerical damping: damping ratio, period error and spectral radius of each method."""
+"""Figure of numerical damping: damping ratio, period error and spectral radius of each integration method."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from paraflex.plots.methods import method_look
 from paraflex.plots.scales import name_powers
 from paraflex.plots.style import ZERO, journal_style
 
-# Of multistep methods the orders at which they start to differ; IDA's roots are those of BDF.
+# Orders of the multistep methods that are shown; IDA is omitted because its characteristic roots are those of BDF.
 _ORDERS = {"adams": (4,), "bdf": (2, 5), "ndf": (2,)}
 CURVES: tuple[tuple[str, int | None], ...] = tuple(
     (name, order) for name in METHODS if name != "ida" for order in _ORDERS.get(name, (None,))
 )
-# Frequencies that a step resolves; and the highest one shown, where modes need only be damped.
+# Frequencies h omega that a step resolves, and the whole range up to those at which modes need only be damped [rad].
 _RESOLVED, _HIGH = np.geomspace(0.1, 3.0, 120), np.geomspace(0.1, 1e4, 240)
-# Range of fractions shown, and the largest spectral radius shown.
+# Range of damping ratio and period error shown, and largest spectral radius shown.
 _SHOWN, _GROWN = (1e-6, 1.0), 1.5
 
 
 @journal_style()
 @checked_arguments(curves='give pairs of a method and an order or None, such as [("bdf", 2)]')
 def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figure:
-    """Damping ratio, period error and spectral radius over h omega (x'' = -omega^2 x, steps of h).
+    """Plot damping ratio, period error and spectral radius over h omega, for x'' = -omega^2 x and steps of size h.
 
-    Damping ratio and period error are shown where a method is stable and does damp.
+    Damping ratio and period error are shown where the method is stable and their magnitude is not negligible.
 
     Parameters
     ----------
     curves : sequence of (str, int or None)
-        Methods by name, with an order where they have several.
+        Names of methods, each with an order if the method has several; by default all methods but IDA.
     """
     figure, axes = panels(1, 3)
     members: dict[str, int] = {}
@@ -68,5 +68,5 @@ def numerical_damping(curves: Sequence[tuple[str, int | None]] = CURVES) -> Figu
 
 
 def _shown(found: Spectrum, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values that a logarithmic axis can show: neither zero nor growth."""
+    """Return values with NaN where the method is unstable or the value is too small for the logarithmic axis."""
     return np.where((found.radius < 1.0 + 1e-9) & (values > 0.1 * _SHOWN[0]), values, np.nan)

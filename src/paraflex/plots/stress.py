@@ -1,4 +1,4 @@
-"""Figures of loads: stresses of beams, motion of joints, efforts of motors and drives, loads of the ground."""
+"""Figures of loads: stresses of beams, motions of joints, efforts of motors and drives, loads on the ground."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from paraflex.units import STRESS
 
 @drawn
 def beam_stresses(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Largest magnitude of the stress along every beam in time, bending and axial; at most the seven largest."""
+    """Plot the largest magnitude of stress along every beam over time, bending and axial; at most the seven largest."""
     run = one_run(data, mode)
     stresses = STRESS.factor * run["stress"].transpose("time", "body").values
     _check_stresses(stresses, "beam_stresses")
@@ -33,9 +33,10 @@ def beam_stresses(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 @drawn
 def stress_envelope(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Largest magnitude of the stress over the run along every beam, dashed its axial part; at most the seven largest.
+    """Plot the largest magnitude of stress over the run along every beam; at most the seven largest beams.
 
-    Two values at one place are those on both sides of a node; crosses are largest values under what slides along.
+    Dotted lines are the axial part. Two values at one position are those on both sides of a node; crosses are the
+    largest values under joints that slide along the beam.
     """
     run = one_run(data, mode)
     found = stresses_of(run)
@@ -58,7 +59,7 @@ def stress_envelope(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 
 def _peaks_under_contacts(run: xr.Dataset, body: str) -> Iterator[tuple[float, float]]:
-    """Place [m] and largest magnitude [Pa] of the stress under each joint that slides along a body."""
+    """Yield position [m] and magnitude [Pa] of the largest stress under each joint that slides along a body."""
     if "contact_moment" not in run:
         return
     found = stresses_of(run, CONTACT)
@@ -77,7 +78,7 @@ def _check_stresses(stresses: NDArray[np.float64], figure: str) -> None:
 
 @drawn
 def joint_motions(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Angle and rate of every joint that turns, travel and speed of every one that slides; at most seven of each."""
+    """Plot angle and rate of every rotating joint, travel and speed of every sliding joint; at most seven of each."""
     run = one_run(data, mode)
     slides = sliding_joints(run)
     moves = run["joint_kind"].values != "weld"
@@ -99,7 +100,7 @@ def joint_motions(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 @drawn
 def drive_efforts(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Torque or force, speed and power of every motor and prescribed motion in time."""
+    """Plot torque or force, speed and power of motors and prescribed motions over time, at most seven of each."""
     run = one_run(data, mode)
     efforts: dict[str, dict[str, NDArray[np.float64]]] = {"torque": {}, "speed": {}, "power": {}}
     units = set()
@@ -123,13 +124,13 @@ def drive_efforts(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 @drawn
 def frame_loads(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Force and moment of the mechanism on the ground: shaking force, and shaking moment about the origin."""
+    """Plot force and moment of the mechanism on the ground: shaking force, and shaking moment about the origin."""
     run = one_run(data, mode)
     force = run["frame_force"].transpose("time", "axis").values
     figure, axes = panels(2, 1)
     _about_zero(axes[0, 0], run, {"$F_x$": force[:, 0], "$F_y$": force[:, 1]}, axis_label("force"))
     moment = {"$M$ about the origin": run["frame_moment"].values}
-    # Looks go on where those of the force end.
+    # The moment continues the sequence of looks.
     _about_zero(axes[1, 0], run, moment, axis_label("moment"), first=2)
     return finish_over_time(figure, axes, data, panel_height=40.0)
 

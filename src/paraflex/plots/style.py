@@ -10,7 +10,7 @@ from typing import Any, Literal
 import matplotlib.style
 from matplotlib.axes import Axes
 
-# Okabe and Ito (2008), Color Universal Design; their yellow is left out, it is too light for a thin line.
+# Okabe and Ito (2008), Color Universal Design; their yellow is omitted because it is too light for a thin line.
 BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
 COLOURS = (BLUE, VERMILLION, GREEN, BLACK, "#CC79A7", "#E69F00", "#56B4E9")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1, 1)), (0, (9, 2)))
@@ -18,7 +18,7 @@ SHADE = "0.92"
 
 
 def look_of(number: int) -> dict[str, Any]:
-    """Colour and dashes of a line by its number: distinguishable in grey, up to 35 lines."""
+    """Return colour and dashes of a line by its number; up to 35 lines differ, and neighbours also in grey."""
     return {"color": COLOURS[number % len(COLOURS)], "linestyle": DASHES[number % len(DASHES)]}
 
 
@@ -26,14 +26,14 @@ def look_of(number: int) -> dict[str, Any]:
 PAIR: tuple[dict[str, Any], ...] = ({"color": BLUE, "linestyle": "-"}, {"color": VERMILLION, "linestyle": (0, (4, 2))})
 ZERO: dict[str, Any] = {"color": "0.7", "linewidth": 0.5, "zorder": 0.5}
 
-# Fonts that come with Matplotlib, so that a figure is the same on every machine.
+# Fonts are those of Matplotlib, so that a figure is the same on every machine.
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.0,
     "mathtext.fontset": "dejavusans",
     "axes.titlesize": 8.0,
     "axes.titlepad": 3.0,
-    "axes.titley": 1.0,  # Nothing stands above a panel; looking for it takes time.
+    "axes.titley": 1.0,  # A fixed position: searching for free room above a panel takes time.
     "axes.labelsize": 8.0,
     "axes.labelpad": 2.0,
     "axes.linewidth": 0.6,
@@ -69,19 +69,19 @@ STYLE: dict[str, Any] = {
     "ps.fonttype": 42,
 }
 
-# Data that differ by less, in the unit of their axis, differ by rounding only.
+# Difference, in the unit of the axis, below which data are constant up to rounding.
 _NOTHING = 1e-9
 
 
 @contextmanager
 def journal_style() -> Iterator[None]:
-    """Draw in this style, from Matplotlib's own defaults, without reading or changing the user's settings."""
+    """Draw in the style of this package, on Matplotlib's defaults, without reading or changing the user's settings."""
     with matplotlib.style.context(STYLE, after_reset=True):
         yield
 
 
 def keep_flat(axes: Axes, scale: float, direction: Literal["x", "y"] = "y") -> None:
-    """Show data that differ by less than a millionth of `scale` in a direction as constant, not as rounding errors."""
+    """Set the limits of an axis so that data which vary by less than a millionth of `scale` appear constant."""
     axis, set_limits = (axes.xaxis, axes.set_xlim) if direction == "x" else (axes.yaxis, axes.set_ylim)
     low, high = axis.get_data_interval()
     if not high - low > max(1e-6 * scale, _NOTHING):  # also true of axes without data

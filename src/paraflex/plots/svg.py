@@ -1,4 +1,4 @@
-"""A scene as elements of SVG: still, or animated in browsers, shapes as lists of values in time (SMIL)."""
+"""Scenes as SVG elements: still, or animated in browsers by lists of values over time (SMIL)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from paraflex.results.drawing import assembled_data
 
 Array = NDArray[np.float64]
 
-# Points of a line this near to it are left out [pixels].
+# Distance from the chord below which points of a line are omitted [pixels].
 _STRAIGHT = 0.15
-# The larger side of a sketch [pixels].
+# Larger side of a sketch [pixels].
 _SKETCH = 320.0
 # Widths of links, and radii of a pin and the end-effector [units].
 _LINK, _PIN, _TIP = 4.0, 3.2, 2.6
@@ -32,14 +32,15 @@ class Pen:
     Attributes
     ----------
     corner : (x, y)
-        Where the scene's origin is [pixels].
+        Position of the scene's origin [pixels].
     scale : float
-        [pixels/m]
+        Scale of the scene [pixels/m].
     unit : float
-        What lines are drawn in [pixels].
+        Unit of line widths and radii [pixels].
     look : Theme
+        Colours.
     seconds : float
-        That a film takes.
+        Duration of the film [s]; zero (default) for a still picture.
     """
 
     corner: tuple[float, float]
@@ -49,12 +50,12 @@ class Pen:
     seconds: float = 0.0
 
     def pixels(self, places: Array) -> Array:
-        """Places on the page, in pixels."""
+        """Return positions [m] as positions on the page [pixels]."""
         return places * [self.scale, -self.scale] + self.corner
 
 
 def sketch(mechanism: Mechanism) -> str:
-    """SVG of the first assembly in the colours of its page; empty if places do not follow from the assembly."""
+    """Return an SVG of the first assembly in the colours of its page; empty if the assembly gives no positions."""
     data = assembled_data(mechanism)
     if data is None:
         return ""
@@ -71,7 +72,7 @@ def sketch(mechanism: Mechanism) -> str:
 
 
 def moving_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:
-    """Elements of all but the ground and the desired path, from the back to the front; at a single time still."""
+    """Return the elements of all parts but ground and desired path, back to front; a scene of one time is still."""
     look, out = pen.look, []
     if shown.trail is not None:
         out.append(_trail(shown.trail, pen))
@@ -92,7 +93,7 @@ def moving_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:
 
 
 def animated(name: str, values: Sequence[str], seconds: float) -> str:
-    """An attribute that takes these values evenly in time, repeatedly; empty if it is constant."""
+    """Return an element that animates an attribute through values at equal intervals, repeatedly; empty if constant."""
     if len(set(values)) == 1:
         return ""
     return (
@@ -112,7 +113,7 @@ def _mark(mark: Mark, pen: Pen) -> str:
 
 
 def _line(places: Array, look: str, name: str, pen: Pen) -> str:
-    """Element of a line; a still line with gaps is a path."""
+    """Return the element of a line; a line with gaps becomes a still path."""
     pixels = pen.pixels(places)
     if np.isnan(pixels).any():
         pieces = np.split(pixels[0], np.flatnonzero(np.isnan(pixels[0, :, 0])))
@@ -132,7 +133,7 @@ def _dot(places: Array, radius: float, look: str, name: str, pen: Pen) -> str:
 
 
 def _trail(places: Array, pen: Pen) -> str:
-    """Element of the whole trail, uncovered with time."""
+    """Return the element of the whole trail, which is uncovered over time."""
     pixels = pen.pixels(places)
     steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(pixels, axis=0), axis=1))])
     if steps[-1] < 0.5:
@@ -158,7 +159,7 @@ def _points(pixels: Array) -> list[str]:
 
 
 def _corners(pixels: Array) -> list[int]:
-    """The points of a line (f, s, 2) at which it is not straight in at least one picture."""
+    """Return the indices of the points of a line (f, s, 2) at which it is not straight in at least one picture."""
     kept = [0]
     for last in range(2, pixels.shape[1]):
         start = pixels[:, kept[-1], None]

@@ -1,4 +1,4 @@
-"""Colours of drawings, films and reports on light and on dark ground."""
+"""Colours of drawings, films and reports on light and on dark backgrounds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from paraflex.mechanism.quantities import known
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours by use; those of links are distinguishable by colour-blind readers too."""
+    """Colours by use; those of links are distinguishable for colour-blind readers as well."""
 
     ground: str
     ink: str
@@ -21,12 +21,12 @@ class Theme:
     links: tuple[str, ...]
 
     def link(self, number: int) -> str:
-        """Colour of a body by its number."""
+        """Return the colour of a body by its number."""
         return self.links[number % len(self.links)]
 
 
-# After Okabe and Ito (2008), Color Universal Design; darker where the ground is light, lighter where it is dark. None
-# is near the trail's colour, or the grey and ink of the desired path.
+# After Okabe and Ito (2008), Color Universal Design; darker on the light background, lighter on the dark one. No colour
+# of a link is near that of the trail, or near the grey and ink of the desired path.
 THEMES = {
     "light": Theme(
         "#ffffff", "#1d2327", "#c3c9ce", "#59636b", "#8a949b", "#d55e00", "#00676f",
@@ -37,7 +37,7 @@ THEMES = {
         ("#56b4e9", "#f0c93a", "#2fd0a0", "#e79bc5", "#8fa8ff", "#b6d24a", "#c08cf0", "#b98a5a"),
     ),
 }  # fmt: skip
-# For a page of unknown background, such as a notebook: colours for both light and dark.
+# Theme for a page of unknown background, such as a notebook: colours for both light and dark.
 PAGE = Theme(
     "rgba(128, 128, 128, 0.6)", "currentColor", "currentColor", "currentColor", "currentColor", "currentColor",
     "currentColor",
@@ -46,6 +46,6 @@ PAGE = Theme(
 
 
 def theme(name: str) -> Theme:
-    """Colours by name."""
+    """Return a theme by name; raise InputError if there is none."""
     known(name, THEMES, "theme", "theme")
     return THEMES[name]

@@ -1,4 +1,4 @@
-"""One mode in time: tip deflections, motion of the links, motion of the end-effector (Figs. 13, 14, 16)."""
+"""Figures of one mode over time: tip deflections, motions of links and of the end-effector (Figs. 13, 14, 16)."""
 
 from __future__ import annotations
 
@@ -16,23 +16,26 @@ from paraflex.plots.runs import END_EFFECTOR, draw_actual, draw_desired, finish_
 from paraflex.plots.selection import moving_directions, of_point, one_run, point_label, run_label, select_run
 from paraflex.plots.style import keep_flat
 
-# Bodies of a symmetric mechanism whose tips move by the same within this share are shown once.
+# Ratio of peak tip displacements above which bodies count as twins of a symmetric mechanism and are shown once.
 _ALIKE = 0.9
-# Links whose motions a page holds in one column.
+# Largest number of links whose motions fit on a page in one column.
 _MOST_NARROW = 4
 
 
 @drawn
 def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = None) -> Figure:
-    """Axial and transverse displacement and slope of links' last ends from the tangents at their first ends (Fig. 13).
+    """Plot axial and transverse displacement and slope of the links' last ends over time (Fig. 13).
+
+    They are measured from the tangent at each link's first end.
 
     Parameters
     ----------
     bodies : sequence of str, optional
-        A row each; by default the two whose tips move most across, twins of a symmetric mechanism counted once.
+        Bodies, one row each; by default the two with the largest transverse tip displacements, twins of a symmetric
+        mechanism counted once.
     """
     run = select_run(data, mode)
-    # A link that does not bend has no panels unless it is asked for, or none does.
+    # A link that does not bend has no panels unless it is requested, or no link bends.
     chosen = [name for name in most_deflected(run) if _bends(run, name)] or most_deflected(run)[:1]
     chosen = chosen if bodies is None else list(bodies)
     for name in chosen:
@@ -61,7 +64,10 @@ def _bends(run: xr.Dataset, name: str) -> bool:
 
 
 def most_deflected(run: xr.Dataset) -> list[str]:
-    """Two bodies, in the order of the mechanism, with the largest transverse tip displacements that differ."""
+    """Return the two bodies with the largest transverse tip displacements, in the order of the mechanism.
+
+    Twins of a symmetric mechanism are counted once, unless there are no others.
+    """
     peaks = {str(name): peak(run["tip_transverse"].sel(body=name)) for name in run["body"].values}
     chosen: list[str] = []
     rest = dict(peaks)
@@ -76,7 +82,10 @@ def most_deflected(run: xr.Dataset) -> list[str]:
 
 @drawn
 def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Transverse displacement of links' last ends from the tangents at their first ends; at most the seven largest."""
+    """Plot transverse displacements of the links' last ends over time, at most the seven largest.
+
+    They are measured from the tangent at each link's first end.
+    """
     run = one_run(data, mode)
     across = run["tip_transverse"].transpose("time", "body").values
     if not peak(across):
@@ -90,7 +99,7 @@ def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 @drawn
 def joint_forces(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Magnitude of the force in every joint in time; if there are more than seven, the largest."""
+    """Plot the magnitude of the force in every joint over time; of more than seven, the seven largest."""
     run = one_run(data, mode)
     forces = np.linalg.norm(run["joint_force"].transpose("time", "joint", "axis").values, axis=2)
     return largest_over_time(data, run, forces, "joint", axis_label("force"))
@@ -98,9 +107,9 @@ def joint_forces(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 @drawn
 def link_motions(data: xr.Dataset, mode: str) -> Figure:
-    """Angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14).
+    """Plot angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14).
 
-    In one column those of the first four.
+    A figure of one column shows the first four links only.
     """
     columns = ("angle", "angular_velocity", "angular_acceleration")
     run, time = select_run(data, mode), data["time"].values
@@ -119,12 +128,12 @@ def link_motions(data: xr.Dataset, mode: str) -> Figure:
 
 @drawn
 def end_effector_motion(data: xr.Dataset, mode: str, point: str | None = None) -> Figure:
-    """Displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16).
+    """Plot displacement, velocity and acceleration of the end-effector in x and y, desired and actual (Fig. 16).
 
     Parameters
     ----------
     point : str, optional
-        "body.point" in place of the end-effector; it has no desired motion.
+        Point "body.point" in place of the end-effector; it has no desired motion.
     """
     run, time = of_point(select_run(data, mode), point), data["time"].values
     directions = moving_directions(run)

@@ -1,4 +1,4 @@
-"""Paths of the end-effector in the workspace (Figs. 11, 15)."""
+"""Figures of the end-effector's path in the workspace (Figs. 11, 15)."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from paraflex.plots.runs import START, draw_actual, draw_desired
 from paraflex.plots.selection import of_point, point_label, select_run
 from paraflex.plots.style import BLUE
 
-# Room round what is drawn, and the height of a panel beside its width, at least and at most.
+# Margin around the drawing as a share of its size, and smallest and largest ratio of a panel's height to its width.
 _MARGIN, _FLATTEST, _TALLEST = 0.06, 0.3, 1.3
-_TALLEST_WIDE = 0.75  # Over two columns.
+_TALLEST_WIDE = 0.75  # Largest ratio for a figure of two columns.
 # The largest deviation is shown as at most this share of the path's extent.
 _SHOWN_DEVIATION = 0.15
 
 
 @drawn
 def desired_path(data: xr.Dataset) -> Figure:
-    """The path the end-effector should follow, and the mechanism in its start pose (Fig. 11)."""
+    """Plot the desired path of the end-effector, and the mechanism in its start pose (Fig. 11)."""
     path = 1e3 * data["end_effector_desired"].isel(mode=0).transpose("time", "axis").values
     figure, axes = workspace_panel()
     axes.plot(*path.T, color=BLUE, linewidth=1.3, zorder=2.6, label="desired path")
@@ -44,14 +44,14 @@ def desired_path(data: xr.Dataset) -> Figure:
 def end_effector_path(
     data: xr.Dataset, mode: str, magnification: float | None = None, point: str | None = None
 ) -> Figure:
-    """Desired and actual path; the deviation from one to the other is drawn magnified (Fig. 15).
+    """Plot the desired and the actual path of the end-effector, with magnified deviation between them (Fig. 15).
 
     Parameters
     ----------
     magnification : float, optional
-        Of the deviation; by default the largest of 1, 2, 5, 10, ... that keeps it small beside the path.
+        Magnification of the deviation; by default the largest of 1, 2, 5, 10, ... that keeps it small beside the path.
     point : str, optional
-        "body.point" in place of the end-effector; it has no desired path, and its own is drawn as it is.
+        Point "body.point" in place of the end-effector; it has no desired path, and its own path is not magnified.
     """
     run = of_point(select_run(data, mode), point)
     if "end_effector_desired" in run:
@@ -71,7 +71,7 @@ def end_effector_path(
 def deviated_paths(
     runs: Mapping[str, xr.Dataset], magnification: float | None, looks: Sequence[Mapping[str, Any]] = ({},)
 ) -> Figure:
-    """Paths of the end-effector in runs with one desired path, by their labels, deviations magnified alike."""
+    """Plot the paths of the end-effector in runs with a common desired path, by label, with one magnification."""
     first = next(iter(runs.values()))
     desired = 1e3 * first["end_effector_desired"].transpose("time", "axis").values
     deviations = [1e3 * run["end_effector"].transpose("time", "axis").values - desired for run in runs.values()]
@@ -92,7 +92,10 @@ def deviated_paths(
 
 
 def round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
-    """Largest of 1, 2, 5, 10, ... that keeps the deviation [mm] small against a path of this extent [mm]."""
+    """Return the largest of 1, 2, 5, 10, ... that keeps a deviation small relative to the extent of the path [mm].
+
+    It is 1 if the deviation is negligible.
+    """
     lengths = np.linalg.norm(deviation, axis=1)
     largest = peak(lengths)
     if not largest > 1e-9 * extent:
@@ -105,7 +108,7 @@ def round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
 
 
 def workspace_panel() -> tuple[Figure, Axes]:
-    """A figure of the plane, and its panel, with equal scales in mm."""
+    """Create a figure of the plane with one panel, with equal scales in mm."""
     figure, axes = panels(1, 1, width=ONE_COLUMN)
     panel: Axes = axes[0, 0]
     panel.set_aspect("equal")
@@ -115,7 +118,7 @@ def workspace_panel() -> tuple[Figure, Axes]:
 
 
 def _draw_direction(axes: Axes, path: NDArray[np.float64]) -> None:
-    """Arrow heads along a path at an eighth, three, five and seven eighths of its length."""
+    """Draw arrow heads along a path at one, three, five and seven eighths of its length."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     if travelled[-1] == 0.0:
         return
@@ -131,7 +134,7 @@ def _draw_direction(axes: Axes, path: NDArray[np.float64]) -> None:
 
 
 def finish_workspace(figure: Figure, axes: Axes) -> Figure:
-    """Set the limits, with a margin for a path that is a line or a point, and lay the figure out."""
+    """Set the limits, with a margin and a minimum size for a path that is a line or a point, and lay out the figure."""
     box = axes.dataLim
     width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
     width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0

@@ -1,4 +1,4 @@
-"""Reports: one HTML file with tables, interactive charts and the mechanism in motion."""
+"""Reports of results: one HTML file with tables, interactive charts and an animation of the mechanism."""
 
 from paraflex.report.film import Animation as Animation, animation as animation
 from paraflex.report.linear import linear_page as linear_page

@@ -1,4 +1,4 @@
-"""The runs of many that a report shows in motion, and those that it draws."""
+"""Choice of the runs of a study that a report shows in motion, and of those that it draws in charts."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from numpy.typing import NDArray
 from paraflex.plots.designs import DesignTable, in_conflict, undominated
 from paraflex.report.designs import metric_name
 
-# Most rows drawn; most runs in motion, the best of the first metric and of the front included.
+# Largest number of rows drawn and of runs in motion; numbers of the latter that are best in the first metric, and that
+# are on the front.
 MOST_ROWS, MOST_RUNS, _BEST, _FRONT = 5000, 8, 3, 2
-# Metrics whose fronts are kept whatever is left out.
+# Number of metrics whose fronts are always kept.
 _FRONTS = 8
 
 
 class Picked(NamedTuple):
-    """A run shown in motion, and the metrics in which it is best."""
+    """Run shown in motion: its row, and the metrics in which it is best."""
 
     row: int
     why: tuple[str, ...]
 
 
 def best_runs(designs: DesignTable) -> list[Picked]:
-    """Runs to show in motion: best designs by the first metric, the best by each other, some of the front of two.
+    """Choose the runs to show in motion, at most eight; smaller metrics are better.
 
-    Three by the first metric, the best by it of each mode, up to two from the middle of the front, eight in all at
-    most; less is better.
+    They are the three best designs by the first metric, the best one by it of each mode, up to two from the middle of
+    the Pareto front of two metrics, and the best by each other metric.
     """
     judged = designs.judged
     if not judged:
@@ -57,9 +58,9 @@ def best_runs(designs: DesignTable) -> list[Picked]:
 
 
 def drawn_rows(designs: DesignTable, kept: Sequence[int], most: int = MOST_ROWS) -> NDArray[np.intp]:
-    """Rows that are drawn: all complete ones, or if there are too many a random sample.
+    """Return the rows to draw: all complete ones or, of more than `most`, a random sample.
 
-    Kept whatever is left out are the rows named and the fronts of every two of the first metrics.
+    The sample always includes the rows `kept` and the fronts of each pair of the first metrics.
     """
     complete = np.flatnonzero(designs.complete)
     if complete.size <= most:
@@ -69,7 +70,7 @@ def drawn_rows(designs: DesignTable, kept: Sequence[int], most: int = MOST_ROWS)
     for two in [tuple(pair), *combinations(names, 2)]:
         if len(two) == 2 and len(chosen) < most:
             chosen |= dict.fromkeys(int(row) for rows in fronts(designs, *two) for row in rows)
-    # The default front is the first of those kept.
+    # The default front comes first, so it is kept if there are too many.
     held = np.array(list(chosen)[:most], dtype=np.intp)
     others = np.setdiff1d(complete, held)
     lot = np.random.default_rng(0).choice(others, size=most - held.size, replace=False)
@@ -77,7 +78,7 @@ def drawn_rows(designs: DesignTable, kept: Sequence[int], most: int = MOST_ROWS)
 
 
 def fronts(designs: DesignTable, across: str, up: str) -> list[NDArray[np.intp]]:
-    """Rows of each path and mode that no other row dominates in two metrics."""
+    """Return the rows of each path and mode that no other row dominates in two metrics."""
     x, y = designs.metrics[across], designs.metrics[up]
     out = []
     for path, mode in designs.series:
@@ -88,7 +89,7 @@ def fronts(designs: DesignTable, across: str, up: str) -> list[NDArray[np.intp]]
 
 
 def _least(designs: DesignTable, metric: str) -> list[int]:
-    """Rows by a metric, the least first, the best of every design only."""
+    """Return the best row of every design, sorted by a metric, the smallest first."""
     values = np.where(designs.complete, designs.metrics[metric], np.inf)
     order = np.argsort(values, kind="stable")
     order = order[np.isfinite(values[order])]
@@ -97,14 +98,14 @@ def _least(designs: DesignTable, metric: str) -> list[int]:
 
 
 def _least_of_series(designs: DesignTable, metric: str) -> dict[str, int]:
-    """The row with the least of a metric for each path and mode, if there are several."""
+    """Return the row with the smallest metric for each path and mode, if there are several of these."""
     out = {}
     pairs = list(designs.series)
     for path, mode in pairs if len(pairs) > 1 else []:
         own = (designs.path == path) & (designs.mode == mode) & designs.complete
         values = np.where(own, designs.metrics[metric], np.inf)
         if np.isfinite(values).any():
-            # Word joiners: signs of a mode stay on one line.
+            # Word joiners keep the signs of a mode on one line.
             signs = "\u2060".join(mode)
             name = signs if len({one[0] for one in pairs}) == 1 else f"{signs} {path}"
             out[name] = int(np.nanargmin(values))
@@ -112,7 +113,7 @@ def _least_of_series(designs: DesignTable, metric: str) -> dict[str, int]:
 
 
 def _knees(designs: DesignTable, across: str, up: str) -> list[int]:
-    """The runs of the front nearest the corner of both least values, scaled by the front's extent."""
+    """Return the inner runs of the front nearest to the corner of both minima, in units of the front's extent."""
     x, y = (np.where(designs.complete, designs.metrics[name], np.nan) for name in (across, up))
     known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     front = known[undominated(x[known], y[known])]

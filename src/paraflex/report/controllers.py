@@ -1,4 +1,4 @@
-"""Controllers of a run on its page: a table of what they are, charts of what they did."""
+"""Controllers in the report of a run: a table of their settings, and charts of torques and readings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from paraflex.results.controllers import (
 
 
 def controller_tables(data: xr.Dataset) -> list[tuple[str, str]]:
-    """A title and the table of controllers, one row for each in each mode; none of results without them."""
+    """Return a title and the table of controllers, one row for each in each mode; empty if there are none."""
     modes = names_of(data, "mode") if "mode" in data.dims else [""]
     figures = {mode: controller_figures(data.sel(mode=mode) if mode else data) for mode in modes}
     rows = [(mode, name, one) for mode in modes for name, one in figures[mode].get(CONTROLLERS, {}).items()]
@@ -56,7 +56,7 @@ def controller_tables(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _internal(figures: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
-    """Modes with controllers, and the largest internal torque of each in words."""
+    """Yield the modes with controllers, and the largest internal torque of each in words."""
     for mode, one in figures.items():
         if CONTROLLERS in one and one.get("internal_torque_max") is not None:
             efforts = [each["given_max"] or 0.0 for of in one[CONTROLLERS].values() for each in of["torques"].values()]
@@ -64,7 +64,7 @@ def _internal(figures: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, s
 
 
 def _limits(torques: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Limits in words: once where all motors have the same."""
+    """Return the limits in words, only once if they are the same for all motors."""
     words = {}
     for motor, one in torques.items():
         bounds = [one["lowest"], one["highest"]]
@@ -85,7 +85,7 @@ def _largest(torques: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def controller_panels(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
-    """Charts over time of runs (run, ...): torques and readings of every controller; none of results without them."""
+    """Return charts over time of runs (run, ...): torques and readings of every controller; empty if there are none."""
     charts = [chart for one in controllers_of(data) for chart in _charts(one, runs)]
     return [Panel("Controllers", charts)] if charts else []
 
@@ -122,5 +122,5 @@ def _charts(one: ControllerData, runs: Sequence[str]) -> Iterator[Chart]:
 
 
 def _stairs(times: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Corners of values that stay until the next one."""
+    """Return the corners of the step curve of values that are held until the next one."""
     return np.repeat(times, 2)[1:], np.repeat(values, 2)[:-1]

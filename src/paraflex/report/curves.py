@@ -1,4 +1,4 @@
-"""Charts that several reports have: families of curves by run and by part of the mechanism."""
+"""Charts common to several reports: families of curves by run and by part of the mechanism."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from paraflex.plots.selection import names_of
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.page import Chart, Curve, Look
 
-# Numbers of colours and dashes of the page, the solid line included.
+# Numbers of colours and of dashes of the page; the latter include the solid line.
 N_COLOURS, N_DASHES = 8, 5
 DOTTED = 2
 MOST_SAMPLES = 2000
-# Share of its median from which on a curve that begins at zero is drawn on a logarithmic axis.
+# Share of its median above which a curve that begins at zero is drawn on a logarithmic axis.
 _RISEN = 0.01
-# Charts without their curves. A deflection is from a link's chord, which displacements of ends are not.
+# Charts without their curves. Displacements of ends differ from deflections, which are measured from a link's chord.
 ERRORS = Chart(
     "errors", "Tracking error", "distance", log=True, note="Distance of the end-effector from its desired place."
 )
@@ -32,58 +32,64 @@ TIPS = Chart(
 
 
 def look(k: int) -> Look:
-    """Colour and dash of the k-th of many curves, all different; few differ in colour."""
+    """Return colour and dash of the k-th curve; up to 40 curves differ, and up to eight of them in colour."""
     return Look(k % N_COLOURS, (k % N_COLOURS + k // N_COLOURS) % N_DASHES)
 
 
 def labelled(label: str, unit: str) -> str:
-    """The label of an axis with its unit, if it has one."""
+    """Return the label of an axis, with its unit if it has one."""
     return label if unit in ("1", "") else f"{label} [{unit}]"
 
 
 def largest(values: NDArray[np.float64]) -> float:
-    """Largest finite magnitude; NaN if there is none."""
+    """Return the largest finite magnitude; NaN if there is none."""
     magnitudes = np.abs(values[np.isfinite(values)])
     return float(magnitudes.max()) if magnitudes.size else float("nan")
 
 
 def energy_scale(data: xr.Dataset) -> float:
-    """Largest energy or work of all runs [J], which imbalances are differences of."""
+    """Return the largest energy or work of all runs [J], the scale for the rounding of energy imbalances."""
     return max((largest(data[name].values) for name in ("kinetic_energy", "strain_energy", "work") if name in data),
                key=np.nan_to_num, default=0.0)  # fmt: skip
 
 
 def errors(data: xr.Dataset) -> xr.DataArray:
-    """Distance of the end-effector from its desired place [m]; dimensions like those of the runs, time last."""
+    """Return the distance of the end-effector from its desired position [m], over the dimensions of runs and time."""
     gaps = (data["end_effector"] - data["end_effector_desired"]).transpose(..., "axis")
     return gaps.reduce(np.linalg.norm, "axis").assign_attrs(units="m")
 
 
 def torque_unit(data: xr.Dataset) -> str:
-    """Unit of the motors: "N m", or "N" for those that slide."""
+    """Return the unit of motor efforts: "N m", or "N" for linear motors."""
     return str(data["torque"].attrs.get("units", "N m"))
 
 
 def torque_chart(data: xr.Dataset) -> Chart:
-    """The chart of torques, without its curves."""
+    """Return the chart of motor torques, without its curves."""
     quantity = "force" if torque_unit(data) == "N" else "torque"
     return Chart("torques", f"Motor {quantity}s", quantity, choosing="motor")
 
 
 def bending(data: xr.Dataset, name: str = "tip_transverse") -> xr.DataArray:
-    """Displacements of the ends of flexible links."""
+    """Return the displacements of the ends of links that bend."""
     bent = [largest(data["tip_transverse"].sel(body=body).values) > 0.0 for body in data["body"].values]
     return data[name].isel(body=np.flatnonzero(bent))
 
 
 def deflections_of(data: xr.Dataset) -> NDArray[np.float64]:
-    """Deflections of links from their chords (..., time, body); for earlier results those of their ends."""
+    """Return magnitudes of the deflections of links from their chords (..., time, body).
+
+    For results of earlier versions they are the transverse displacements of the links' ends.
+    """
     name = "deflection" if "deflection" in data else "tip_transverse"
     return np.abs(data[name].transpose(..., "time", "body").values)
 
 
 def joint_force_curves(force: NDArray[np.float64], x: NDArray[np.float64] | None = None) -> list[Curve]:
-    """Magnitude and components of forces (joints, samples, 2), one joint at a time; over x, by default the time."""
+    """Return curves of magnitude and components of forces (joints, samples, 2), one choice per joint.
+
+    They are drawn over `x`, by default the time.
+    """
     curves = []
     for j, one in enumerate(force):
         parts = (("magnitude", np.linalg.norm(one, axis=-1)), ("x", one[:, 0]), ("y", one[:, 1]))
@@ -99,19 +105,20 @@ def followed(
     desired: xr.DataArray | None = None,
     selecting: str = "mode",
 ) -> Chart:
-    """Curves over time of the selected run, one for each part; or of one part in all runs, if there are more.
+    """Return a chart of curves over time: all parts in the selected run or, by choice, one part in all runs.
 
     Parameters
     ----------
     chart : Chart
-        Without curves and unit.
+        Chart without curves and unit.
     values : (runs, samples, parts) DataArray
-        In the unit that its attributes name; its last dimension names the parts.
+        Values in the unit given by their attributes; the last dimension names the parts.
     runs : sequence of str
+        Names of the runs.
     desired : (samples, parts) DataArray, optional
-        Drawn dotted.
+        Desired values, drawn dotted.
     selecting : str
-        What a run is called.
+        Noun for a run on the page.
     """
     parts = names_of(values, str(values.dims[-1]))
     unit = display_unit(values.attrs["units"], values.values)
@@ -137,7 +144,7 @@ def followed(
 
 
 def compared(chart: Chart, values: xr.DataArray, runs: Sequence[str]) -> Chart:
-    """A quantity (runs, samples) over time in all runs, in a chart without curves and unit."""
+    """Return a chart of a quantity (runs, samples) over time in all runs, from a chart without curves and unit."""
     unit = display_unit(values.attrs["units"], values.values)
     shown = [unit.factor * (risen(one) if chart.log else one) for one in values.values]
     curves = [Curve(run, shown[r], run=r, look=look(r)) for r, run in enumerate(runs)]
@@ -145,14 +152,17 @@ def compared(chart: Chart, values: xr.DataArray, runs: Sequence[str]) -> Chart:
 
 
 def risen(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A positive curve without its rise from zero, which a logarithmic axis would show as many decades."""
+    """Return a positive curve with NaN during its initial rise from zero, which would span many decades."""
     known = values[np.isfinite(values)]
     enough = np.nan_to_num(values) >= _RISEN * (float(np.median(known)) if known.size else 0.0)
     return np.where(np.arange(values.size) >= np.argmax(enough), values, np.nan)
 
 
 def plane_path(data: xr.Dataset, runs: Sequence[str], *, common: bool = True) -> Chart:
-    """Paths of the end-effector, deviations also magnified, and the desired path: common, or one per run."""
+    """Return a chart of the end-effector's paths, with magnified deviations, and the desired path.
+
+    The desired path is common to all runs, or there is one per run.
+    """
     actual, desired = (1e3 * data[name].values for name in ("end_effector", "end_effector_desired"))
     curves = []
     for r in range(len(runs)):
@@ -169,7 +179,7 @@ def plane_path(data: xr.Dataset, runs: Sequence[str], *, common: bool = True) ->
 
 
 def energies(data: xr.Dataset, runs: Sequence[str]) -> Chart:
-    """Kinetic and strain energy and work of the selected run."""
+    """Return a chart of kinetic and strain energy and work of the selected run."""
     names = {"kinetic_energy": "kinetic", "strain_energy": "strain", "work": "work done on it"}
     curves = [
         Curve(label, data[name].values[r], run=r, shown=(r,), look=look(k))
@@ -180,7 +190,7 @@ def energies(data: xr.Dataset, runs: Sequence[str]) -> Chart:
 
 
 def thinned(data: xr.Dataset) -> xr.Dataset:
-    """Every n-th sample, if there are more than a chart can show."""
+    """Return every n-th sample if there are more than a chart can show."""
     return data.isel(time=slice(None, None, max(1, -(-data.sizes["time"] // MOST_SAMPLES))))
 
 

@@ -1,4 +1,4 @@
-"""Runs of many designs: their numbers as columns of a page, reasons of failures."""
+"""Runs of many designs in a report: their numbers as columns of the page, and reasons for failures."""
 
 from __future__ import annotations
 
@@ -13,27 +13,29 @@ from paraflex.plots.labels import display_unit, text_symbol
 from paraflex.report.page import DesignColumn
 from paraflex.results.metrics import metric_label
 
-# Reasons of failures that are listed.
+# Largest number of listed reasons for failures.
 _MOST_REASONS = 12
 _COMPLETE = "complete"
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-# A metric with this ratio of values has a logarithmic axis, as has a logarithmic range.
+# Ratio of values above which a metric has a logarithmic axis, and the same for a parameter with a logarithmic range.
 _WIDE, _WIDE_RANGE = 50.0, 10.0
 
 
 def columns(
     designs: DesignTable, rows: NDArray[np.intp], units: Mapping[str, str], logarithmic: Sequence[str]
 ) -> list[DesignColumn]:
-    """Parameters that differ and metrics of some rows, for the page.
+    """Return the columns of a page: parameters that vary, and metrics.
 
     Parameters
     ----------
     designs : DesignTable
+        Table of all runs.
     rows : array of int
+        Rows to include.
     units : mapping of str to str
-        Of parameters.
+        Units of the parameters.
     logarithmic : sequence of str
-        Parameters whose range is.
+        Parameters with a logarithmic range.
     """
     judged = designs.judged
     out = []
@@ -57,7 +59,7 @@ def columns(
 
 
 def shown_unit(unit: str, values: NDArray[np.float64]) -> tuple[str, float]:
-    """The unit for display, and the factor of values; "" for numbers without unit."""
+    """Return the unit for display, empty for dimensionless numbers, and the factor of the values."""
     if unit in ("", "1"):
         return "", 1.0
     name, factor = display_unit(unit, values)
@@ -65,12 +67,15 @@ def shown_unit(unit: str, values: NDArray[np.float64]) -> tuple[str, float]:
 
 
 def metric_name(metric: str) -> str:
-    """Label of a metric: "RMS tracking error"; "peak torque of τ₁" for a metric of one motor."""
+    """Return the label of a metric: "RMS tracking error"; "peak torque of τ₁" for a metric of one motor."""
     return metric_label(metric, text_symbol)
 
 
 def reasons(designs: DesignTable) -> list[tuple[str, str, int]]:
-    """Reasons why runs are not complete: status, an example, and the number of reasons alike but for numbers."""
+    """Return the reasons why runs are not complete: status, an example, and the number of such runs.
+
+    Reasons that differ only in their numbers are counted together.
+    """
     groups: dict[tuple[str, str], list[str]] = {}
     for status, reason in zip(designs.status.tolist(), designs.reason.tolist(), strict=True):
         if status != _COMPLETE:
@@ -82,6 +87,6 @@ def reasons(designs: DesignTable) -> list[tuple[str, str, int]]:
 
 
 def is_wide(values: NDArray[np.float64], share: float = _WIDE) -> bool:
-    """Whether positive values differ by more than a factor, by default that of logarithmic axes."""
+    """Return whether all values are positive and their ratio exceeds `share`, by default that of logarithmic axes."""
     known = values[np.isfinite(values)]
     return bool(known.size and known.min() > 0.0 and known.max() > share * known.min())

@@ -1,4 +1,4 @@
-"""The animation of a page: scenes of all its runs for the player, in some hundred frames."""
+"""Animation of a page: scenes of all its runs for the player, in at most `MOST_FRAMES` frames."""
 
 from __future__ import annotations
 
@@ -37,28 +37,28 @@ NO_SHAPES = (
 
 @dataclass(frozen=True)
 class Animation:
-    """Frames of all runs; drawn magnified by m, a body is at `base + m (shape - base)`, and so is a symbol.
+    """Frames of all runs; with magnification m, bodies and symbols are drawn at `base + m (shape - base)`.
 
     Attributes
     ----------
     time : (frames,) array
-        [s]
+        Times of the frames [s].
     shape, base : (runs, frames, stations, 2) arrays
-        Drawn points of all bodies, and where they were if nothing bent [m].
+        Stations of all bodies, deformed and undeformed [m].
     bodies : sequence of (str, int, int)
-        Name, first station and the one after the last.
+        Name of each body, its first station, and the one after its last.
     scenes : sequence of Scene or None
-        Of each run, with its true deflections; none of a run without a sample.
+        Scene of each run with true deflections; None for a run without a sample.
     stiff : sequence of Scene or None
-        The same without deflections, of runs whose joints are elsewhere then.
+        Scene of each run without deflections; None if its joints are at the same positions.
     path : (samples, 2) or (runs, samples, 2) array, optional
-        Where the end-effector should go [m], in all runs or in each.
+        Desired path of the end-effector [m], common to all runs or one for each.
     magnify : float
-        How many times deflections are drawn at first.
+        Initial magnification of deflections.
     periodic : bool
-        Whether it is a turn of something that comes again and again: its time is shown as a phase.
+        Whether the frames are one period of a repeated motion; the time is then shown as a phase.
     moments : sequence of str
-        What is shown in place of the time of each frame, of frames that are no instants.
+        Text for each frame in place of its time, for frames that are not instants.
     """
 
     time: Array
@@ -73,7 +73,7 @@ class Animation:
     moments: Sequence[str] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """The animation in plain values for JSON."""
+        """Return the animation as plain values for JSON."""
         known = [one for one in self.scenes if one is not None]
         limits = common_limits(known) if known else Limits(-1.0, 1.0, -1.0, 1.0)
         shown = next((k for k, one in enumerate(self.scenes) if one is not None), 0)
@@ -82,7 +82,7 @@ class Animation:
             "time": self.time.tolist(),
             "base": packed(self.base),
             "bend": packed(self.shape - self.base),
-            # Where lines end, and whether they are filled.
+            # Name, range of stations, and whether the figure is filled.
             "bodies": [
                 [name, first, first + figure.shape[1], is_plate(figure[0])]
                 for (name, first, _), figure in zip(self.bodies, figures, strict=True)
@@ -93,11 +93,11 @@ class Animation:
             "moments": list(self.moments),
             "marks": [one and [_marks(still_marks(one, limits), 1), _marks(moving_marks(one, limits), self.time.size)]
                       for one in self.scenes],
-            # How far the moving symbols are from where they were if nothing bent.
+            # Displacements of the moving symbols from their undeformed positions.
             "swing": [None if one is None or stiff is None else _swing(one, stiff, limits)
                       for one, stiff in zip(self.scenes, self.stiff, strict=True)],
             "dot": DOT * limits.size,
-            # Arrows of the largest force and torque: line, head, size.
+            # Key arrows of the largest force and torque: line, head, text.
             "keys": [one and [[*(part.ravel().tolist() for part in key_arrow(kind, limits)), text]
                               for kind, text in one.load_keys.items()] for one in self.scenes],
             "tips": [one and one.followed for one in self.scenes],
@@ -107,7 +107,7 @@ class Animation:
 
 
 def _marks(marks: list[Mark], frames: int) -> dict[str, Any]:
-    """Looks and names of symbols, the indices of their places, and the places."""
+    """Return looks and names of symbols, the ranges of their points, and the points."""
     ends = np.cumsum([0, *(mark.places.shape[1] for mark in marks)]).tolist()
     pieces = [[mark.look, mark.name, first, end] for mark, first, end in zip(marks, ends, ends[1:], strict=False)]
     places = np.concatenate([np.zeros((frames, 0, 2)), *(mark.places for mark in marks)], axis=1)
@@ -115,13 +115,13 @@ def _marks(marks: list[Mark], frames: int) -> dict[str, Any]:
 
 
 def _swing(one: Scene, stiff: Scene, limits: Limits) -> dict[str, Any]:
-    """Places of the moving symbols less those without deflections."""
+    """Return the positions of the moving symbols minus those without deflections."""
     pairs = zip(moving_marks(one, limits), moving_marks(stiff, limits), strict=True)
     return packed(np.concatenate([bent.places - still.places for bent, still in pairs], axis=1)[None])
 
 
 def animation(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Animation | None:
-    """The animation of a dataset with runs along these dimensions; None if it has no shapes."""
+    """Return the animation of a dataset with runs along these dimensions; None if it has no shapes."""
     if any(name not in data for name in _SHAPES):
         return None
     few = data.isel(time=frames_of(data.sizes["time"]))
@@ -148,19 +148,19 @@ def animation(data: xr.Dataset, dims: Sequence[str] = ("mode",)) -> Animation | 
 
 
 def frames_of(samples: int, most: int = MOST_FRAMES) -> NDArray[np.intp]:
-    """Indices of at most a number of samples, the first and the last among them."""
+    """Return the indices of at most `most` samples, evenly spaced, including the first and the last."""
     return np.unique(np.rint(np.linspace(0, samples - 1, min(samples, most))).astype(np.intp))
 
 
 def _runs(values: xr.DataArray, dims: Sequence[str]) -> Array:
-    """Values (runs, ...): the dimensions of runs merged into one, which a single run does not have."""
+    """Return values (runs, ...) with the dimensions of runs merged into one; a single run has a first axis as well."""
     rest = [dim for dim in values.dims if dim not in dims]
     array = np.asarray(values.transpose(*dims, *rest).values, dtype=float)
     return array.reshape(-1, *array.shape[len(dims) :])
 
 
 def _swings(run: xr.Dataset) -> bool:
-    """Whether joints are elsewhere where nothing bends."""
+    """Return whether deflections move joints from their undeformed positions or directions."""
     return any(base in run and bool((run[name] != run[base]).where(run[name].notnull(), False).any())
                for name, base in JOINT_BASES.items())  # fmt: skip
 

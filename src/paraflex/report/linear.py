@@ -1,4 +1,4 @@
-"""The report of linear models: mode shapes in motion, gains, poles and zeros."""
+"""Report of linear models: animated mode shapes, gains, poles and zeros."""
 
 from __future__ import annotations
 
@@ -40,24 +40,24 @@ from paraflex.results.linear_summary import (
 
 Complex = NDArray[np.complex128]
 
-# Frames of a period, which takes so long [s].
+# Number of frames of a period, and its duration [s].
 _FRAMES, _PERIOD = 33, 2.0
-# Oscillations and zeros of a table's row; linear.json has all.
+# Largest numbers of oscillations and zeros in a row of a table; linear.json has all.
 _OSCILLATIONS, _ROOTS = 6, 6
 _ROUNDING = 1e-7
-# Poles below this part of what is shown are zero; so many decades are numbered each.
+# Share of the largest shown magnitude below which poles are zero, and largest number of decades that are all numbered.
 _NOTHING, _DECADES = 1e-9, 4
 
 
 @checked_arguments()
 def linear_page(data: xr.Dataset) -> Page:
-    """The report of linear models from `results.linear_dataset`."""
+    """Return the report of linear models, a dataset from `results.linear_dataset`."""
     check_kind(data, "linear")
     drawn = list(drawn_modes(data))
     groups: dict[str, int] = {}
     for one in drawn:
         groups[_group(one)] = groups.get(_group(one), 0) + 1
-    # The first that vibrates with motors held, where there is one.
+    # The first mode shape that vibrates with motors held, if there is one, is selected.
     mode = default_mode(data)
     wanted = [k for k, one in enumerate(drawn) if one.frequency > 0.0 and one.holding == "held" and one.mode == mode]
     of_maps = [chart for name in names_of(data, "map") for chart in (_gain_chart(data, name), _map_chart(data, name))]
@@ -90,7 +90,7 @@ def _name(one: DrawnMode) -> str:
 
 
 def _film(data: xr.Dataset, drawn: Sequence[DrawnMode]) -> Animation | None:
-    """A turn of every mode shape."""
+    """Return the animation of one period of every mode shape; None if there are none."""
     if not drawn:
         return None
     phases = np.linspace(0.0, 2.0 * np.pi, _FRAMES)
@@ -120,7 +120,7 @@ def _facts(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _command(run: dict[str, Any]) -> str:
-    """The command that gives these models again; empty if it is not known."""
+    """Return the command that reproduces these models; empty if it is not known."""
     if not run.get("linearise"):
         return ""
     words = ["paraflex", "linearise", *([run["results"]] if "results" in run else model_words(run))]
@@ -128,7 +128,7 @@ def _command(run: dict[str, Any]) -> str:
         words += repeated(flag, run.get(name))
     for name in ("pose", "at", "along", "path", "assembly", "coordinates"):
         if name in run:
-            # A place may begin with a minus.
+            # A value may begin with a minus.
             words += [f"--{name}={run[name]}"] if str(run[name]).startswith("-") else [f"--{name}", str(run[name])]
     return shlex.join([*words, *(["--balanced"] if run.get("balanced") else [])])
 
@@ -151,7 +151,7 @@ def _tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
 
 
 def _frequencies(data: xr.Dataset) -> str:
-    """Frequencies and damping ratios of all modes, motors free and held."""
+    """Return the table of frequencies and damping ratios of all modes, motors free and held."""
     modes, common = names_of(data, "mode"), common_poles(data)
     rows: list[tuple[str, Complex]] = []
     for holding in HOLDINGS:
@@ -176,7 +176,7 @@ def _frequencies(data: xr.Dataset) -> str:
 
 
 def _zero_tables(data: xr.Dataset) -> list[tuple[str, str]]:
-    """Zeros of every map, a row for each mode."""
+    """Return the tables of the zeros of every map, a row for each mode."""
     out = []
     for name in names_of(data, "map"):
         rows = []
@@ -197,7 +197,7 @@ def _zero_tables(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _gain_chart(data: xr.Dataset, name: str) -> Chart:
-    """Largest and least gain over frequency."""
+    """Return the chart of the largest and the smallest gain over frequency."""
     curves = []
     for k, mode in enumerate(names_of(data, "mode")):
         gains = gains_of(data, mode, name)
@@ -212,7 +212,7 @@ def _gain_chart(data: xr.Dataset, name: str) -> Chart:
 
 
 def _map_chart(data: xr.Dataset, name: str) -> Chart:
-    """Poles and zeros on symmetrical logarithmic axes."""
+    """Return the chart of poles and zeros on symmetrical logarithmic axes."""
     most = 2.0 * np.pi * float(data["frequency"].values[-1])
     modes, common = names_of(data, "mode"), common_poles(data)
     series = [(f"zeros, {mode}", zeros_of(data, mode, name), look(k), "ring") for k, mode in enumerate(modes)]
@@ -242,9 +242,9 @@ def _complex(value: complex) -> str:
 
 
 def _plane(place: Callable[[NDArray[np.float64]], NDArray[np.float64]], least: float, most: float) -> dict[str, Any]:
-    """Numbers of both axes, every decade or every other, and the right half plane shaded."""
+    """Return Plotly's layout of both axes, numbered every decade or every other, with the right half plane shaded."""
     count = int(np.ceil(np.log10(most / least))) + 1
-    # The numbers next to zero would touch it.
+    # The first decade has no number because it would touch that of zero.
     decades = least * 10.0 ** np.arange(1, count, 1 if count <= _DECADES else 2)
     ticks, end = np.concatenate([-decades[::-1], [0.0], decades]), float(place(np.array(2.0 * most)))
     axis = {"tickvals": place(ticks).tolist(), "ticktext": [f"{one:g}".replace("-", "−") for one in ticks],
@@ -255,7 +255,7 @@ def _plane(place: Callable[[NDArray[np.float64]], NDArray[np.float64]], least: f
 
 
 def _branch_charts(data: xr.Dataset) -> list[Chart]:
-    """Poles along the motion, as branches."""
+    """Return the charts of pole branches along the motion; empty for models about one instant."""
     if "branch_real" not in data:
         return []
     chosen = [(mode, holding) for mode in names_of(data, "mode") for holding in HOLDINGS]

@@ -1,4 +1,4 @@
-"""Loads and stresses of a run on its page: tables of the largest, charts over time."""
+"""Loads and stresses in the report of a run: tables of the largest values, and charts over time."""
 
 from __future__ import annotations
 
@@ -17,24 +17,26 @@ from paraflex.results.loads import error_text, load_figures, ranked, sliding_joi
 from paraflex.results.sensors import sensor_groups
 from paraflex.units import STRESS, speed_text
 
-# Prescribed motions with a tile of their own.
+# Largest number of prescribed motions with a tile.
 _MOST_TILES = 2
-# Tables with more rows than that show the beam with the largest stress of each mode.
+# Number of rows above which the table of stresses shows only the beam with the largest stress of each mode.
 _MOST_ROWS = 40
-# And tables of motors or joints with more rows in all modes are those of one mode.
+# Number of rows in all modes above which tables of motors or joints show only one mode.
 _MOST_ROWS_OF_MODES = 200
 
 
 def load_tables(data: xr.Dataset, selected: str = "") -> list[tuple[str, str]]:
-    """Titles and tables: stresses of beams, efforts of motors and drives, joints and ground; none of earlier results.
+    """Return titles and tables of stresses of beams, efforts of motors and drives, loads of joints and ground.
 
-    Tables of motors and joints follow the page's choice of a mode; paper has those of all modes.
+    Results of earlier versions have none. Tables of motors and joints follow the mode selected on the page; a printed
+    page has those of all modes.
 
     Parameters
     ----------
     data : xarray.Dataset
+        Results of a run.
     selected : str
-        The mode whose motors and joints are shown where there are too many of all modes; without modes empty.
+        Mode whose motors and joints are shown if those of all modes are too many; empty (default) without modes.
     """
     modes = names_of(data, "mode") if "mode" in data.dims else [""]
     figures = {mode: load_figures(data.sel(mode=mode) if mode else data) for mode in modes}
@@ -53,7 +55,7 @@ def load_tables(data: xr.Dataset, selected: str = "") -> list[tuple[str, str]]:
 
 
 def _of_modes(modes: Sequence[str], selected: str, rows: int, html: Callable[[str], str]) -> str:
-    """A table of every mode, or of the selected one where all of them have too many rows."""
+    """Return the tables of all modes, or that of the selected one if there are too many rows."""
     if len(modes) == 1:
         return html(modes[0])
     if rows <= _MOST_ROWS_OF_MODES:
@@ -63,7 +65,7 @@ def _of_modes(modes: Sequence[str], selected: str, rows: int, html: Callable[[st
 
 
 def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, str]]:
-    """The numbers a designer asks first: largest stress, efforts of prescribed motions, largest joint force."""
+    """Return the tiles of the main loads: largest stress, efforts of prescribed motions, largest joint force."""
     tiles = []
     if stresses := ranked(figures, "beams", "stress_max"):
         most, run, body, one = stresses[0]
@@ -137,7 +139,7 @@ def _factor(one: Mapping[str, float | None]) -> str:
 
 
 def _efforts(efforts: Mapping[str, Mapping[str, Any]]) -> str:
-    """Units stand in the head where all rows have the same, else in the rows."""
+    """Return the table of efforts; units are in the head if they are common to all rows, else in the rows."""
     kinds = {(one["torque_unit"], one["speed_unit"]) for one in efforts.values()}
     same = len(kinds) == 1 and None not in min(kinds)
     units = [f"[{unit}]" for unit in kinds.pop()] if same else ["", ""]
@@ -158,7 +160,10 @@ def _efforts(efforts: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _joints(figures: Mapping[str, Any]) -> str:
-    """A table of the joints that turn and one of those that slide: angles and travels are not in one column."""
+    """Return the tables of rotating joints, of sliding joints, and of the loads on the ground.
+
+    Angles and travels have separate tables because their units differ.
+    """
     joints = figures.get("joints", {})
     wide = {key: max((one[key] or 0.0 for one in joints.values()), default=0.0) for key in ("force_max", "moment_max")}
     out = ""
@@ -192,9 +197,9 @@ def _joints_of(joints: Mapping[str, Mapping[str, Any]], unit: str, what: str, wi
 
 
 def load_panel(data: xr.Dataset, runs: Sequence[str], selecting: str = "mode") -> list[Panel]:
-    """Charts over time of runs (run, time, ...): stresses, joints, drives, ground, sensors; none of earlier results.
+    """Return charts over time of runs (run, time, ...): stresses, joints, drives, motors, ground and sensors.
 
-    `selecting` is what a run is called.
+    Results of earlier versions have none. `selecting` is the noun for a run on the page.
     """
     charts: list[Chart] = []
 
@@ -227,7 +232,7 @@ def load_panel(data: xr.Dataset, runs: Sequence[str], selecting: str = "mode") -
 
 
 def _sensor_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
-    """Charts of readings by their units; none of results without sensors."""
+    """Return charts of sensor readings, grouped by unit; empty for results without sensors."""
     charts = [
         followed(Chart(f"sensors-{k}", f"Sensors: {group.quantity}", group.quantity, choosing="sensor"),
                  group.readings, runs)
@@ -237,7 +242,7 @@ def _sensor_panel(data: xr.Dataset, runs: Sequence[str]) -> list[Panel]:
 
 
 def _joint_charts(data: xr.Dataset) -> Iterator[tuple[Chart, xr.DataArray]]:
-    """Angles and rates of joints that turn, travels and speeds of those that slide, with the values of their curves."""
+    """Yield charts with their values: angles and rates of rotating joints, travels and speeds of sliding joints."""
     slides = sliding_joints(data)
     for own, kind, variable, title, unit in (
         (~slides, "angle", "joint_coordinate", "Joint angles", "rad"),

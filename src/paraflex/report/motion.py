@@ -1,4 +1,4 @@
-"""The report of a run without a path."""
+"""Report of a run without a path."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
 
 _ALONE = ("",)
-# Charts choose among so many points and joints; results.nc has them all.
+# Largest number of points, bodies or joints that a chart offers for choice; results.nc has all.
 _MOST_CHOICES = 60
 
 
 @checked_arguments()
 def motion_page(data: xr.Dataset) -> Page:
-    """The report of a run from `results.motion_dataset`."""
+    """Return the report of a run, a dataset from `results.motion_dataset`."""
     check_kind(data, "motion")
     data = data.transpose("time", ...)
     moving = animation(data, ())
@@ -71,7 +71,7 @@ def motion_page(data: xr.Dataset) -> Page:
 
 
 def _subtitle(data: xr.Dataset) -> str:
-    """What moves the mechanism."""
+    """Return a text on the drives and torques that move the mechanism."""
     drives = names_of(data, "drive") if "drive" in data.dims else []
     torques = {str(name): data["applied_torque"].sel(motor=name).values for name in data["motor"].values}
     given = [text_symbol(name) for name, values in torques.items() if np.any(np.nan_to_num(values))]
@@ -101,14 +101,14 @@ def _table(data: xr.Dataset) -> str:
 
 
 def _torque(values: xr.DataArray) -> str:
-    """A constant torque, or the least and the largest of one in time."""
+    """Return a constant torque, or the smallest and the largest value of a varying one, as text."""
     if "time" not in values.dims:
         return f"{number(float(values))} N m"
     return f"{number(float(values.min()))} to {number(float(values.max()))} N m"
 
 
 def _panels(data: xr.Dataset) -> list[Panel]:
-    # A run beside no other.
+    # The charts need a dimension of runs.
     run, bodies = data.expand_dims("run"), names_of(data, "body")
     angles, rates = (
         Chart("angles", "Angles", "angle", choosing="body"),
@@ -139,7 +139,7 @@ def _phases(data: xr.Dataset, bodies: list[str]) -> Chart:
 
 
 def _points(data: xr.Dataset) -> Chart | None:
-    """Paths of the points that move, without those of joints made by the program."""
+    """Return the chart of the paths of points that move, without generated points; None if there are none."""
     places = data["point_position"].transpose("point", "time", "axis").values
     names = names_of(data, "point")
     moving = [
@@ -169,7 +169,7 @@ def _joint_forces(data: xr.Dataset) -> Chart:
 
 
 def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
-    """Coordinates of one body at a time: place and angle of its frame, and flexible coordinates."""
+    """Return the chart of the coordinates of one body at a time: position and angle of its frame, or flexible ones."""
     names = names_of(data, "coordinate")
     values = data["coordinate_value"].transpose("coordinate", "time").values
     curves, choices = [], []
@@ -210,5 +210,5 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     reached = np.isfinite(data["angle"].values).all(axis=1)
     end = np.max(data["time"].values[reached], initial=0.0)
     ended = ("status", status, f"{last}t = {end:.4g} s, computed in {number(data['wall_time'].item())} s")
-    # That a run failed is more than its numbers.
+    # The failure of a run comes before its numbers.
     return [ended, *tiles] if last else [*tiles, ended]

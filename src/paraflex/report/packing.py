@@ -1,4 +1,4 @@
-"""Numbers in a page: compressed, and with NaN, which JSON does not have."""
+"""Compressed numbers for a page, including NaN, which JSON does not have."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# 16-bit numbers: the code of NaN, and the largest magnitude of others.
+# 16-bit integers: the code of NaN, and the largest magnitude of other values.
 MISSING, _LARGEST_CODE = -32768, 32767
 # Bits of a single-precision fraction that are dropped: the rest resolves 4e-6 of a value and compresses better.
 _DROPPED = 6
@@ -18,16 +18,19 @@ _DROPPED = 6
 
 @dataclass
 class Series:
-    """Rows of numbers for curves, each kept once, in single precision.
+    """Rows of numbers for curves, each stored once, in single precision.
 
-    Curves of many charts share their rows: time, and what is shown alone as well as beside other runs.
+    Curves of many charts share rows: the time, and quantities that are shown both alone and beside other runs.
     """
 
     rows: list[bytes] = field(default_factory=list)
     _numbers: dict[bytes, int] = field(default_factory=dict)
 
     def add(self, values: ArrayLike, *, exact: bool = False) -> int:
-        """The number of a row with these values (k,), rounded to about six digits unless they are to be exact."""
+        """Add a row of values (k,) unless it is stored already, and return its index.
+
+        Values are rounded to about six digits, or to single precision if `exact` is True.
+        """
         with np.errstate(over="ignore"):
             row = np.array(values, dtype="<f4", ndmin=1, copy=True)
         if not exact:
@@ -40,15 +43,15 @@ class Series:
         return self._numbers[raw]
 
     def to_dict(self) -> dict[str, Any]:
-        """All rows for JSON: their lengths, and their bytes."""
+        """Return all rows for JSON: their lengths and their compressed bytes."""
         joined = np.frombuffer(b"".join(self.rows), dtype=np.uint8)
         return {"lengths": [len(row) // 4 for row in self.rows], "data": _deflated(joined.reshape(-1, 4))}
 
 
 def packed(values: ArrayLike) -> dict[str, Any]:
-    """An array (runs, frames, ...) with last axis x, y for JSON: 16 bits per number, differences in time.
+    """Return an array (runs, frames, ...) with last axis x, y for JSON: 16 bits per number, differences over frames.
 
-    A number is `offset + scale * integer`, with an offset for x and for y; NaN where the integer is MISSING.
+    A number is `offset + scale * integer`, with separate offsets for x and y; it is NaN where the integer is MISSING.
     """
     array = np.asarray(values, dtype=float)
     flat = array.reshape(-1, array.shape[-1])
@@ -59,12 +62,12 @@ def packed(values: ArrayLike) -> dict[str, Any]:
     whole = np.full(array.shape, MISSING, dtype="<i2")
     known = np.isfinite(array).all(axis=-1)
     whole[known] = np.rint((array[known] - offset) / scale)
-    # Differences wrap round as sums do again.
+    # Integer overflow of the differences cancels in the sums.
     whole[:, 1:] = np.diff(whole, axis=1)
     data = _deflated(np.ascontiguousarray(whole).view(np.uint8).reshape(-1, 2))
     return {"shape": list(array.shape), "offset": offset.tolist(), "scale": scale, "data": data}
 
 
 def _deflated(numbers: NDArray[np.uint8]) -> str:
-    """Bytes (numbers, bytes of each) in base64: all first bytes, all second ones and so on, which compresses better."""
+    """Compress bytes (numbers, bytes of each) to base64: all first bytes, then all second ones, which is smaller."""
     return base64.b64encode(zlib.compress(np.ascontiguousarray(numbers.T).tobytes(), 6)).decode("ascii")

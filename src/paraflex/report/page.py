@@ -1,4 +1,4 @@
-"""The HTML page of every report: one file with its style, its scripts, Plotly and the numbers."""
+"""HTML page of every report: one file with its style, its scripts, Plotly and the numbers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from paraflex.report.film import Animation
 from paraflex.report.packing import Series
 from paraflex.writing import write_text
 
-# So many notices are folded.
+# Number of notices from which they are folded.
 _FOLDED = 3
 _ORIGIN = "How these results were made"
 _STYLES = ("page.css",)
@@ -33,9 +33,9 @@ _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
 
 
 class Look(NamedTuple):
-    """Look of a curve: one of the page's eight colours, or without one that of text, as for desired curves.
+    """Look of a curve: index of one of the page's eight colours, or None for the colour of text, and dashes.
 
-    Dashes: 0 solid, 1 dashed, 2 dotted, 3 dash-dotted, 4 long dashes.
+    Dashes are 0 solid, 1 dashed, 2 dotted, 3 dash-dotted, 4 long dashes.
     """
 
     colour: int | None = None
@@ -47,28 +47,30 @@ PLAIN_LOOK = Look()
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve of a chart.
+    """Curve of a chart.
 
     Attributes
     ----------
     name : str
+        Name of the curve.
     y : (k,) array
-        In the chart's unit; NaN where there is no value.
+        Ordinates in the chart's unit; NaN where there is no value.
     x : (k,) array, optional
-        The page's time by default.
+        Abscissae; the page's time by default.
     look : Look
+        Colour and dashes.
     run : int, optional
-        The run it is of: drawn thicker beside others when this run is selected.
+        Run of the curve, which is drawn thicker than others when this run is selected.
     shown : tuple of int, optional
-        Runs with whose selection it is shown; always by default.
+        Selected runs with which the curve is shown; any by default.
     choice : int, optional
-        Which of the chart's choices shows it; every one by default.
+        Choice of the chart that shows the curve; every choice by default.
     quiet : bool
-        Left out of the label at the pointer.
+        Whether the curve is omitted from the label at the pointer.
     mark : str
-        "ring" or "cross": marks at its points instead of a line.
+        Marks at its points instead of a line, "ring" or "cross"; empty (default) for a line.
     texts : sequence of str
-        What the label at the pointer says of each mark.
+        Text of each mark in the label at the pointer.
     """
 
     name: str
@@ -84,7 +86,7 @@ class Curve:
 
 
 class Picker(NamedTuple):
-    """A choice of columns for a chart of designs, and the initial ones."""
+    """Choice of a column for a chart of designs: name, columns, and index of the initial one."""
 
     name: str
     columns: Sequence[int]
@@ -93,33 +95,34 @@ class Picker(NamedTuple):
 
 @dataclass(frozen=True)
 class Chart:
-    """A diagram.
+    """Chart of a page.
 
     Attributes
     ----------
     identity : str
-        A word of its own within the page.
+        Identifier, unique within the page.
     title, y, x : str
-        What it shows; labels of its axes with units.
+        Title, and labels of the axes with units.
     curves : sequence of Curve
+        Curves of the chart.
     choices : sequence of str
-        Names of what it shows one at a time: links, motors.
+        Names of the members that the chart shows one at a time, such as links or motors.
     choosing : str
-        What is chosen, for those who hear the page.
+        Noun for a choice, for screen readers.
     log, log_x, equal : bool
-        A logarithmic vertical axis, a logarithmic horizontal one; the same scale both ways.
+        Whether the vertical axis is logarithmic, whether the horizontal one is, and whether their scales are equal.
     over_time : bool
-        Whether x is time: a line then moves with the animation, else a dot on every curve of a run.
+        Whether x is time: a line then moves with the animation, otherwise a dot on every curve of a run.
     note : str
-        A sentence under it.
+        Sentence below the chart.
     layout : mapping
-        Parts of Plotly's `layout` that are added: numbers of axes, shapes.
+        Additional parts of Plotly's `layout`, such as numbers of axes and shapes.
     figure : mapping, optional
-        Plotly's own `data` and `layout` instead of curves; colours and fonts of the page are added.
+        Plotly's own `data` and `layout` in place of curves; colours and fonts of the page are added.
     drawer : str
-        What of the page's designs it shows instead of curves: "responses", "front", "parallel" or "distribution".
+        Chart of the page's designs in place of curves: "responses", "front", "parallel" or "distribution".
     pickers : sequence of Picker
-        What the reader chooses for the drawer.
+        Choices of columns that the reader makes for the drawer.
     """
 
     identity: str
@@ -142,20 +145,20 @@ class Chart:
 
 @dataclass(frozen=True)
 class DesignColumn:
-    """A column with a number of every design.
+    """Column with one number per run.
 
     Attributes
     ----------
     identity : str
-        Its name in the table.
+        Name of the column in the table of the study.
     name, unit : str
-        As it is shown.
+        Name and unit as shown.
     values : (k,) array
-        In that unit; NaN where there is none.
+        Values in that unit; NaN where there is none.
     parameter : bool
-        Whether it was varied, or came of it.
+        Whether the column is a parameter or (default) a metric.
     log : bool
-        Shown on a logarithmic axis.
+        Whether its axis is logarithmic.
     """
 
     identity: str
@@ -173,17 +176,17 @@ class Designs:
     Attributes
     ----------
     columns : sequence of DesignColumn
-        Parameters first.
+        Columns, parameters first.
     telling : str
-        What distinguishes runs: "mode".
+        Name of the property that distinguishes series of runs, such as "mode".
     series : sequence of (str, Look)
-        Its names and looks.
+        Names and looks of the series.
     member : (k,) array of int
-        Which of them each run is of.
+        Index of the series of each run.
     number : (k,) array of int
-        Of its design.
+        Number of the design of each run.
     shown : (k,) array of int
-        Which of the page's runs it is; -1 for most.
+        Index of each run among the runs of the page; -1 for most.
     """
 
     columns: Sequence[DesignColumn]
@@ -210,41 +213,43 @@ class Page:
     Attributes
     ----------
     title, subtitle : str
+        Title and subtitle of the page.
     kind : str
-        What it is a report of, for the browser's title.
+        Kind of results, for the browser's title.
     verdict : str
-        On the results in a word, beside the title: "sound", "doubtful", "wrong"; empty where there is none.
+        Verdict on the results beside the title, "sound", "doubtful" or "wrong"; empty if there is none.
     facts : sequence of (str, str)
-        Names and values of what the results were made with, at the end.
+        Names and values of the settings behind the results, at the end of the page.
     command : str
-        The command that gives these results again, below them; empty where it is not known.
+        Command that reproduces the results, below the facts; empty if it is not known.
     figures : sequence of (str, str, str)
-        The few numbers that matter: name, value, and what it is of.
+        Tiles of the main numbers: name, value, and the member or run they refer to.
     summary, tables, more : sequence of (str, str)
-        Headings and HTML of what stands before all charts, before those over time, and after them; see `text.table`.
+        Headings and HTML of the sections before all charts, before those over time, and after them; see `text.table`.
     survey : sequence of Panel
-        Charts before the tables: what all designs do.
+        Charts of all designs, before the tables.
     designs : Designs, optional
-        What they draw.
+        Data of the survey's charts.
     panels : sequence of Panel
+        Charts over time or of single runs.
     time : (k,) array
-        What curves without x are drawn over; empty where nothing moves.
+        Abscissae of curves without x; empty if nothing moves.
     runs : sequence of str
-        Names of what can be selected.
+        Names of the runs that can be selected.
     groups : sequence of (str, int)
-        Names of groups that one chooses from before a run, and how many of the runs each has; none for few runs.
+        Names of groups from which the reader chooses before a run, and their numbers of runs; empty for few runs.
     selecting : str
-        What a run is called in this page: "mode", "model", "design".
+        Noun for a run on this page: "mode", "model", "design".
     selected : int
-        The run selected at first.
+        Index of the initially selected run.
     film : Animation, optional
-        The animation.
+        Animation of the runs.
     no_film : str
-        Why there is none.
+        Reason why there is no animation.
     notes : sequence of str
-        What the reader has to know first: runs that failed.
+        Notices at the top, such as failed runs.
     remarks : sequence of str
-        What speaks for the results, below the notes.
+        Remarks that support the results, below the notices.
     """
 
     title: str
@@ -273,7 +278,7 @@ class Page:
 
 @checked_arguments()
 def render(page: Page) -> str:
-    """The page as HTML."""
+    """Return the page as HTML."""
     return Template(_asset("page.html")).substitute(
         title=escape(page.title),
         kind=escape(page.kind),
@@ -300,12 +305,12 @@ def render(page: Page) -> str:
 
 @checked_arguments()
 def save_page(page: Page, path: str | Path) -> None:
-    """Write the page; the file appears whole or not at all.
+    """Write the page as an HTML file, which appears whole or not at all.
 
     Raises
     ------
     OutputError
-        It cannot be written.
+        The file cannot be written.
     """
     path = Path(path)
     with added_to(path.parent) as folder:
@@ -314,7 +319,7 @@ def save_page(page: Page, path: str | Path) -> None:
 
 @cache
 def plotly_script() -> str:
-    """Plotly's script from its Python package, without importing it, which would take a second."""
+    """Return Plotly's script from its Python package without importing the package, which would take a second."""
     found = find_spec("plotly")
     for folder in (found.submodule_search_locations or []) if found else []:
         script = Path(folder) / "package_data" / "plotly.min.js"
@@ -327,7 +332,7 @@ def plotly_script() -> str:
 
 
 def _data(page: Page) -> dict[str, Any]:
-    """Data for the scripts."""
+    """Return the data for the scripts."""
     series = Series()
     time = series.add(page.time, exact=True)
 
@@ -350,7 +355,7 @@ def _data(page: Page) -> dict[str, Any]:
 
 
 def _fields(thing: Any, *left_out: str) -> dict[str, Any]:
-    """Fields of a dataclass, without some."""
+    """Return the fields of a dataclass, except some, as a dict."""
     return {one.name: getattr(thing, one.name) for one in fields(thing) if one.name not in left_out}
 
 
@@ -388,12 +393,12 @@ def _anchor(heading: str) -> str:
 
 
 def _of_charts(page: Page) -> str:
-    """Name of the part with what moves and what is drawn over time."""
+    """Return the heading of the section of animation and charts."""
     return "Animation and charts" if page.film or page.no_film else "Charts"
 
 
 def _contents(page: Page) -> str:
-    """Links to the parts of the page, in their order."""
+    """Return links to the sections of the page in their order; empty if there is only one."""
     parts = [
         *((heading, _anchor(heading)) for heading, _ in page.summary),
         *([("All designs", "survey")] if page.survey else []),
@@ -406,7 +411,7 @@ def _contents(page: Page) -> str:
 
 
 def _notes(notes: Sequence[str]) -> str:
-    """Notices; the mechanism stays in sight below many of them, as they are folded from the second on."""
+    """Return the notices; many of them are folded from the second on, so that the animation stays visible."""
     if len(notes) < _FOLDED:
         return _paragraphs(notes, "notice")
     rest = _paragraphs(notes[1:], "notice")
@@ -435,14 +440,14 @@ def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
 
 
 def _origin(page: Page) -> str:
-    """What the results were made with."""
+    """Return the section of the settings and the command behind the results."""
     facts = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in page.facts)
     html = (f'<dl class="facts">{facts}</dl>' if facts else "") + _command(page.command)
     return _sections([(_ORIGIN, html)]) if html else ""
 
 
 def _command(command: str) -> str:
-    """The command, with line breaks between its options only."""
+    """Return the command, with line breaks only between its options."""
     if not command:
         return ""
     parts = command.replace(" --", "\n--").split("\n")
@@ -450,7 +455,7 @@ def _command(command: str) -> str:
 
 
 def _script_json(data: Mapping[str, Any]) -> str:
-    """JSON with escapes, so that no name in it ends the script."""
+    """Return JSON with escapes, so that no name in it can end the script."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     for mark in "<>&\u2028\u2029":
         text = text.replace(mark, f"\\u{ord(mark):04x}")

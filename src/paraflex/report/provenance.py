@@ -1,4 +1,4 @@
-"""Origin of results: facts of a run, and the command that repeats it."""
+"""Provenance of results: facts of a run, and the command that repeats it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import xarray as xr
 from paraflex.files import library_names
 from paraflex.results.doubts import FINDINGS, finished, verdict_of
 
-# Defaults of a run.
+# Flags and fields of a request that the command line repeats.
 _RUN_FLAGS = ("rigid", "ked", "balanced")
 _REQUEST_FIELDS = (
     "duration",
@@ -35,7 +35,7 @@ _GIVEN = {name: f"--{name.replace('_', '-')}" for name in _REQUEST_FIELDS} | {"t
 
 
 def asked(data: xr.Dataset) -> dict[str, Any]:
-    """The request; empty if it is not known."""
+    """Return the request of the command that made the results; empty if it is not known."""
     try:
         return json.loads(data.attrs["parameters"]).get("run", {})
     except (KeyError, ValueError):
@@ -43,13 +43,14 @@ def asked(data: xr.Dataset) -> dict[str, Any]:
 
 
 def verdict_word(data: xr.Dataset, failed: Collection[str] = ()) -> str:
-    """Verdict on results: "failed", or "partly failed" with modes that are whole, else "sound", "doubtful", "wrong".
+    """Return the verdict on results: "failed", "partly failed" if some modes are complete, or that of their findings.
 
-    Empty for files of earlier versions.
+    The findings give "sound", "doubtful" or "wrong"; the verdict is empty for files of earlier versions.
 
     Parameters
     ----------
     data : xarray.Dataset
+        Results of a run.
     failed : collection of str
         Modes that could not start.
     """
@@ -60,7 +61,7 @@ def verdict_word(data: xr.Dataset, failed: Collection[str] = ()) -> str:
 
 
 def common_facts(data: xr.Dataset) -> list[tuple[str, str]]:
-    """Duration, method, tolerance and versions."""
+    """Return duration, method, step or tolerance, and versions, as names and values."""
     time, attrs = data["time"].values, data.attrs
     facts = [("duration", f"{time[-1]:g} s, {time.size} samples")]
     method = attrs.get("method")
@@ -81,13 +82,13 @@ def common_facts(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def mechanism_argument(source: str) -> str:
-    """Argument of a command for the mechanism of a file."""
+    """Return the argument of a command for a mechanism: its name in the library, or its file."""
     name = source.removesuffix(".toml")
     return name if name in library_names() else source
 
 
 def run_command_line(run: dict[str, Any]) -> str:
-    """The `paraflex run` command of a request; empty if it is not known."""
+    """Return the `paraflex run` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
     words = ["paraflex", "run", *model_words(run)]
@@ -110,7 +111,7 @@ def run_command_line(run: dict[str, Any]) -> str:
 
 
 def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence[str]) -> str:
-    """The `paraflex verify` command of a request; empty if it is not known."""
+    """Return the `paraflex verify` command of a request; empty if it is not known."""
     if "mechanism" not in run:
         return ""
     words = ["paraflex", "verify", *model_words(run), "--path", run["path"], *repeated("--mode", run.get("modes"))]
@@ -125,7 +126,7 @@ def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence
 
 
 def model_words(run: dict[str, Any]) -> list[str]:
-    """A model as an argument, with what was set of it."""
+    """Return the arguments of a command for a model, with its overridden values."""
     given = run.get("set") or {}
     texts = (f"{name}={value if isinstance(value, str) else json.dumps(value)}" for name, value in given.items())
     outside = ["--allow-outside"] if run.get("allow_outside") else []
@@ -133,5 +134,5 @@ def model_words(run: dict[str, Any]) -> list[str]:
 
 
 def repeated(flag: str, values: Iterable[str] | None) -> list[str]:
-    """An option that is repeated for each of some values."""
+    """Return the words of an option that is repeated for each value."""
     return [word for value in values or () for word in (flag, value)]

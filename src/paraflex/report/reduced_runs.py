@@ -1,4 +1,4 @@
-"""The part of a report on runs with few flexible coordinates: beside the runs with all of them."""
+"""Section of a report that compares runs with reduced flexible coordinates to the runs with all of them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from paraflex.results.reduced_runs import COUNTS, DISTANCE, FULL
 
 
 def reduction_tables(data: xr.Dataset) -> list[tuple[str, str]]:
-    """How far off every run is and how much faster; nothing of runs with all flexible coordinates."""
+    """Return the table of errors and speed-ups of reduced runs; empty for runs with all flexible coordinates."""
     if DISTANCE not in data:
         return []
     along = "mode" in data.dims

@@ -1,4 +1,4 @@
-"""The report of reduced linear models: states needed, errors and responses beside those of the full model."""
+"""Report of reduced linear models: states needed, and errors and responses beside those of the full model."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from paraflex.results.linear_summary import HELD_WORDS
 from paraflex.results.reduction_along import OWN, STATIC, along_heads, along_rows, basis_name
 from paraflex.results.reduction_data import FULL, percent_off
 
-# Gains and errors below this part of the largest are not drawn.
+# Share of the largest gain or error below which values are not drawn.
 _LEAST = 1e-12
 
 
 @checked_arguments()
 def reduction_page(data: xr.Dataset) -> Page:
-    """The report of reduced models from `results.reduction_dataset`."""
+    """Return the report of reduced models, a dataset from `results.reduction_dataset`."""
     check_kind(data, "reduction")
     attrs = data.attrs
     kept, full = int(attrs["kept_states"]), int(attrs["full_states"])
@@ -57,7 +57,7 @@ def reduction_page(data: xr.Dataset) -> Page:
 
 
 def _tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    """The most states that any output needs, and the largest error, by method."""
+    """Return tiles of the largest number of states that any output needs, and of the largest error, by method."""
     tiles = []
     for name in names_of(data, "reduction"):
         states, errors = data["states"].sel(reduction=name).values, data["largest_error"].sel(reduction=name).values
@@ -72,7 +72,7 @@ def _states(value: float) -> str:
 
 
 def _of_outputs(data: xr.Dataset, name: str, caption: str, text: Callable[[float], str]) -> str:
-    """A row a mode and method, a column an output."""
+    """Return a table with one row for each mode and method and one column for each output."""
     outputs = names_of(data, "output")
     rows = [
         (mode, [method, *(text(data[name].sel(mode=mode, reduction=method, output=one).item()) for one in outputs)])
@@ -82,7 +82,7 @@ def _of_outputs(data: xr.Dataset, name: str, caption: str, text: Callable[[float
 
 
 def _frequencies(data: xr.Dataset) -> str:
-    """Frequencies of the full models, and of reduced ones with how far they are off."""
+    """Return the table of the frequencies of the full models, and of reduced ones with their relative errors."""
     count = data.sizes["order"]
     rows: list[tuple[str, list[str]]] = []
     for mode in names_of(data, "mode"):
@@ -106,7 +106,7 @@ def _frequency(value: float, exact: float, *, full: bool) -> str:
 
 
 def _gain_charts(data: xr.Dataset) -> Iterator[Chart]:
-    """Largest gain of a mode's inputs to every output, of the full model and of reduced ones."""
+    """Yield charts of the largest gain from a mode's inputs to every output, for the full and the reduced models."""
     modes, frequency = names_of(data, "mode"), data["frequency"].values
     for k, output in enumerate(names_of(data, "output")):
         gains = data["gain"].sel(output=output)
@@ -120,7 +120,7 @@ def _gain_charts(data: xr.Dataset) -> Iterator[Chart]:
 
 
 def _error_charts(data: xr.Dataset) -> Iterator[Chart]:
-    """Error to the worst output over frequency, a line for each method."""
+    """Yield the chart of the error of the worst output over frequency, with a line for each method."""
     modes, frequency = names_of(data, "mode"), data["frequency"].values
     curves = [
         Curve(name, _drawn(data["error"].sel(mode=mode, reduction=name).max("output").values), frequency, look(r + 1),
@@ -132,7 +132,7 @@ def _error_charts(data: xr.Dataset) -> Iterator[Chart]:
 
 
 def _along_tables(data: xr.Dataset) -> list[tuple[str, str]]:
-    """Errors along a path with bases of each pose, of one and between several; nothing where no path was asked for."""
+    """Return the table of errors along a path with bases of each pose, of one and of several; empty without a path."""
     rows = list(along_rows(data))
     if not rows:
         return []
@@ -146,7 +146,7 @@ def _along_tables(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _along_chart(data: xr.Dataset) -> Chart:
-    """Largest error of responses over the way along the path, a line for each basis."""
+    """Return the chart of the largest error of responses over the position along the path, a line for each basis."""
     modes, places = names_of(data, "mode"), data["place"].values
     curves = []
     for m, mode in enumerate(modes):
@@ -168,5 +168,5 @@ def _over(modes: list[str]) -> dict[str, Any]:
 
 
 def _drawn(values: np.ndarray) -> np.ndarray:
-    """Values of a logarithmic axis; NaN where there is next to nothing."""
+    """Return values for a logarithmic axis, with NaN where they are negligible."""
     return np.where(values > _LEAST * np.nanmax(values, initial=0.0), values, np.nan)

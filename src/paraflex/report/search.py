@@ -1,4 +1,4 @@
-"""The result of an optimisation or identification on its page: the design found, and what it came to."""
+"""Result of an optimisation or identification in its report: the design found and its metrics or targets."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from paraflex.report.designs import metric_name, shown_unit
 from paraflex.report.text import NO_VALUE, number, table
 
 IDENTIFICATION = "identification"
-# Tiles for metrics or parameters.
+# Largest number of tiles for metrics or parameters.
 _MOST_TILES = 2
 
 
 def search_tiles(
     found: Mapping[str, Any], units: Mapping[str, str], metric_units: Mapping[str, str]
 ) -> list[tuple[str, str, str]]:
-    """The main numbers of a search: what it minimised, then the parameters identified or the metrics of its design.
+    """Return tiles of the minimised quantity, then of the identified parameters or of the metrics of the design.
 
     Parameters
     ----------
     found : mapping
         Content of `result.json`.
     units, metric_units : mapping of str to str
-        Of parameters and of metrics.
+        Units of parameters and of metrics.
     """
     identified = found["kind"] == IDENTIFICATION
     goal = "residual" if identified else "objective"
@@ -43,7 +43,7 @@ def search_tiles(
 def search_tables(
     found: Mapping[str, Any], units: Mapping[str, str], metric_units: Mapping[str, str]
 ) -> list[tuple[str, str]]:
-    """Titles and tables of a search: its parameters, and its targets or metrics; none where nothing was found."""
+    """Return titles and tables of a search: its parameters, and its targets or metrics; empty if it found no design."""
     if not found.get("values"):
         return []
     identified = found["kind"] == IDENTIFICATION
@@ -94,13 +94,13 @@ def _metrics(found: Mapping[str, Any], metric_units: Mapping[str, str]) -> str:
 
 
 def _in_unit(values: Sequence[float | None], unit: str) -> list[str]:
-    """Numbers in a unit that suits all of them, and the unit."""
+    """Return numbers in a unit that suits all of them, and the unit."""
     name, factor = shown_unit(unit, np.array([np.nan if value is None else value for value in values]))
     return [*(number(value, factor) for value in values), name]
 
 
 def _off(value: float | None, other: float | None) -> str:
-    """Relative difference in percent, with its sign."""
+    """Return the relative difference in per cent, with its sign."""
     if value is None or not other:
         return NO_VALUE
     share = 100.0 * (value - other) / abs(other)

@@ -1,4 +1,4 @@
-"""The report of static equilibria: the mechanism in steps, force and stiffness along the travel, buckling, stresses."""
+"""Report of static equilibria: animation of the steps, force and stiffness along the travel, buckling, stresses."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ from paraflex.units import STRESS
 
 Array = NDArray[np.float64]
 
-# How long the animation takes from the first step to the last [s].
+# Duration of the animation from the first step to the last [s].
 _DURATION = 5.0
-# Tiles of coordinates that are given, and of stiffnesses.
+# Largest numbers of tiles of given coordinates and of stiffnesses.
 _TILES = 2
-# Forces are differences of what is so much larger: stiffnesses times lengths.
+# Ratio of internal terms, stiffness times length, to the forces that are their differences: the scale for rounding.
 _PARTS = 1e5
 
 
 @checked_arguments()
 def statics_page(data: xr.Dataset) -> Page:
-    """The report of equilibria from `results.statics_dataset`."""
+    """Return the report of equilibria, a dataset from `results.statics_dataset`."""
     check_kind(data, "statics")
     data = data.transpose("step", ...)
     summary = statics_summary(data)
@@ -82,7 +82,7 @@ def _times(steps: int) -> Array:
 
 
 def _film(data: xr.Dataset) -> Animation | None:
-    """The mechanism from step to step; a single equilibrium stands still."""
+    """Return the animation from step to step; a single equilibrium is repeated. None if there are no shapes."""
     steps = data.isel(step=[0, 0]) if data.sizes["step"] == 1 else data
     film = animation(as_samples(steps), ())
     if film is None:
@@ -94,7 +94,7 @@ def _film(data: xr.Dataset) -> Animation | None:
 
 
 def _subtitle(data: xr.Dataset) -> str:
-    """What is given."""
+    """Return a text on the coordinates that are moved, loaded and held."""
     words = {"moved": "moved", "loaded": "loaded", "held": "held"}
     found = {
         word: [text_symbol(str(name)) for name, role in zip(data["named"].values, data["role"].values, strict=True)
@@ -104,7 +104,7 @@ def _subtitle(data: xr.Dataset) -> str:
 
 
 def _command(run: dict[str, Any]) -> str:
-    """The command that gives these equilibria again; empty if it is not known."""
+    """Return the command that reproduces these equilibria; empty if it is not known."""
     if not run.get("statics"):
         return ""
     words = ["paraflex", "statics", *model_words(run)]
@@ -166,7 +166,7 @@ def _text(one: xr.Dataset, quantity: str, value: float) -> str:
 
 def _last_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
     rows = [
-        # The role, then numbers with their units below.
+        # Role of the coordinate, then values with their units below.
         (text_symbol(name), [role, *(cell.replace("-", "−").replace(" ", "\n", 1) or NO_VALUE for cell in cells)])
         for name, role, *cells in last_rows(data)
     ]
@@ -204,7 +204,7 @@ def _stress_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
 
 
 def _reactions(data: xr.Dataset) -> Iterator[tuple[str, str]]:
-    """Forces and moments of joints at the last step."""
+    """Yield the table of forces and moments of joints at the last step."""
     if not data.sizes.get("joint"):
         return
     force, moment = data["joint_force"].values[-1], data["joint_moment"].values[-1]

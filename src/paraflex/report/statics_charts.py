@@ -1,4 +1,4 @@
-"""Charts of static equilibria: what is given, stiffness and others against the travel, buckling shapes."""
+"""Charts of static equilibria: force, stiffness and other quantities against travel, and buckling shapes."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from paraflex.units import STRESS
 
 Array = NDArray[np.float64]
 
-# Frequencies drawn, and joints and coordinates that a chart chooses from; statics.nc has all.
+# Largest numbers of frequencies drawn, and of joints or coordinates offered by a chart; statics.nc has all.
 _FREQUENCIES, _MOST_CHOICES = 4, 60
-# The largest displacement of a buckling shape, as a part of the mechanism's size.
+# Largest displacement of a buckling shape, as a share of the mechanism's size.
 _SWING = 0.12
 
 
 class _Abscissa(NamedTuple):
-    """What charts are drawn over: values (steps,) in the unit of a label."""
+    """Abscissa of charts: values (steps,), in the unit of the label."""
 
     values: Array
     label: str
 
 
 def statics_panels(data: xr.Dataset) -> list[Panel]:
-    """Charts of equilibria with dimension step first: along the travel, buckling; of a single one its shape."""
+    """Return the charts of equilibria (dimension step first): along the travel and of buckling, or else the shape."""
     over, panels = _over(data), []
     if over is not None:
         own = (_stiffness_charts, _travel_chart, _frequency_chart, _stress_chart, _joint_chart)
@@ -53,7 +53,7 @@ def _over(data: xr.Dataset) -> _Abscissa | None:
 
 
 def _branch(data: xr.Dataset, name: str, x: Array, y: Array, own: Look, choice: int | None = None) -> list[Curve]:
-    """A curve over the branch, dotted where it is unstable; rings are limit points."""
+    """Return the curves of a branch: solid where stable, dotted where unstable, with rings at limit points."""
     parts, y, own = branch_parts(data), np.where(np.isfinite(y), y, np.nan), own._replace(dash=0)
     curves = [Curve(name, np.where(parts.stable, y, np.nan), x, own, run=0, choice=choice)]
     if parts.unstable.any():
@@ -66,7 +66,7 @@ def _branch(data: xr.Dataset, name: str, x: Array, y: Array, own: Look, choice: 
 
 
 def _force_charts(data: xr.Dataset) -> Iterator[Chart]:
-    """Force against travel of each coordinate that is moved or loaded."""
+    """Yield charts of force against travel for each coordinate that is moved or loaded."""
     note = "Dotted: unstable equilibria; rings: limit points." if branch_parts(data).unstable.any() else ""
     for k in given_coordinates(data):
         one = data.isel(named=k)
@@ -98,7 +98,7 @@ def _stiffness_charts(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
 
 
 def _travel_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
-    """Travel of coordinates that nothing is given of: what moves along."""
+    """Yield the chart of the travel of free coordinates, which are neither moved nor loaded nor held."""
     free = [k for k, role in enumerate(data["role"].values) if role == "free"]
     curves, choices = [], []
     for k in free[:_MOST_CHOICES]:
@@ -150,7 +150,7 @@ def _joint_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
 
 
 def _buckling_chart(data: xr.Dataset) -> Iterator[Chart]:
-    """How it buckles, as seen from the last stable equilibrium with a shape."""
+    """Yield the chart of the buckling shapes at the last stable equilibrium that has any."""
     seen = seen_buckling(data)
     if seen is None:
         return
@@ -173,7 +173,7 @@ def _buckling_chart(data: xr.Dataset) -> Iterator[Chart]:
 
 
 def _shape_chart(data: xr.Dataset) -> Chart:
-    """The mechanism at its only equilibrium."""
+    """Return the chart of the mechanism at its only equilibrium, beside its undeformed shape."""
     curves = [*_outlines(data, data["shape_base"].values[-1], PLAIN_LOOK._replace(dash=DOTTED), "undeformed"),
               *_outlines(data, data["shape"].values[-1], None, "")]  # fmt: skip
     return Chart("shape", "Shape at rest", "y [mm]", curves, x="x [mm]", equal=True, over_time=False)
@@ -182,10 +182,10 @@ def _shape_chart(data: xr.Dataset) -> Chart:
 def _outlines(
     data: xr.Dataset, places: Array, own: Look | None, name: str, choice: int | None = None
 ) -> Iterator[Curve]:
-    """The bodies at places (stations, 2), each in its colour unless all have one look."""
+    """Yield curves of the bodies with stations at `places` (stations, 2), each in its colour unless a look is given."""
     owners = data["station_body"].values
     for k, body in enumerate(dict.fromkeys(map(str, owners))):
-        # A single point makes no line.
+        # A body with a single station has no line.
         if np.count_nonzero(owners == body) < 2:
             continue
         line = 1e3 * figure_of(places[None, owners == body])[0]

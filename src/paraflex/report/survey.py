@@ -1,4 +1,4 @@
-"""Charts of all designs of a study: responses, front, distribution, all numbers, convergence."""
+"""Charts of all designs of a study: convergence, responses, Pareto front, distribution, parallel coordinates."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LOWER = "Less is taken as better; a safety factor, a stiffness and others of whi
 
 
 class Step(NamedTuple):
-    """A design of a search: its number, its objective (NaN where it failed), and whether limits hold."""
+    """Design of a search: its number, its objective (NaN if it failed), and whether it satisfies the limits."""
 
     number: int
     objective: float
@@ -33,7 +33,10 @@ def survey(
     *,
     seeks_least: bool = True,
 ) -> list[Panel]:
-    """Charts of all designs; that of the front only where less is better in the metrics, not targets are to be met."""
+    """Return the charts of all designs.
+
+    `seeks_least` is whether smaller metrics are better; without it, as for targets, there is no Pareto front.
+    """
     parameters = [k for k, column in enumerate(drawn) if column.parameter]
     metrics = [k for k, column in enumerate(drawn) if not column.parameter]
     place = {column.identity: k for k, column in enumerate(drawn)}
@@ -65,7 +68,7 @@ def survey(
 
 
 def _responses(parameters: Sequence[int], metrics: Sequence[int]) -> list[Chart]:
-    """Two charts of the same kind side by side: of the first two parameters, or metrics."""
+    """Return two response charts: of the first two parameters, or of two metrics if there is only one parameter."""
     note = "A mark a run; thick, the median over the other parameters." if len(parameters) > 1 else "A mark a run."
     starts = [(0, 0), (0, 1)] if len(parameters) > 1 else [(k, 0) for k in range(min(2, len(metrics)))]
     return [
@@ -88,7 +91,7 @@ def _drawn(designs: DesignTable, rows: NDArray[np.intp]) -> str:
 
 
 def _history(steps: Sequence[Step], goal: str) -> Chart:
-    """Objectives or residuals of a search in the order of evaluation, and the least so far."""
+    """Return the chart of objectives or residuals of a search in order of evaluation, and of the smallest so far."""
     numbers = np.array([step.number for step in steps], dtype=float)
     values = np.array([step.objective for step in steps], dtype=float)
     allowed = np.array([step.allowed for step in steps], dtype=bool)
@@ -103,7 +106,7 @@ def _history(steps: Sequence[Step], goal: str) -> Chart:
 def drawn_designs(
     designs: DesignTable, rows: NDArray[np.intp], drawn: Sequence[DesignColumn], shown: Mapping[int, int]
 ) -> Designs:
-    """Drawn rows for the page's charts; `shown` gives the page's run of a row."""
+    """Return the drawn rows for the page's charts; `shown` maps a row to its run on the page."""
     pairs = list(dict.fromkeys(zip(designs.path.tolist(), designs.mode.tolist(), strict=True)))
     several_paths, several_modes = (len({pair[k] for pair in pairs}) > 1 for k in (0, 1))
     names = [", ".join([mode] * several_modes + [path] * several_paths) or mode or "runs" for path, mode in pairs]

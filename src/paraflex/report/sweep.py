@@ -1,4 +1,4 @@
-"""The report of a study of many designs: its parameters, its results, and the best designs in motion."""
+"""Report of a study of many designs: its parameters, its results, and the best designs in motion."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from paraflex.report.survey import LOWER, Step, drawn_designs, survey
 from paraflex.report.text import NO_VALUE, count, number, table
 
 _NO_RUN = "None of the best designs was simulated again, so there is no animation."
-# Of the table of best designs; others are in the study's table.
+# Largest number of columns in the table of best designs; the study's table has all.
 _MOST_COLUMNS = 12
 _SHOWN_VARIABLES = (
     "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
@@ -51,7 +51,7 @@ _COORDINATES = (
 
 
 class VariedParameter(NamedTuple):
-    """A parameter: fields of the mechanism's file, unit, lowest and highest value, distribution."""
+    """Varied parameter: fields of the mechanism's file, unit, smallest and largest value, distribution."""
 
     fields: tuple[str, ...]
     unit: str
@@ -62,26 +62,30 @@ class VariedParameter(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyAccount:
-    """Content of a study's report besides its rows.
+    """Content of a study's report in addition to its rows.
 
     Attributes
     ----------
     kind : str
-        "sweep", "optimisation", "identification".
+        Kind of study: "sweep", "optimisation" or "identification".
     name, mechanism : str
+        Names of the study and of the mechanism.
     total : int or None
-        Runs of the whole study.
+        Number of runs of the whole study; None if it is not known.
     parameters : mapping of str to VariedParameter
+        Varied parameters by name.
     facts : sequence of (str, str)
+        Names and values of the settings of the study.
     runs : mapping of int to Dataset
-        Runs made again, by row.
+        Repeated runs, by row.
     failed : mapping of int to str
-        Why others could not be.
+        Reasons why other rows could not be repeated.
     found : mapping of str to object
         Content of a search's `result.json`; empty for a sweep.
     history : sequence of Step
-        Of a search.
+        Evaluated designs of a search, in order.
     notes : sequence of str
+        Notices at the top of the page.
     """
 
     kind: str
@@ -103,20 +107,21 @@ class StudyAccount:
 
     @property
     def seeks_least(self) -> bool:
-        """Whether less is better in the metrics: not where targets are to be met."""
+        """Whether smaller metrics are better, as in all studies but an identification, which has targets."""
         return self.kind != IDENTIFICATION
 
 
 def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAccount) -> Page:
-    """The report of a study.
+    """Return the report of a study of many designs.
 
     Parameters
     ----------
     designs : DesignTable
-        From `plots.designs.read_designs`.
+        Table of all runs, from `plots.designs.read_designs`.
     picked : sequence of Picked
-        From `designs.best_runs`: the table of best designs.
+        Rows of the table of best designs, from `choice.best_runs`.
     account : StudyAccount
+        Further content of the report.
     """
     shown, others = _of_one_kind({row: account.runs[row] for row, _ in picked if row in account.runs})
     labels = [designs.label(row) for row in shown]
@@ -151,7 +156,7 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
 
 
 def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Dataset:
-    """Runs of one mechanism with different numbers as one dataset, over the longest of their times; else NaN."""
+    """Combine runs of one mechanism with different parameters into a dataset over the longest time, padded with NaN."""
     longest = max((one["time"].values for one in runs), key=lambda time: time[-1])
     parts = []
     for one in _with_as_many_stations(runs):
@@ -160,31 +165,31 @@ def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Datase
         same = np.array_equal(one["time"].values, longest)
         parts.append(kept if same else kept.interp(time=longest))
     first = parts[0]
-    # Coordinates of the first: those that all have are the same.
+    # Coordinates are taken from the first run; common ones are equal.
     data = xr.concat(parts, dim="mode", coords="minimal", compat="override", join="override", combine_attrs="override")
     return data.assign_coords(mode=list(labels)).assign_attrs(runs[0].attrs | first.attrs)
 
 
 def _of_one_kind(runs: Mapping[int, xr.Dataset]) -> tuple[dict[int, xr.Dataset], list[int]]:
-    """Runs with the bodies, joints, motors and springs of the first, and the other rows."""
+    """Return the runs with the bodies, joints, motors and springs of the first, and the rows of the others."""
     kinds = {row: _kind(one) for row, one in runs.items()}
     first = next(iter(kinds.values()), None)
     return {row: one for row, one in runs.items() if kinds[row] == first}, [r for r in runs if kinds[r] != first]
 
 
 def _kind(run: xr.Dataset) -> tuple:
-    """Common structure of runs that are drawn with the same links; numbers of stations may differ."""
+    """Return the structure that runs must share to be drawn together; numbers of stations may differ."""
     names = [tuple(map(str, run[dim].values)) for dim in ("body", "joint", "motor")]
     springs = run["spring_position"].shape[1:] if "spring_position" in run else ()
     return (*names, tuple(dict.fromkeys(map(str, _station_bodies(run)))), springs)
 
 
 def _with_as_many_stations(runs: Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    """Runs with the largest number of stations of each body; some stations are repeated, none is moved.
+    """Return runs in which every body has the largest number of stations; stations are repeated, none is moved.
 
-    A parameter that moves a point along a beam changes how many there are between its points.
+    A parameter that moves a point along a beam changes the number of stations between its points.
     """
-    # They differ from run to run, and so do the radii of wheels.
+    # Station numbers differ from run to run, and so do the radii of wheels.
     runs = [run.reset_coords([name for name in _DIFFERING if name in run.coords]) for run in runs]
     names = [_station_bodies(run) for run in runs]
     if all(np.array_equal(each, names[0]) for each in names):
@@ -194,14 +199,14 @@ def _with_as_many_stations(runs: Sequence[xr.Dataset]) -> list[xr.Dataset]:
 
 
 def _taken(run: xr.Dataset, stations: NDArray[np.intp]) -> xr.Dataset:
-    """A run with some stations only, ascending; points and ends of springs are at the same ones as before."""
+    """Return a run with the given stations, ascending; indices of points, springs, rails and loads are updated."""
     moved = {name: run[name].copy(data=np.where(run[name] < 0, -1, np.searchsorted(stations, run[name])))
              for name in _STATIONS if name in run}  # fmt: skip
     return run.isel(station=stations).assign(moved)
 
 
 def _spread(names: NDArray[np.str_], most: Mapping[str, int]) -> NDArray[np.intp]:
-    """Stations, each at least once, such that every body has a given number."""
+    """Return station indices, each at least once, such that every body has a given number of them."""
     own = {name: np.flatnonzero(names == name) for name in most}
     return np.concatenate([
         places[np.rint(np.linspace(0, places.size - 1, most[name])).astype(np.intp)] for name, places in own.items()
@@ -245,7 +250,7 @@ def _tiles(designs: DesignTable, account: StudyAccount) -> list[tuple[str, str, 
 def _best_table(
     designs: DesignTable, picked: Sequence[Picked], shown: Sequence[int], account: StudyAccount
 ) -> tuple[str, str]:
-    """Title and table of the best designs: their numbers, metrics, and the metrics in which they are best."""
+    """Return title and table of the best designs: parameters, metrics, and the metrics in which they are best."""
     title, why_head, note = (
         ("Best designs", "best in", LOWER) if account.seeks_least else ("Designs shown", "which", "")
     )
@@ -283,7 +288,7 @@ def _parameter_table(account: StudyAccount) -> str:
 
 
 def _trouble(designs: DesignTable) -> list[tuple[str, str]]:
-    """Reasons why runs are not complete, similar ones together."""
+    """Return the table of reasons why runs are not complete, with similar ones grouped."""
     found = reasons(designs)
     if not found:
         return []
@@ -300,7 +305,7 @@ def _unfinished(designs: DesignTable, account: StudyAccount) -> list[str]:
 
 
 def _panels(data: xr.Dataset, runs: list[str], account: StudyAccount) -> list[Panel]:
-    """The runs shown in motion, over time."""
+    """Return the charts over time of the runs shown in motion."""
     data = data.transpose("mode", "time", ...)
     title = f"The {'best ' if account.seeks_least else ''}designs in motion"
     if "end_effector_desired" not in data:

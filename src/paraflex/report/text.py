@@ -1,4 +1,4 @@
-"""Numbers, names and tables of a page."""
+"""Numbers and tables of a page as text and HTML."""
 
 from __future__ import annotations
 
@@ -12,23 +12,25 @@ from html import escape
 from paraflex.plots.labels import display_unit, display_units, raised
 from paraflex.units import DisplayUnit
 
-# Magnitudes written out; others as powers of ten.
+# Range of magnitudes written without powers of ten.
 _SMALLEST_PLAIN, _LARGEST_PLAIN = 1e-3, 1e5
-# A value is rounding below this share of what it is a difference of.
+# Share of the magnitude of its terms below which a difference is a rounding error.
 _ROUNDING = 16.0 * sys.float_info.epsilon
 NO_VALUE = "–"
 _WORD_CLASS, _SORTABLE = ' class="words"', ' class="sortable"'
 
 
 def number(value: float | None, factor: float = 1.0, *, beside: float = 0.0) -> str:
-    """A value to three digits, times a factor: "0.377", "1.2 × 10⁻⁵"; a dash if there is none.
+    """Format a value times a factor with three digits: "0.377", "1.20 × 10⁻⁵"; a dash if there is none.
 
     Parameters
     ----------
     value : float, optional
+        Value to format.
     factor : float
+        Factor of the value, such as a change of units.
     beside : float
-        Magnitude of what the value is a difference of, or a part; what is only the rounding of that is "0".
+        Magnitude of the quantities whose difference or part the value is; a value within their rounding is "0".
     """
     if value is None or not math.isfinite(factor * value):
         return NO_VALUE
@@ -38,15 +40,15 @@ def number(value: float | None, factor: float = 1.0, *, beside: float = 0.0) -> 
     if not _SMALLEST_PLAIN <= abs(value) < _LARGEST_PLAIN:
         digits, power = f"{value:.2e}".split("e")
         return f"{digits} × 10{raised(int(power))}".replace("-", "−")
-    # Whole numbers of four or five digits are kept.
+    # Numbers of four or five digits are written as whole numbers.
     text = f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:#.3g}".rstrip(".")
     return text.replace("-", "−")
 
 
 def common_unit(unit: str, values: Iterable[float | None], *, beside: float = 0.0) -> DisplayUnit:
-    """The unit in which all values are written without powers of ten, or that of the largest where there is none.
+    """Return the unit in which all values are written without powers of ten, else the unit of the largest.
 
-    Values are those of `number`, with the same magnitude beside them.
+    Values and `beside` are as for `number`.
     """
     known = [abs(one) for one in values if one is not None and math.isfinite(one) and abs(one) > _ROUNDING * beside]
     if not known:
@@ -61,13 +63,13 @@ def common_unit(unit: str, values: Iterable[float | None], *, beside: float = 0.
 
 
 def quantity(value: float, unit: str, shown: DisplayUnit | None = None) -> str:
-    """A value in a suitable unit, or in a given one: "0.377 mm"."""
+    """Format a value in a suitable unit, or in a given one: "0.377 mm"."""
     shown = shown or display_unit(unit, value)
     return f"{number(value, shown.factor)} {shown.name}"
 
 
 def count(value: float | None) -> str:
-    """A whole number with thousands separated: "43 708"."""
+    """Format a whole number with separated thousands: "43 708"; a dash if there is none."""
     return NO_VALUE if value is None or not math.isfinite(value) else f"{int(value):,}".replace(",", "\u2009")
 
 
@@ -80,26 +82,25 @@ def table(
     runs: Mapping[str, int] | None = None,
     keys: Mapping[str, Sequence[float | str | None]] | None = None,
 ) -> str:
-    r"""An HTML table with a name before each row, which scrolls within the page if it is too wide.
+    r"""Return an HTML table with a name before each row, which scrolls within the page if it is too wide.
 
     Parameters
     ----------
     heads : sequence of (str, str)
-        Names of columns and their units, the rows' own first.
+        Names and units of the columns, first that of the row names.
     rows : sequence of (str, sequence of str)
-        Name of a row, and its cells; a cell of two lines is "first\nsecond".
+        Name and cells of each row; a cell of two lines is "first\nsecond".
     caption : str
-        For those who hear the page.
+        Caption for screen readers.
     note : str
-        A sentence under it.
+        Sentence below the table.
     runs : mapping of str to int, optional
-        Which rows select which run of the page.
+        Runs of the page that rows select, by the name of the row.
     keys : mapping of str to sequence, optional
-        What rows are sorted by when the reader chooses a column, one for each column of a row, the rows' own first;
-        None stands last.
+        Sort keys of each row by its name, one for each column, first that of the row names; None is sorted last.
     """
     runs = runs or {}
-    # Columns of texts with words, which are no numbers.
+    # Columns that contain words instead of numbers.
     words = re.compile(r"[^\n]*?[A-Za-z]{2}")
     wordy = [k > 0 and any(words.match(cells[k - 1]) for _, cells in rows) for k in range(len(heads))]
     head = "".join(
@@ -117,7 +118,10 @@ def table(
 
 
 def by_run(tables: Sequence[tuple[str, str]]) -> str:
-    """HTML of tables, one for each run of the page with its title: the screen has the selected run's, paper all."""
+    """Return the HTML of tables with titles, one for each run of the page.
+
+    The screen shows the table of the selected run, a printed page all of them.
+    """
     return "".join(
         f'<div class="of-run" data-of-run="{run}"><h3>{escape(title)}</h3>{html}</div>'
         for run, (title, html) in enumerate(tables)
@@ -125,7 +129,7 @@ def by_run(tables: Sequence[tuple[str, str]]) -> str:
 
 
 def pairs(facts: Sequence[tuple[str, str]]) -> str:
-    """HTML of names and values."""
+    """Return the HTML of a list of names and values."""
     return f'<dl class="pairs">{"".join(f"<div><dt>{escape(a)}</dt><dd>{escape(b)}</dd></div>" for a, b in facts)}</dl>'
 
 
@@ -136,7 +140,7 @@ def _small(text: str) -> str:
 def _row(
     name: str, cells: Sequence[str], wordy: Sequence[bool], run: int | None, keys: Sequence[float | str | None] | None
 ) -> str:
-    """A row, columns of words as such; that of a run of the page is a button, keys are for sorting."""
+    """Return the HTML of a row; if it selects a run, its name is a button; keys are for sorting."""
     about, head = "", escape(name)
     if run is not None:
         about, head = f' data-run="{run}"', f'<button type="button" class="pick">{head}</button>'

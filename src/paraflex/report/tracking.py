@@ -1,4 +1,4 @@
-"""The report of a tracking study: comparison of all modes, and each mode."""
+"""Report of a tracking study: comparison of all actuation modes, and details of each mode."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ from paraflex.results.validity import validity_line, validity_summary
 
 @checked_arguments()
 def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> Page:
-    """The report of a tracking study.
+    """Return the report of a tracking study.
 
     Parameters
     ----------
     data : xarray.Dataset
-        From `results.tracking_dataset`.
+        Results from `results.tracking_dataset`.
     failed : mapping of str to str, optional
         Modes that could not start, each with its reason.
     """
@@ -67,7 +67,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     modes = f"{len(runs)} actuation modes" if len(runs) > 1 else f"actuation mode {runs[0]}"
     moving = animation(data)
     few = thinned(data)
-    # Of whole runs only.
+    # The validity is that of complete runs only.
     whole = data.isel(mode=finished(data))
     valid = validity_line({name: validity_summary(whole.sel(mode=name)) for name in names_of(whole, "mode")})
     return Page(
@@ -97,7 +97,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
 
 
 def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
-    """Results of every mode."""
+    """Return the table of the results of every mode."""
     runs = names_of(data, "mode")
     errors_rms, words = headline(data)
     gaps, deflections = errors(data).values, deflections_of(data)
@@ -143,7 +143,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
 
 
 def solver_table(data: xr.Dataset) -> str:
-    """What the integration of every mode took, and how well it kept energy and constraints."""
+    """Return the table of the solver's statistics for every mode, and of its errors in energy and constraints."""
     heads = [
         ("mode", ""), ("imbalance", "energy [J]"), ("constraints", "position [m]"), ("constraints", "velocity [m/s]"),
         ("steps", ""), ("rejected", "steps"), ("iterations", "of Newton"), ("factorisations", ""), ("wall time", "[s]"),
@@ -165,7 +165,7 @@ def solver_table(data: xr.Dataset) -> str:
 
 
 def _after(data: xr.Dataset) -> list[tuple[str, str]]:
-    """Actions of the motors after the motion, if runs go on after it."""
+    """Return a fact on the motors after the motion, if runs continue after it."""
     if data["time"].values[-1] <= data.attrs.get("motion_end", np.inf) or "after" not in data.attrs:
         return []
     if asked(data).get("ked"):
@@ -174,7 +174,7 @@ def _after(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _after_columns(data: xr.Dataset) -> list[tuple[str, str, NDArray[np.float64]]]:
-    """Name, unit and values of results after the motion; none if runs end with it."""
+    """Return name, unit and values of the results after the motion; empty if runs end with it."""
     columns = []
     for name, key, unit in (
         ("error after", "tracking_rms_after", "m"),
@@ -227,7 +227,7 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
 
 
 def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
-    """Angular velocity over angle, a closed curve for a periodic motion."""
+    """Return the phase diagram, angular velocity over angle; a periodic motion gives a closed curve."""
     angle, rate = data["angle"].values, data["angular_velocity"].values
     way, pace = data["angle_desired"].values[0], data["angular_velocity_desired"].values[0]
     curves = []
@@ -244,7 +244,7 @@ def _phases(data: xr.Dataset, bodies: list[str], runs: list[str]) -> Chart:
 
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    """The main numbers: where modes failed that, and of the others the rest."""
+    """Return the tiles of the main numbers; failed modes come first, and numbers are those of complete modes."""
     rms, words = headline(data)
     whole = finished(data)
     errors_rms = np.where(whole, rms.values, np.nan)
@@ -268,7 +268,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
 
 
 def _broken_off(data: xr.Dataset, whole: NDArray[np.bool_]) -> tuple[str, str, str]:
-    """How many runs did not come to their end, and how far they came."""
+    """Return the tile of incomplete runs: their number and the times at which they ended."""
     first = np.flatnonzero(~whole)
     ends = [float(data["time"].values[max(samples(data.isel(mode=r)) - 1, 0)]) for r in first]
     word = str(data["status"].values[first[0]])
@@ -282,7 +282,7 @@ def _name(data: xr.Dataset, run: int) -> str:
 
 
 def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
-    """Reasons why modes ended early."""
+    """Return the reasons why modes failed or ended early."""
     out = [f"Mode {name} could not be run: {reason}" for name, reason in failed.items()]
     for r, name in enumerate(data["mode"].values):
         status = str(data["status"].values[r])
@@ -303,7 +303,7 @@ def _model(run: Mapping[str, object]) -> str:
 
 
 def _deflection(values: NDArray[np.float64], bodies: NDArray[np.str_], factor: float, wide: float) -> str:
-    """The largest deflection (samples, bodies) of a mechanism of some width, and its body."""
+    """Return the largest of deflections (samples, bodies) and its body as text; `wide` is the mechanism's size [m]."""
     if not np.isfinite(values).any() or np.nanmax(values) == 0.0:
         return NO_VALUE
     where = int(np.nanargmax(np.nanmax(np.where(np.isfinite(values), values, -1.0), axis=0)))

@@ -1,4 +1,4 @@
-"""The report of a verification: all models of one mechanism in common charts, and their distances."""
+"""Report of a verification: all models of one mechanism in common charts, and their distances."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _KED = (
 
 
 class _Runs:
-    """Runs of every model in every mode, modes first."""
+    """Runs of every model in every mode, ordered by mode."""
 
     def __init__(self, data: xr.Dataset) -> None:
         self.modes, self.models = names_of(data, "mode"), names_of(data, "model")
@@ -45,17 +45,17 @@ class _Runs:
         ]
 
     def of_mode(self, mode: int) -> tuple[int, ...]:
-        """All runs of a mode."""
+        """Return the indices of all runs of a mode."""
         return tuple(mode * len(self.models) + k for k in range(len(self.models)))
 
     def array(self, values: xr.DataArray) -> NDArray[np.float64]:
-        """Values (modes, models, samples, ...)."""
+        """Return values as an array (modes, models, samples, ...)."""
         return values.transpose("mode", "model", "time", ...).values
 
     def overlaid(self, chart: Chart, values: NDArray[np.float64], unit: str) -> Chart:
-        """A chart with curves of values (modes, models, samples): all models of the selected run's mode.
+        """Return a chart of values (modes, models, samples) that shows all models in the mode of the selected run.
 
-        Where the chart has choices, there is a last axis of them.
+        If the chart has choices, values have a last axis for them.
         """
         shown = display_unit(unit, values)
         values = shown.factor * values
@@ -73,14 +73,14 @@ class _Runs:
 
 @checked_arguments()
 def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
-    """The report of a verification.
+    """Return the report of a verification.
 
     Parameters
     ----------
     data : xarray.Dataset
-        From `studies.Verification.dataset`.
+        Results from `studies.Verification.dataset`.
     summary : mapping
-        From `studies.agreement`: what `verify.json` holds.
+        Summary from `studies.agreement`, the content of `verify.json`.
     """
     check_kind(data, "verification")
     runs, asked_for = _Runs(data), asked(data)
@@ -125,7 +125,7 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
 
 
 def _models(mode: Mapping[str, Any], reference: str, runs: _Runs, name: str, wide: float) -> str:
-    """Every model in a mode of a mechanism whose path reaches so far from the origin [m]."""
+    """Return the table of all models in a mode; `wide` is the largest coordinate of the desired path [m]."""
     models = mode["models"]
     unit, away, finer, meshed = (
         common_unit("m", [one.get(key) for one in models.values() for key in keys], beside=wide)
@@ -203,7 +203,7 @@ def _panels(data: xr.Dataset, runs: _Runs, reference: str) -> list[Panel]:
     datum, name = runs.models.index(reference), printed(reference)
 
     def of_parts(chart: Chart, variable: str, *, difference: bool = False) -> Chart:
-        """A quantity of one link or motor at a time in all models, or its difference from the reference."""
+        """Return a chart of one link or motor at a time in all models, or of its difference from the reference."""
         values = runs.array(data[variable])
         parts = [text_symbol(part) for part in names_of(data, "motor" if variable == "torque" else "body")]
         values = values - values[:, datum : datum + 1] if difference else values
@@ -246,7 +246,7 @@ def _panels(data: xr.Dataset, runs: _Runs, reference: str) -> list[Panel]:
 
 
 def _paths(data: xr.Dataset, runs: _Runs) -> Chart:
-    """Paths in all models, deviations magnified alike."""
+    """Return the chart of the paths in all models, with one magnification of deviations."""
     desired = 1e3 * runs.array(data["end_effector_desired"])[0, 0]
     places = 1e3 * runs.array(data["end_effector"])
     times = round_magnification((places - desired).reshape(-1, 2), float(np.ptp(desired, axis=0).max()))
@@ -261,7 +261,10 @@ def _paths(data: xr.Dataset, runs: _Runs) -> Chart:
 
 
 def _tiles(summary: Mapping[str, Any], reference: str) -> list[tuple[str, str, str]]:
-    """The nearest model to the reference and its distance in the first mode, and the time of all runs."""
+    """Return the tiles: nearest and farthest model and the error of the reference in the first mode, number of models.
+
+    Distances are from the reference model.
+    """
     name, mode = next(iter(summary["modes"].items()))
     apart = {
         model: one["distance_max"] for model, one in mode["models"].items()
