@@ -1,7 +1,7 @@
-"""Readings of sensors for coordinates over time, and their exact derivatives at a state.
+"""Sensor readings from coordinates over time, and their exact derivatives at a state.
 
-Every sensor reads from the few bodies, constraint rows and motors that it depends on; its derivatives are found by
-complex steps in these alone. Squire, Trapp (1998), Using complex variables to estimate derivatives of real functions.
+Every sensor reads from the few bodies, constraint rows and motors that it depends on; complex steps in these alone give
+its derivatives. Squire, Trapp (1998), Using complex variables to estimate derivatives of real functions.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _STEP = 1e-30
 
 
 class MotionSamples(NamedTuple):
-    """What sensors read from: coordinates (k, n) and their derivatives, multipliers (k, m), torques (k, motors)."""
+    """Inputs of sensors: coordinates (k, n) and their derivatives, multipliers (k, m), torques (k, motors)."""
 
     q: Numbers
     v: Numbers
@@ -54,7 +54,7 @@ class MotionSamples(NamedTuple):
 
 
 class SensorRows(NamedTuple):
-    """Derivatives of readings, sparse: (sensors, n) by q, v and a, (sensors, m), (sensors, motors)."""
+    """Sparse derivatives of readings: (sensors, n) by q, v and a, (sensors, m) and (sensors, motors)."""
 
     q: scipy.sparse.csr_matrix
     v: scipy.sparse.csr_matrix
@@ -64,12 +64,12 @@ class SensorRows(NamedTuple):
 
 
 class _Local(NamedTuple):
-    """A sensor with what it depends on.
+    """A sensor and the quantities it depends on.
 
     Attributes
     ----------
     read : callable
-        From those of its own columns alone to readings (k,).
+        Function from the samples of its own columns to readings (k,).
     columns : MotionSamples of (c,) arrays
         Numbers of the coordinates, multipliers and motors that it depends on.
     """
@@ -78,30 +78,31 @@ class _Local(NamedTuple):
     columns: MotionSamples
 
     def taken(self, given: MotionSamples) -> MotionSamples:
-        """Its own columns of those of a system."""
+        """Select the sensor's own columns from the samples of a system."""
         return MotionSamples(*(values[:, own] for values, own in zip(given, self.columns, strict=True)))
 
 
 class SensorReader:
-    """Readings of some sensors of a system, for one call after another.
+    """Readings of sensors of a system, prepared for repeated calls.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     sensors : sequence of Sensor, optional
-        By default those of the mechanism.
+        Sensors to read; those of the mechanism by default.
 
     Raises
     ------
     InputError
-        A sensor of what the mechanism does not have.
+        A sensor refers to a member that the mechanism does not have.
     """
 
     def __init__(self, system: System, sensors: Sequence[Sensor] | None = None) -> None:
         self._locals: list[_Local] = _locals(system, sensors)
 
     def __call__(self, q: Numbers, v: Numbers, a: Numbers, multipliers: Numbers, torques: Numbers) -> Numbers:
-        """See `sensor_readings`."""
+        """Return the readings: see `sensor_readings`."""
         given = MotionSamples(q, v, a, multipliers, torques)
         readings = [each.read(each.taken(given)) for each in self._locals]
         return np.stack(readings, axis=1) if readings else np.zeros((len(q), 0))
@@ -116,22 +117,25 @@ def sensor_readings(
     torques: Numbers,
     sensors: Sequence[Sensor] | None = None,
 ) -> Numbers:
-    """Readings (k, sensors), each in its unit (`Mechanism.sensor_unit`); complex where something given is.
+    """Return readings (k, sensors), each in its unit (`Mechanism.sensor_unit`); complex if any argument is.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     q, v, a : (k, n) arrays
+        Coordinates, velocities and accelerations.
     multipliers : (k, m) array
+        Multipliers.
     torques : (k, motors) array
         Torque or force of every motor.
     sensors : sequence of Sensor, optional
-        By default those of the mechanism.
+        Sensors to read; those of the mechanism by default.
 
     Raises
     ------
     InputError
-        A sensor of what the mechanism does not have.
+        A sensor refers to a member that the mechanism does not have.
     """
     return SensorReader(system, sensors)(q, v, a, multipliers, torques)
 
@@ -145,20 +149,23 @@ def sensor_rows(
     torques: Array,
     sensors: Sequence[Sensor] | None = None,
 ) -> SensorRows:
-    """Derivatives of the readings at one state by all that they are read from, exact but for rounding.
+    """Return the derivatives of the readings at one state by all their inputs, exact up to rounding.
 
     Parameters
     ----------
     system, sensors
-        As for `sensor_readings`.
+        System and sensors as for `sensor_readings`.
     q, v, a : (n,) arrays
+        Coordinates, velocities and accelerations.
     multipliers : (m,) array
+        Multipliers.
     torques : (motors,) array
+        Torque or force of every motor.
 
     Raises
     ------
     InputError
-        A sensor of what the mechanism does not have.
+        A sensor refers to a member that the mechanism does not have.
     """
     state = MotionSamples(*(np.asarray(each)[None] for each in (q, v, a, multipliers, torques)))
     found = _locals(system, sensors)
@@ -176,7 +183,7 @@ def sensor_rows(
 
 
 def _sparse(rows: Sequence[tuple[Array, Array]], width: int) -> scipy.sparse.csr_matrix:
-    """A matrix of rows that are given by their columns and the values there."""
+    """Return the matrix of rows given by their columns and the values there."""
     counts = [columns.size for columns, _ in rows]
     columns = np.concatenate([np.zeros(0, int), *(columns for columns, _ in rows)])
     values = np.concatenate([np.zeros(0), *(values for _, values in rows)])
@@ -195,7 +202,7 @@ def _locals(system: System, sensors: Sequence[Sensor] | None) -> list[_Local]:
 
 
 def _local(system: System, sensor: Sensor) -> _Local:
-    """A sensor in a system of the bodies alone that it depends on."""
+    """Return a sensor in a system reduced to the bodies that it depends on."""
     names, parts = _bodies(system, sensor), JointParts((), ())
     if isinstance(sensor, JointForceSensor):
         parts = joint_parts(system, sensor.joint)
@@ -213,12 +220,12 @@ def _local(system: System, sensor: Sensor) -> _Local:
 
 
 def _contacts(system: System, sensor: Sensor) -> list[Joint]:
-    """Joints that slide along the beam of a strain gauge: their forces bend it where they are."""
+    """Return the joints that slide along the beam of a strain sensor: their forces bend it locally."""
     return sliding_joints(system.mechanism, sensor.body) if isinstance(sensor, StrainGauge) else []
 
 
 def _bodies(system: System, sensor: Sensor) -> list[str]:
-    """Names of the bodies that a reading depends on, each once."""
+    """Return the names of the bodies that a reading depends on, each once."""
     joints = [system.mechanism.joint(name) for _, name, _ in joints_named(sensor)] + _contacts(system, sensor)
     points = [*points_named(sensor).values(), *(point for joint in joints for point in (joint.a, joint.b))]
     names = [*(point.body for point in points), getattr(sensor, "body", GROUND)]
@@ -226,7 +233,7 @@ def _bodies(system: System, sensor: Sensor) -> list[str]:
 
 
 def _reader(system: System, sensor: Sensor, parts: JointParts) -> Callable[[MotionSamples], Numbers]:
-    """What a sensor of a system does."""
+    """Return the function that evaluates a sensor of a system."""
     if isinstance(sensor, Encoder):
         return lambda at: joint_coordinate(system, sensor.joint, at.q, at.v).value
     if isinstance(sensor, Tachometer):
@@ -243,7 +250,7 @@ def _reader(system: System, sensor: Sensor, parts: JointParts) -> Callable[[Moti
 
 
 def _of_point(system: System, sensor: PointSensor) -> Callable[[MotionSamples], Numbers]:
-    """Component of a point's motion along an axis, which a body may carry."""
+    """Return the reader of a component of a point's motion along an axis, which a body may carry."""
     marker, (ex, ey) = system.marker(sensor.point), sensor.direction
     frame = None if sensor.body == GROUND else system.body(sensor.body)
 
@@ -263,7 +270,7 @@ def _of_point(system: System, sensor: PointSensor) -> Callable[[MotionSamples], 
 
 
 def _of_strain(system: System, sensor: StrainGauge) -> Callable[[MotionSamples], Numbers]:
-    """Strain of a beam, N / E A - distance M / E I; without N where its coordinates do not stretch."""
+    """Return the reader of a beam's strain, N / E A - distance M / E I; without N if its coordinates do not stretch."""
     described = system.mechanism.body(sensor.body)
     assert isinstance(described, FlexibleBeam | AssumedModesBeam)
     at_place = section_at(system, sensor.body, sensor.place(described.points))
@@ -282,7 +289,7 @@ def _of_strain(system: System, sensor: StrainGauge) -> Callable[[MotionSamples],
 
 
 def _of_load(system: System, sensor: JointForceSensor, parts: JointParts, at: MotionSamples) -> Numbers:
-    """Component of a joint's force, or its moment."""
+    """Return a component of a joint's force, or its moment."""
     force, moment = load_in(system, sensor.joint, parts, at.q, at.multipliers, at.torques)
     if sensor.axis == "moment":
         return moment
@@ -297,7 +304,7 @@ def _of_load(system: System, sensor: JointForceSensor, parts: JointParts, at: Mo
 
 
 def _of_deflection(system: System, sensor: DeflectionSensor) -> Callable[[MotionSamples], Numbers]:
-    """Displacement of a point in its body's frame, or the turn of the material there."""
+    """Return the reader of a point's displacement in its body's frame, or of the rotation of the material there."""
     marker = system.marker(sensor.point)
     body = system.bodies[marker.body]
     if sensor.axis == "angle":
