@@ -1,4 +1,4 @@
-"""Joints along beams: axes that stay straight where the pin seems to run along a beam that bends."""
+"""Joints along beams: straight axes where the pin seems to slide along a beam that bends."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from paraflex.dynamics import System, joint_coordinate
 from paraflex.findings import Finding
 from paraflex.mechanism import FlexibleBeam, Mechanism
 
-# Sine of the angle between an axis and its beam below which it lies along the beam.
+# Sine of the angle between an axis and its beam below which the axis is along the beam.
 _ALONG = 1e-6
 
 
 def axes_along_beams(mechanism: Mechanism, rigid: System, q: Array) -> Iterator[Finding]:
-    """Slots and prismatic joints with an axis along a flexible beam and the pin on it, at rigid q (n,)."""
+    """Yield slots and prismatic joints whose axis is along a flexible beam and whose pin is on it, at rigid q (n,)."""
     for joint in mechanism.joints:
         beam = None if joint.a.on_ground else mechanism.body(joint.a.body)
         if not joint.slides or joint.follows_beam or not isinstance(beam, FlexibleBeam) or not beam.flexible:

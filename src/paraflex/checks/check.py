@@ -1,4 +1,4 @@
-"""All checks in one."""
+"""All checks of a model together."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from paraflex.validity.numbers import doubtful_numbers
 
 
 def loaded(model: Model | Mechanism | str | FilePath) -> Model | Mechanism:
-    """A model or mechanism as it is, or the model of a name or file; an `InputError` for anything else."""
+    """Return a model or mechanism unchanged, or load the model of a name or file; other types raise an `InputError`."""
     found = load(model) if isinstance(model, str | FilePath) else model
     if isinstance(found, Model | Mechanism):
         return found
@@ -36,30 +36,30 @@ def check(
     modes: Sequence[str] | None = None,
     seen: Examination | None = None,
 ) -> Verdict:
-    """Look a model over before it runs: are its numbers plausible, does it close as meant, can it do its study?
+    """Check a model before it runs: whether its numbers are plausible, it closes as intended, and its study can run.
 
     Parameters
     ----------
     model : Model, Mechanism, str or Path
-        A name or file is loaded. Of a mechanism alone there is no study to look at.
+        Model to check, or its name or file. A mechanism alone has no study to check.
     path : str, optional
-        One of the model's paths; the study's by default.
+        Name of one of the model's paths; the study's by default.
     assembly : str, optional
-        The study's, or the first.
+        Name of the assembly; by default the study's, or the first.
     modes : sequence of str, optional
-        Actuation modes along the path; the study's, or all of the mechanism.
+        Actuation modes along the path; by default the study's, or all of the mechanism.
     seen : Examination, optional
-        Of the mechanism, where it has been examined.
+        Examination of the mechanism, if it has been made.
 
     Returns
     -------
     Verdict
-        Sound, doubtful or wrong, and why: a `Finding` for each reason, with code, place, text and remedy.
+        Verdict, sound, doubtful or wrong, with a `Finding` for each reason: code, place, text and remedy.
 
     Raises
     ------
     InputError
-        A file that cannot be read, an unknown path, assembly or mode, or nothing to check.
+        A file cannot be read, a path, assembly or mode is unknown, or there is nothing to check.
     """
     model = loaded(model)
     mechanism = model if isinstance(model, Mechanism) else model.mechanism
@@ -87,9 +87,9 @@ def check(
 def check_planned(
     model: Model, task: TrackingTask, path: str, modes: Sequence[ActuationMode], assembly: str | None
 ) -> Verdict:
-    """The same of a study along a path of that name, planned and about to run.
+    """Check a study along a path of that name, planned and about to run.
 
-    Modes that cannot be driven are left to the run.
+    Modes that cannot drive the mechanism are reported by the run.
     """
     seen = examine(model.mechanism, assembly or model.study.assembly)
     found = [*doubtful_numbers(model.mechanism), *pose_findings(seen), *task_findings(task, modes)]

@@ -1,4 +1,4 @@
-"""A model drawn before it runs."""
+"""Drawing of a model before it runs."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from paraflex.results.posed import Posed, posed
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Of a drawing beside its margins, and of one that fits into memory [mm].
+# Least width of a drawing with its margins, and largest width that fits into memory [mm].
 _NARROWEST, _WIDEST = 20.0, 5000.0
 
 
 def pose_of(
     model: Model | Mechanism | str | FilePath, *, assembly: str | None = None, path: str | None = None
 ) -> Posed:
-    """The pose that a model starts from: on its path where it has one, else as its start or its assembly says.
+    """Return the pose that a model starts from: on its path if it has one, else given by its start or its assembly.
 
     Parameters
     ----------
     model : Model, Mechanism, str or Path
-        A name or file is loaded.
+        Model, or its name or file.
     assembly : str, optional
-        The study's, or the first.
+        Name of the assembly; by default the study's, or the first.
     path : str, optional
-        One of the model's paths; the study's by default.
+        Name of one of the model's paths; the study's by default.
 
     Raises
     ------
     InputError
-        A file that cannot be read, an unknown path or assembly, or no assembly at all.
+        A file cannot be read, a path or assembly is unknown, or there is no assembly at all.
     """
     model = loaded(model)
     if isinstance(model, Mechanism):
@@ -59,27 +59,28 @@ def draw(
     width: float = 174.0,
     theme_name: str = "light",
 ) -> Figure:
-    """A model drawn before anything runs: bodies, joints by kind, motors, springs, loads and path, with their names.
+    """Draw a model before it runs: bodies, joints by kind, motors, springs, loads and path, with their names.
 
-    Loops that do not close are drawn as given, their open joints marked, with a warning.
+    Loops that do not close are drawn as given, with their open joints marked, and a warning is issued.
 
     Parameters
     ----------
     model, assembly, path
-        See `pose_of`.
+        Arguments of `pose_of`.
     width : float
-        [mm]
+        Width of the drawing [mm].
     theme_name : str
-        "light" or "dark".
+        Theme: "light" or "dark".
 
     Returns
     -------
     matplotlib.figure.Figure
+        Drawing of the model.
 
     Raises
     ------
     InputError
-        See `pose_of`.
+        The pose cannot be found (see `pose_of`), or the width is out of range.
     """
     from paraflex.plots.model_drawing import model_drawing  # Matplotlib takes long to import
 

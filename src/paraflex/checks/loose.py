@@ -1,4 +1,4 @@
-"""Points that were to be joined and are not: of one name, at about one place, where more is free than is driven."""
+"""Points likely meant to be joined: of one name, close together, in a mechanism with undriven freedoms."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from paraflex.mechanism.joints import GROUND, PointRef
 from paraflex.validity.actions import numbered_alike
 from paraflex.validity.numbers import mechanism_size
 
-# Distance of two such points over the mechanism's size: what was to be joined closes only roughly without its joint.
+# Distance of two such points relative to the mechanism's size: without its joint an assembly closes only roughly.
 NEAR_POINTS = 0.2
 
 
 def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
-    """A point that nothing uses beside one of the same name on another body, at coordinates q of the rigid mechanism.
+    """Yield unused points close to a point of the same name on another body, at coordinates q of the rigid mechanism.
 
-    B and B3 count as one name where both are unused.
+    B and B3 count as the same name if both points are unused.
     """
     mechanism = rigid.mechanism
     unused = _unused(mechanism)
     ground = [PointRef(GROUND, name) for name in mechanism.ground]
     known = [*ground, *(PointRef(body.name, name) for body in mechanism.bodies for name in body.points)]
     direct = {frozenset((one.a.body, one.b.body)) for one in mechanism.joints}
-    # An assembly by angles leaves their travels open.
+    # An assembly by angles leaves the travels of sliding joints open.
     sliding = {end.body for joint in mechanism.joints if joint.slides for end in (joint.a, joint.b)}
     sliding.discard(GROUND)
     reported: set[PointRef] = set()
@@ -42,7 +42,7 @@ def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
             gap = float(np.linalg.norm(point_position(rigid, q, one) - point_position(rigid, q, other)))
             if gap < size * (1.0 if {one.body, other.body} & sliding else NEAR_POINTS):
                 pairs.append((other not in unused, gap, one, other))
-    # First those that are both unused, then the nearest.
+    # Pairs with both points unused come first, then the nearest.
     for _, gap, one, other in sorted(pairs, key=lambda pair: pair[:2]):
         if not reported & {one, other}:
             reported |= {one, other}
@@ -53,7 +53,7 @@ def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
 
 
 def _unused(mechanism: Mechanism) -> list[PointRef]:
-    """Points of bodies that no joint, spring, load, lump or end-effector names."""
+    """Return the points of bodies that no joint, spring, load, lump or end-effector refers to."""
     used = mechanism.points_used
     named = [PointRef(body.name, name) for body in mechanism.bodies for name in body.points]
     return [point for point in named if point not in used]

@@ -1,4 +1,4 @@
-"""The pose a mechanism starts from: does it close as meant, is it special, what do motors reach, what vibrates."""
+"""Checks of the pose a mechanism starts from: closure, special poses, freedoms driven by motors, vibrations."""
 
 from __future__ import annotations
 
@@ -30,27 +30,28 @@ from paraflex.limits import OUT_OF_PROPORTION
 from paraflex.mechanism import Mechanism, standing
 from paraflex.validity import moved_far, stiff_modes
 
-# A first natural frequency below this is that of no link [Hz].
+# Natural frequency below that of any link [Hz].
 SLOWEST_LINK = 0.1
 
 
 @dataclass(frozen=True)
 class Examination:
-    """What is found of a mechanism at the pose of one of its assemblies.
+    """Results of examining a mechanism at the pose of one of its assemblies.
 
     Attributes
     ----------
     system, rigid : System
-        Flexible, and with rigid bodies.
+        Flexible system, and the system with rigid bodies.
     starts : tuple of Closure
-        Of every assembly.
+        Closure of every assembly.
     chosen : Closure or None
-        Of the assembly asked for; None where there is no assembly.
+        Closure of the chosen assembly; None if there is no assembly.
     mobility : Mobility or None
+        Degrees of freedom at the pose; None if the assembly does not close.
     reach : Reach or None
-        None of an assembly that does not close.
+        Degrees of freedom driven by motors; None if the assembly does not close.
     problem : str
-        Why they could not be computed where it does; empty for none.
+        Reason why mobility and reach of a closed assembly could not be computed; empty for none.
     """
 
     system: System
@@ -63,12 +64,19 @@ class Examination:
 
 
 def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
-    """Close every assembly, and see what is free and what motors reach at the one asked for, or the first.
+    """Close every assembly, and compute degrees of freedom and reach of the motors for the chosen one, or the first.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Mechanism as described.
+    assembly : str, optional
+        Name of the chosen assembly; the first by default.
 
     Raises
     ------
     InputError
-        An unknown assembly.
+        The assembly is unknown.
     """
     mechanism = standing(mechanism, assembly)
     system, rigid = build_system(mechanism), build_system(mechanism.rigid())
@@ -87,7 +95,7 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
 
 
 def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Finding]:
-    """What is wrong or doubtful about the pose, and whether what starts there at rest would stay."""
+    """Yield findings about the pose; `at_rest` adds whether a mechanism at rest there would stay."""
     if not seen.starts:
         yield Finding(
             "assembly-missing", "assembly", "no assembly: it cannot be seen whether the loops close",
@@ -128,7 +136,7 @@ def _mobility(free: Mobility, drives: Reach) -> Iterator[Finding]:
 
 
 def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
-    """What vibrates too slowly for a link, and what grows, with motors held where they reach everything."""
+    """Yield vibrations too slow for a link, and unstable motions with motors held if these drive all freedoms."""
     if seen.chosen is None or seen.chosen.state is None or seen.mobility is None or seen.reach is None:
         return
     for body in seen.system.bodies:
@@ -150,7 +158,7 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
     except NumericalError:
         return
     growing = int(np.sum(vibration.squares < 0.0))
-    # What is let go where it does not balance moves off anyway.
+    # A mechanism released out of balance moves off anyway.
     holds = seen.reach.all_motors == seen.mobility.freedoms
     if growing and (holds or (at_rest and vibration.acceleration < BALANCED)):
         held = " with the motors held" if motors else ""

@@ -1,4 +1,4 @@
-"""The start of a run without a path: can the mechanism start as the file says?"""
+"""Check of the start of a run without a path: whether the mechanism can start as the file specifies."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from paraflex.validity.numbers import FAST, mechanism_size
 
 
 def start_findings(model: Model, seen: Examination, assembly: str | None) -> Iterator[Finding]:
-    """Deflections and velocities of [start] that joints, prescribed motions or one another do not allow."""
+    """Yield findings about values of [start] that joints, prescribed motions or other values do not allow."""
     open_ = seen.chosen is None or not (seen.chosen.closes or seen.chosen.undecided)
     if model.start is None or (seen.starts and open_):
         return
@@ -29,7 +29,7 @@ def start_findings(model: Model, seen: Examination, assembly: str | None) -> Ite
 
 
 def _fast(mechanism: Mechanism, start: Start) -> Iterator[Finding]:
-    """Rates that no body turns at."""
+    """Yield angular velocities above those of any body."""
     size = mechanism_size(mechanism)
     for body, rate in start.angular.items():
         if abs(rate) * size > FAST:

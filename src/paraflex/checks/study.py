@@ -1,4 +1,4 @@
-"""The study a model will run: can it, along its path and in its modes, and is anything cut short?"""
+"""Checks of a model's study: whether it can run along its path and in its modes, and whether anything is cut off."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import STANDARD_GRAVITY, mechanism_mass, mechanism_size
 from paraflex.validity.plausibility import doubtful_torques
 
-# Condition number of the actuation matrix beyond which torques are mostly those of a nearby singular position.
+# Condition number of the actuation matrix above which a nearby singular configuration dominates torques.
 ILL_CONDITIONED = 1e3
-# Speed [m/s] and acceleration [m/s^2] of an end-effector that no machine reaches: the fastest robots have 150 m/s^2.
+# Speed [m/s] and acceleration [m/s^2] of an end-effector above any machine: the fastest robots have 150 m/s^2.
 FASTEST, SHARPEST = 50.0, 2000.0
-# Turns that a path along a circle may take.
+# Largest number of turns of a path along a circle.
 _TURNS = 8.0
-# Duration of a run over that of its path beyond which nearly all of it is rest, and with which it is planned here.
+# Duration of a run relative to that of its path above which nearly all of it is rest; and that of the plan here.
 DWELL, _REST = 100.0, 2.0
-# Samples a turn below which the motion of a drive does not show.
+# Samples per turn below which the motion of a drive cannot be seen.
 SAMPLES_A_TURN = 6.0
-# Samples at which a plan is looked at.
+# Number of samples at which a plan is evaluated.
 _SAMPLES = 201
 _SAME_TIME = 1e-9
-# Part of a path's extent that counts as none.
+# Fraction of a path's extent that counts as zero.
 _STILL = 1e-6
 
 
 def study_findings(
     model: Model, path: str | None = None, assembly: str | None = None, modes: Sequence[str] | None = None
 ) -> Iterator[Finding]:
-    """What is wrong or doubtful about the study of a model; see `check` for the arguments."""
+    """Yield findings about the study of a model; see `check` for the arguments."""
     if not model.paths and path is None:
         if model.study.duration is None and model.statics == StaticsDefaults():
             yield Finding("duration-missing", "study.duration", "no path and no duration", "give one, in s")
@@ -69,10 +69,10 @@ def study_findings(
 
 
 def _of_path(model: Model, name: str, assembly: str | None, modes: Sequence[str] | None) -> Iterator[Finding]:
-    """What is wrong or doubtful about one path of a study."""
+    """Yield findings about one path of a study."""
     chosen, duration = model.paths[name], model.duration(name)
     if duration < chosen.duration:
-        # With xarray, which descriptions of mechanisms do without.
+        # Imports xarray, which descriptions of mechanisms do without.
         from paraflex.results.dataset import part_of
 
         part = part_of(chosen, duration)
@@ -80,7 +80,7 @@ def _of_path(model: Model, name: str, assembly: str | None, modes: Sequence[str]
             yield part.finding()
     yield from path_findings(model, chosen, name, duration)
     try:
-        # What comes after the path is rest.
+        # The mechanism is at rest after the path.
         end = min(duration, _REST * model.driven_for(chosen))
         task = model.plan(chosen, mechanism=model.mechanism.rigid(), duration=end, samples=_SAMPLES, assembly=assembly)
     except UnreachablePathError as error:
@@ -88,7 +88,7 @@ def _of_path(model: Model, name: str, assembly: str | None, modes: Sequence[str]
             "path-unreachable", f"path.{name}", str(error), "move the path or the bases, or choose another assembly"
         )
     except AssemblyError:
-        # The pose has been found not to close.
+        # The pose check reports that the assembly does not close.
         return
     except NumericalError as error:
         yield Finding("path-unreachable", f"path.{name}", str(error), "move the path")
@@ -100,9 +100,9 @@ def _of_path(model: Model, name: str, assembly: str | None, modes: Sequence[str]
 
 
 def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, magnitudes: bool = False) -> Iterator[Finding]:
-    """How modes drive the mechanism along a planned path: singular positions, and friction beyond the motors.
+    """Yield findings about modes along a planned path: singular configurations, and friction beyond the motors.
 
-    With `magnitudes` also torques and forces that are far from plausible; a run says so of those it applied.
+    `magnitudes` adds torques and forces that are implausible; a run reports those it applied itself.
     """
     for mode in modes:
         try:
@@ -124,7 +124,7 @@ def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, magnitu
 
 
 def path_findings(model: Model, path: Path, name: str, duration: float) -> Iterator[Finding]:
-    """What can be seen of a path before it is planned."""
+    """Yield findings about a path before it is planned."""
     yield from laws_cut_short(model.mechanism, duration)
     yield from _too_fast(name, path, duration)
     yield from _idle(model.mechanism, name, path)
@@ -149,7 +149,7 @@ def _too_fast(name: str, path: Path, duration: float) -> Iterator[Finding]:
 
 
 def _idle(mechanism: Mechanism, name: str, path: Path) -> Iterator[Finding]:
-    """A path that moves, and not along what the end-effector is to follow."""
+    """Yield a path that moves, but not along the coordinates that the end-effector follows."""
     if mechanism.end_effector is None:
         return
     task = mechanism.end_effector.coordinates
@@ -166,7 +166,7 @@ def _idle(mechanism: Mechanism, name: str, path: Path) -> Iterator[Finding]:
 
 
 def _few_samples(model: Model) -> Iterator[Finding]:
-    """A drive that turns between two samples so far that its motion is not to be seen."""
+    """Yield drives that rotate so far between two samples that their motion cannot be seen."""
     duration, count = model.study.duration, model.study.samples
     for one in model.mechanism.prescribed:
         if duration is None or model.mechanism.slides(one.joint):
@@ -183,7 +183,7 @@ def _few_samples(model: Model) -> Iterator[Finding]:
 
 
 def _turns(place: str, path: Path, orientation: float) -> Iterator[Finding]:
-    """Angles of a path and of the end-effector that are in degrees."""
+    """Yield angles of a path and of the end-effector that are likely in degrees."""
     angles = {"study.orientation": (orientation, 1.0)}
     if isinstance(path, ShapedPath):
         path = path.path
@@ -210,7 +210,7 @@ def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> It
 
 
 def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:
-    """Friction that takes more of a motor's torque than all else does."""
+    """Yield friction that requires more of a motor's torque than everything else."""
     units = mechanism.motor_units()
     for k, motor in enumerate(mechanism.motors):
         limit = sum(one.limit for one in mechanism.frictions if one.joint == motor.joint)
@@ -225,7 +225,7 @@ def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> I
 
 
 def _given_torques(model: Model) -> Iterator[Finding]:
-    """Given torques beyond what turns all bodies, and friction that they do not overcome."""
+    """Yield given torques above those that move all bodies, and friction that they do not overcome."""
     mechanism = model.mechanism
     size, weight = mechanism_size(mechanism), STANDARD_GRAVITY * mechanism_mass(mechanism)
     for motor, unit in zip(mechanism.motors, mechanism.motor_units(), strict=True):
@@ -246,7 +246,7 @@ def _given_torques(model: Model) -> Iterator[Finding]:
 
 
 def _largest_torque(torque: InTime, duration: float) -> float:
-    """The largest magnitude of a torque until a time, knots and rows of its law included [N m]."""
+    """Return the largest magnitude of a torque up to a time, knots and rows of its law included [N m]."""
     if not isinstance(torque, AngleLaw):
         return abs(torque)
     times = [*np.linspace(0.0, duration, _SAMPLES), *(time for time in marks(torque) if 0.0 <= time <= duration)]
@@ -254,7 +254,7 @@ def _largest_torque(torque: InTime, duration: float) -> float:
 
 
 def laws_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator[Finding]:
-    """Prescribed motions and loads whose pieces or tables a run does not get to the end of."""
+    """Yield prescribed motions and loads whose pieces or tables extend beyond the end of a run."""
     laws = [(f"prescribed.{one.name}", one.law) for one in mechanism.prescribed]
     laws += [(f"load.{one.name}", law) for one in mechanism.loads for law in one.laws[:1]]
     for place, law in laws:

@@ -1,4 +1,4 @@
-"""What a model file gives and nothing in it uses, or leaves out: mostly a name that was to be used elsewhere."""
+"""Unused and missing entries of a model file: mostly a name that was intended for use elsewhere."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NAME = re.compile(r"[^\W\d]\w*")
 
 
 def file_findings(model: Model) -> Iterator[Finding]:
-    """What the file of a model says for nothing, and what it leaves out and is easily forgotten."""
+    """Yield findings about entries of a model's file without effect, and about omissions that are likely mistakes."""
     yield from _unused(model.parameters)
     if model.paths and model.study.torques:
         yield Finding(
@@ -33,9 +33,9 @@ def file_findings(model: Model) -> Iterator[Finding]:
 
 
 def _unused(data: Mapping[str, Any]) -> Iterator[Finding]:
-    """Parameters, sections, materials, lumped masses and ground points of a file as read that nothing names.
+    """Yield parameters, sections, materials, lumped masses and ground points of a file that nothing refers to.
 
-    Any text of the file that holds the name counts as a use of it.
+    Any text of the file that contains the name counts as a use of it.
     """
     texts = list(_texts(data))
     words = {word for text in texts for word in _NAME.findall(without_quantities(text))}
@@ -57,9 +57,9 @@ def _unused(data: Mapping[str, Any]) -> Iterator[Finding]:
 
 
 def _texts(value: Any, *, key: str = "") -> Iterator[str]:
-    """All texts in tables and lists; keys of tables that name points too."""
+    """Yield all texts in tables and lists, and the keys of tables that name points."""
     if isinstance(value, str):
-        # What is said of a model in words uses nothing.
+        # Names and descriptions of a model refer to nothing.
         if key not in ("name", "description"):
             yield value
     elif isinstance(value, Mapping):

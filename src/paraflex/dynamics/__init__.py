@@ -1,4 +1,4 @@
-"""From a mechanism to a system of equations: constant arrays, energies, consistent states."""
+"""Equations of motion of a mechanism: its system of constant arrays, consistent states, equilibria, linearisation."""
 
 from paraflex.dynamics.brake import Braked as Braked, brake as brake
 from paraflex.dynamics.chord import across_chord as across_chord

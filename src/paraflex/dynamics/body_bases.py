@@ -1,4 +1,4 @@
-"""Fewer flexible coordinates for a body: its lowest modes, Craig-Bampton shapes, or shapes that are given."""
+"""Reduced flexible coordinates of a body: its lowest modes, Craig-Bampton shapes, or given shapes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from paraflex.errors import InputError
 from paraflex.fem import ModalBasis, modal_basis
 from paraflex.mechanism import Body, BodyReduction, FlexibleBeam, Mechanism, RigidBody
 
-# A shape of which others make up all but this part, in the root of its strain energy, is left out.
+# A shape is dropped if its part independent of the others is below this fraction, by the root of its strain energy.
 _DEPENDENT = 1e-10
 
 
 def is_reduced(mechanism: Mechanism, body: Body) -> bool:
-    """Whether a body keeps fewer flexible coordinates than its elements or functions have."""
+    """Return whether a body keeps fewer flexible coordinates than its elements or assumed functions have."""
     if isinstance(body, RigidBody) or not body.flexible:
         return False
     return body.modes is not None or body.name in mechanism.bases
@@ -36,23 +36,25 @@ def reduced_body(
     name: str,
     like: ModalBasis | None = None,
 ) -> BodyCoordinates:
-    """An undamped body in the coordinates that are kept of it.
+    """Return an undamped body in its reduced flexible coordinates.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism of the body, with its given bases.
     bodies : sequence of BodyCoordinates
-        Of the mechanism, each with all its coordinates, undamped.
+        Bodies of the mechanism, each with all its coordinates, undamped.
     constraints : sequence of Constraint
-        Of the mechanism.
+        Constraints of the mechanism.
     name : str
+        Name of the body.
     like : ModalBasis, optional
-        Of the same body with other numbers: see `build_system`.
+        Modes of the same body with other numbers, which the reduced modes follow: see `build_system`.
 
     Raises
     ------
     InputError
-        Given shapes of another number of coordinates; Craig-Bampton shapes of a body that something slides along.
+        Given shapes have another number of coordinates, or something slides along a body with Craig-Bampton shapes.
     """
     body = next(one for one in bodies if one.name == name)
     described = mechanism.body(name)
@@ -79,7 +81,7 @@ def reduced_body(
 
 
 def _given(body: BodyCoordinates, shapes: Numbers) -> Numbers:
-    """Given shapes (own, k), in the flexible coordinates of the body's reference condition, in its modes."""
+    """Express given shapes (own, k), in the flexible coordinates of the body's reference condition, in its modes."""
     own = body.shape.integrals.Mff
     if shapes.ndim != 2 or len(shapes) != len(own):
         raise InputError(
@@ -90,7 +92,7 @@ def _given(body: BodyCoordinates, shapes: Numbers) -> Numbers:
 
 
 def _vibrations(body: BodyCoordinates, shapes: Numbers) -> Numbers:
-    """Modes (nf, k) of unit mass of a body whose deformation is combined of shapes (nf, any), in its modes."""
+    """Return mass-normalised modes (nf, k) of a body restricted to the span of shapes (nf, any), in its full modes."""
     energies = body.modes.omega[:, None] * shapes
     sizes = np.linalg.norm(np.real(energies), axis=0)
     shapes = shapes[:, sizes > 0.0] / sizes[sizes > 0.0]
@@ -103,5 +105,5 @@ def _vibrations(body: BodyCoordinates, shapes: Numbers) -> Numbers:
 
 
 def _frequencies(body: BodyCoordinates, shapes: Numbers) -> Numbers:
-    """Of modes (nf, k) of unit mass [rad/s]."""
+    """Return the angular frequencies of modes (nf, k) of unit mass [rad/s]."""
     return np.sqrt(np.sum((body.modes.omega[:, None] * shapes) ** 2, axis=0))

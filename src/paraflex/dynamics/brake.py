@@ -1,4 +1,4 @@
-"""Brakes: joints locked from an instant on, at the angle or travel of that instant."""
+"""Brakes: joints locked from an instant on, at the angle or travel they have at that instant."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Braked:
     Attributes
     ----------
     system : System
-        With the joints locked; its coordinates are those of the free system.
+        System with the joints locked; its coordinates are those of the free system.
     state : State
-        Just after.
+        State just after the impact.
     energy : float
-        Kinetic energy that the brakes took [J].
+        Kinetic energy dissipated by the brakes [J].
     rows : tuple of int
-        Of the locked joints among the system's rows, in the order they were named.
+        Row numbers of the locked joints in the system, in the order in which the joints were named.
     """
 
     system: System
@@ -37,29 +37,36 @@ class Braked:
     rows: tuple[int, ...]
 
     def holding(self, multipliers: Array) -> Array:
-        """Torques of the brakes (k, joints), signed as those of motors [N m, N], from multipliers (k, m)."""
-        # Phi_q^T lambda stands on the left of the equations, a motor's torque on the right.
+        """Return the torques of the brakes (k, joints), signed as those of motors [N m, N], from multipliers (k, m)."""
+        # Phi_q^T lambda is on the left-hand side of the equations, a motor's torque on the right-hand side.
         return -multipliers[:, list(self.rows)]
 
 
 def brake(system: System, state: State, joints: Sequence[str]) -> Braked:
     """Lock joints at a state by a plastic impact.
 
-    Velocities become the nearest, in the metric of mass, that locked joints allow: an inelastic engagement,
-    v+ = v - M^-1 C^T (C M^-1 C^T)^-1 C v, with C the derivatives of constraints and locked joints. It takes the kinetic
-    energy of what is lost, (v - v+)^T M (v - v+) / 2.
+    The velocities after the impact are the nearest, in the mass metric, that the locked joints allow: v+ = v - M^-1 C^T
+    (C M^-1 C^T)^-1 C v, with C the Jacobian of constraints and locked joints. The impact dissipates the kinetic energy
+    (v - v+)^T M (v - v+) / 2.
 
     Parameters
     ----------
     system : System
+        System of the free mechanism.
     state : State
+        State just before the impact.
     joints : sequence of str
-        Angle or travel, slopes of beams included, stays as it is.
+        Joints to lock; their angle or travel, slopes of beams included, is kept.
+
+    Returns
+    -------
+    Braked
+        Locked system, its state after the impact, and the dissipated energy.
 
     Raises
     ------
     InconsistentConstraintsError
-        A joint that a prescribed law moves.
+        A joint is moved by a prescribed law.
     """
     mechanism = system.mechanism
     names = [f"brake of {joint}" for joint in joints]

@@ -1,4 +1,4 @@
-"""Constraints of joints and compliant members, part by part, and their order."""
+"""Constraints of joints and compliant members as sums of terms, and their order."""
 
 from __future__ import annotations
 
@@ -16,20 +16,23 @@ from paraflex.mechanism import Joint, Mechanism, PointRef, Relation
 
 @dataclass(frozen=True)
 class Term:
-    """A part of a joint's constraint: a quantity of point b less that of point a, times a weight.
+    """A term of a constraint: a quantity of point b less that of point a, times a weight.
 
     Attributes
     ----------
     joint : str
+        Joint that the term belongs to.
     kind : int
-        The quantity: POINT, both coordinates; ANGLE; or AXIS, the place of b along an axis that a carries.
+        Quantity: POINT for both coordinates; ANGLE; or AXIS for the position of b along an axis carried by a.
     a, b : PointRef
+        Points of the joint.
     weight : float
+        Weight of the term in the constraint.
     direction : float
-        Of an axis against body a [rad].
+        Direction of the axis relative to body a [rad].
     carrier : str
-        What carries an axis: the "material" at point a, the body's "frame" there, its "track", from the frame's
-        origin on, or "nothing": then it points from a to b.
+        Carrier of the axis: the "material" at point a, the body's "frame" there, its "track", measured from the frame's
+        origin, or "nothing", in which case the axis points from a to b.
     """
 
     joint: str
@@ -43,25 +46,27 @@ class Term:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A joint or part of one, a prescribed motion, a spring, damper or friction before packing.
+    """A joint or part of one, a prescribed motion, a spring, a damper or friction, before packing.
 
-    Its value is a sum of terms. A spring is a compliant constraint: value - rest = compliance * multiplier; so is a
-    damper, of the value's rate.
+    Its value is a sum of terms. A spring is a compliant constraint: value - rest = compliance * multiplier; a damper is
+    the same in the rate of the value.
 
     Attributes
     ----------
     name : str
+        Name of the joint or member.
     terms : tuple of Term
-        The first says what the value is: a length or an angle.
+        Terms of the value; the kind of the first decides whether the value is a length or an angle.
     labels : tuple of str
-        One a row.
+        Row names, one per row.
     signal : int
-        Where it is driven in time, else -1.
+        Number of the signal that prescribes the value in time, -1 for none.
     row : int
         Kind of its rows: CONSTRAINT, SPRING, DAMPER or FRICTION.
     compliance, limit : float
+        Compliance of a spring, damper or friction, and limit of the friction force or torque; zero for constraints.
     rest : float
-        What the value is compared with: of a spring at rest, of an angle held.
+        Reference for the value: that of an unloaded spring, or of a fixed angle or length.
     """
 
     name: str
@@ -80,7 +85,7 @@ class Constraint:
 
 
 def _joint_constraints(joint: Joint) -> list[Constraint]:
-    """Constraints of a joint."""
+    """Return the constraints of a joint."""
     name, a, b = joint.name, joint.a, joint.b
     normal, carrier = joint.direction + 0.5 * np.pi, "track" if joint.follows_beam else "material"
     axis = Term(name, AXIS, a, b, direction=normal, carrier=carrier)
@@ -95,7 +100,7 @@ def _joint_constraints(joint: Joint) -> list[Constraint]:
 
 
 def coordinate(joint: Joint, weight: float = 1.0) -> Term:
-    """A joint's coordinate times a weight."""
+    """Return the term of a joint's coordinate, times a weight."""
     if joint.slides:
         carrier = "frame" if joint.follows_beam else "material"
         return Term(joint.name, AXIS, joint.a, joint.b, weight, joint.direction, carrier)
@@ -103,12 +108,12 @@ def coordinate(joint: Joint, weight: float = 1.0) -> Term:
 
 
 def coordinate_kind(joint: Joint) -> str:
-    """Kind of a joint's coordinate."""
+    """Return the kind of a joint's coordinate: "travel" or "angle"."""
     return "travel" if joint.slides else "angle"
 
 
 def _along(joint: Joint, name: str, **keywords) -> Constraint:
-    """A compliant or driven row of a joint's coordinate."""
+    """Return a compliant or driven row on a joint's coordinate."""
     return Constraint(name, (coordinate(joint),), (f"{name} {coordinate_kind(joint)}",), **keywords)
 
 
@@ -126,7 +131,7 @@ def _constraints(mechanism: Mechanism) -> list[Constraint]:
 
 
 def _relation_constraint(mechanism: Mechanism, one: Relation) -> Constraint:
-    """Sum of joints' coordinates times their weights less the phase, over the first of these weights."""
+    """Return a relation's constraint: weighted sum of joint coordinates less the phase, over the first weight."""
     joints, (scale, *_) = [mechanism.joint(name) for name in one.shares], one.shares.values()
     assert one.phase is not None
     terms = tuple(coordinate(joint, one.shares[joint.name] / scale) for joint in joints)
@@ -134,7 +139,7 @@ def _relation_constraint(mechanism: Mechanism, one: Relation) -> Constraint:
 
 
 def constraint_count(mechanism: Mechanism) -> int:
-    """Number of constraint rows of joints, prescribed motions and gears, redundant ones included."""
+    """Return the number of constraint rows of joints, prescribed motions and gears, redundant ones included."""
     return sum(len(one.labels) for one in _constraints(mechanism) if one.row == CONSTRAINT)
 
 
@@ -146,7 +151,7 @@ class RowTerm(NamedTuple):
 
 
 def terms_by_joint(constraints: Sequence[Constraint]) -> dict[str, list[RowTerm]]:
-    """Terms of constraints, which are in the order of their rows, by the joints that they are of."""
+    """Group the terms of constraints, given in the order of their rows, by joint."""
     found, row = {}, 0
     for constraint in constraints:
         rows = list(range(row, row := row + len(constraint.labels)))
@@ -156,7 +161,7 @@ def terms_by_joint(constraints: Sequence[Constraint]) -> dict[str, list[RowTerm]
 
 
 def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
-    """An order of constraints with a small envelope of the Schur complement (reverse Cuthill-McKee)."""
+    """Order the constraints for a small envelope of the Schur complement (reverse Cuthill-McKee)."""
     constraints = _constraints(mechanism)
     if not constraints:
         return []

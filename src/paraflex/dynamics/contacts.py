@@ -1,14 +1,14 @@
-"""What a force that slides along a beam does to its section moments beyond its shape functions.
+"""Correction of section moments of a beam for forces that slide along it, beyond its shape functions.
 
 The transverse force P of a sliding joint is the multiplier of its normal row. Within an element the moment has a kink
-at the place x_c of the force, which shape functions do not have, and a beam reduced to few modes has even less of it.
-What they leave out is quasi-static: the exact moment of the load under the statically determinate supports of the
-body's frame, less that of the flexible coordinates which it deflects, u = W(x_c) P / omega^2,
+at the position x_c of the force. The shape functions do not represent it, and a beam reduced to few modes represents
+even less of it. The missing part is quasi-static: the exact moment of the load with the statically determinate supports
+of the body frame, less that of the flexible coordinates which the force deflects, u = W(x_c) P / omega^2,
 
     dM(x) = P G(x, x_c) - E I(x) W''(x) u,    G = (x_c - x)_+ - S(x, x_c)
 
-with S of the supports: 0 of a clamped first end (cantilever), x_c (L - x) / L of two pins, and of a free frame the
-moment of the inertia of the beam that P accelerates. dM vanishes at a node of a full mesh.
+where S is the contribution of the supports: 0 for a clamped first end (cantilever), x_c (L - x) / L for two pins, and
+for a free frame the moment of the inertia of the beam accelerated by P. dM vanishes at a node of a full mesh.
 
 Bisplinghoff, Ashley (1962), Principles of Aeroelasticity, 9.2 (mode acceleration: the static response of all modes).
 """
@@ -28,9 +28,9 @@ from paraflex.dynamics.system import System
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism import FlexibleBeam, Joint, Mechanism
 
-# Integrates the cubic of an arm times an acceleration exactly.
+# Two points integrate the cubic, an arm times an acceleration, exactly.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(2)
-# Part of the way to the middle of its element by which a station at a node with a lump is on one side of it.
+# Offset towards the middle of its element that puts a station at a node with a lump on one side of the node.
 _INSIDE = 1e-12
 
 
@@ -42,9 +42,9 @@ class ContactLoad(NamedTuple):
     place : (k, contacts) array
         Distance from the beam's first end [m].
     force : (k, contacts) array
-        Across the beam [N].
+        Force across the beam [N].
     deflected : (k, nf) array
-        Flexible coordinates that the forces deflect quasi-statically.
+        Quasi-static deflection by the forces, in flexible coordinates.
     """
 
     place: Array
@@ -53,21 +53,24 @@ class ContactLoad(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """Joints that slide along a beam, and what their forces need of it.
+    """Joints that slide along a beam, and the data of the beam for their moments.
 
     Attributes
     ----------
     beam : FlexibleBeam
+        Beam as described.
     body : BodyCoordinates
+        Coordinates of the beam.
     joints : tuple of str
+        Names of the sliding joints.
     rows : tuple of int
-        Multiplier of each.
+        Number of the multiplier of each joint.
     pieces : (elements, 6, nf) array
         Transverse displacement W: see `transverse_pieces`.
     resisted : (elements, 8, nf) array
-        See `inertia_moments`.
+        Inertia moments R: see `inertia_moments`.
     stiffness : (elements,) array
-        E I [N m^2].
+        Bending stiffness E I [N m^2].
     """
 
     beam: FlexibleBeam
@@ -79,10 +82,10 @@ class Contacts(NamedTuple):
     stiffness: Array
 
     def at(self, system: System, q: Array, multipliers: Array) -> tuple[Array, Array]:
-        """Places along the beam [m] and transverse forces on it [N] (k, contacts).
+        """Return positions along the beam [m] and transverse forces on it [N], each (k, contacts).
 
-        The force is zero beyond the ends of the beam, and where its multiplier is not known; the place is then that of
-        the nearer end.
+        The force is zero beyond the ends of the beam, where the position is that of the nearer end, and where its
+        multiplier is NaN.
         """
         place = np.stack([place_along_beam(system, name, q) for name in self.joints], axis=1)
         force = multipliers[:, self.rows]
@@ -91,22 +94,22 @@ class Contacts(NamedTuple):
         return np.where(off, nearest, place), np.where(off | np.isnan(force), 0.0, force)
 
     def inside(self, x: Array, element: NDArray[np.int64]) -> Array:
-        """Places (s,) a little within their elements, on their side of its nodes."""
+        """Return positions (s,) moved slightly into their elements, on their side of a node."""
         nodes = self.beam.mesh.nodes
         return x + _INSIDE * (0.5 * (nodes[element] + nodes[element + 1]) - x)
 
     def load(self, system: System, q: Array, multipliers: Array) -> ContactLoad:
-        """What the contacts do, of coordinates (k, n) and multipliers (k, m)."""
+        """Return the contact loads at coordinates (k, n) with multipliers (k, m)."""
         place, force = self.at(system, q, multipliers)
         deflected = np.einsum("kcj,kc->kj", self._rows(place, 0), force) / self.body.modes.omega**2
         return ContactLoad(place, force, deflected)
 
     def moments(self, x: Array, load: ContactLoad) -> Array:
-        """Moments (k, s) of the contacts at places x (k, s)."""
+        """Return the moments (k, s) of the contact forces at positions x (k, s)."""
         return np.einsum("ksc,kc->ks", self.exact(x[:, :, None], load.place[:, None, :]), load.force)
 
     def between(self, x: Array, place: Array) -> tuple[NDArray[np.int64], Array]:
-        """Of stations (s,) the index of that before each place, in its element, and how far it is to the next one."""
+        """Return per position the index of the preceding station of x (s,), and the fraction of the way to the next."""
         nodes = self.beam.mesh.nodes
         count, element = len(x) // len(self.stiffness), element_at(nodes, place)
         z = (place - nodes[element]) / (nodes[element + 1] - nodes[element])
@@ -114,17 +117,17 @@ class Contacts(NamedTuple):
         return left, (place - x[left]) / (x[left + 1] - x[left])
 
     def moment(self, place: Array, u: Array, across: Array) -> Array:
-        """Moment (k, contacts) of coordinates (k, nf) and their accelerations across the beam, at places."""
+        """Return moments (k, contacts) at positions, from coordinates (k, nf) and accelerations across the beam."""
         bending = self.stiffness[element_at(self.beam.mesh.nodes, place)][..., None] * self._rows(place, 2)
         resisted = transverse_rows(self.beam.mesh.nodes, self.resisted, place, 0)
         return np.einsum("kcj,kj->kc", bending, u) + np.einsum("kcj,kj->kc", resisted, across)
 
     def _rows(self, place: Array, derivative: int) -> Array:
-        """W or a derivative at places (k, contacts): (k, contacts, nf)."""
+        """Return W or a derivative at positions (k, contacts): (k, contacts, nf)."""
         return transverse_rows(self.beam.mesh.nodes, self.pieces, place, derivative)
 
     def exact(self, x: Array, place: Array) -> Array:
-        """Moment G at x of a unit force at each place, in the supports of the frame; of arrays that go together."""
+        """Return the moment G at x of a unit force at each position, supported as the frame; arrays broadcast."""
         arm = place - x
         moment = np.where(np.real(arm) > 0.0, arm, 0.0)
         if self.beam.reference is ReferenceCondition.PINNED:
@@ -134,7 +137,7 @@ class Contacts(NamedTuple):
         return moment
 
     def _inertia(self, x: Array, place: Array) -> Array:
-        """Moment at x of what resists the rigid motion that a unit force at each place gives the free beam."""
+        """Return the moment at x of the inertia of the free beam under a unit force at each position."""
         beam, whole = self.beam, self.body.integrals
         centre = whole.S1[0] / whole.m
         turn = (place - centre) / (whole.I0 + whole.J - whole.m * centre**2)
@@ -154,12 +157,12 @@ class Contacts(NamedTuple):
 
 
 def sliding_joints(mechanism: Mechanism, beam: str) -> list[Joint]:
-    """Joints that slide along a beam."""
+    """Return the joints that slide along a beam."""
     return [one for one in mechanism.joints if one.follows_beam and one.a.body == beam]
 
 
 def contacts_of(system: System, beam: FlexibleBeam) -> Contacts | None:
-    """What slides along a beam of a system; None for nothing."""
+    """Return the contacts of a beam of a system; None if nothing slides along it."""
     joints = tuple(one.name for one in sliding_joints(system.mechanism, beam.name))
     if not joints:
         return None

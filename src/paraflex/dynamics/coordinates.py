@@ -1,4 +1,4 @@
-"""Coordinates and material points of a body: the only place that maps slices of q to bodies."""
+"""Coordinates and material points of a body: the only module that maps slices of q to bodies."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from paraflex.fem.element import transverse_shape
 from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
-# The least eigenvalue of a body's mass matrix, scaled to ones along its diagonal, that is more than rounding.
+# Eigenvalues of a body's mass matrix, scaled to a unit diagonal, below this are rounding.
 _SINGULAR = 1e-14
 
 
@@ -34,15 +34,17 @@ class BodyCoordinates:
     Attributes
     ----------
     name : str
+        Name of the body.
     offset : int
-        Of r in q; phi follows at offset + 2, flexible coordinates from offset + 3.
+        Index of r in q; phi follows at offset + 2, flexible coordinates from offset + 3.
     integrals : ShapeIntegrals
-        In modal coordinates: u of the formulation is `modes.vectors @ q[flexible]`.
+        Shape integrals in modal coordinates: u of the formulation is `modes.vectors @ q[flexible]`.
     modes : ModalBasis
+        Modes of the body.
     shape : BodyShape
-        Its points in its own coordinates, to which `integrals.D` leads.
+        Integrals and points in the body's own coordinates, which `integrals.D` gives from modal ones.
     points : MassPoints or None
-        In modal coordinates, of a flexible beam of second-order geometry.
+        Mass points in modal coordinates, of a flexible beam with second-order geometry.
     damping : (nf, nf) array
         Damping matrix [1/s]: see `dynamics.damping`.
     """
@@ -86,13 +88,13 @@ class BodyCoordinates:
         return slice(self.offset, self.offset + 3 + self.nf)
 
     def slopes(self, q: Array) -> Array:
-        """Slopes along the body, a beam's at its nodes [rad]; none for a rigid body."""
+        """Return the slopes along the body, those of a beam at its nodes [rad]; empty for a rigid body."""
         return self.shape.slopes @ (self.integrals.D @ q[self.flexible])
 
 
 @dataclass(frozen=True)
 class Marker:
-    """A material point: its place in the undeformed body and its shape rows in modal coordinates.
+    """A material point: its position in the undeformed body and its shape rows in modal coordinates.
 
     Attributes
     ----------
@@ -103,9 +105,9 @@ class Marker:
     N : (2, nf) array
         Displacement per modal coordinate.
     slope : (nf,) array
-        Turn of the beam there per modal coordinate.
+        Rotation of the beam there per modal coordinate.
     bending : (nf, nf) array or None
-        Of the quadratic form that moves the point by -1/2 of it along x; None where it is zero.
+        Matrix B of the shortening by bending, u^T B u / 2, which is subtracted from x; None where it is zero.
     """
 
     body: int
@@ -116,11 +118,11 @@ class Marker:
 
     @property
     def on_frame(self) -> Marker:
-        """The same place fixed to the body frame, without the deformation."""
+        """Marker at the same position, fixed to the body frame, without the deformation."""
         return replace(self, N=np.zeros_like(self.N), slope=np.zeros_like(self.slope), bending=None)
 
     def place(self, u: Array) -> Array:
-        """Place in the body frame (2,) for flexible coordinates u (nf,)."""
+        """Return the position in the body frame (2,) for flexible coordinates u (nf,)."""
         s = self.x0 + self.N @ u
         if self.bending is not None:
             s[0] -= 0.5 * (u @ self.bending @ u)
@@ -128,19 +130,21 @@ class Marker:
 
 
 def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = None) -> BodyCoordinates:
-    """All coordinates of a body, none of its modes left out, undamped and as if they were the first of q.
+    """Return the coordinates of a body with all its modes, undamped, with offset 0.
 
     Parameters
     ----------
     body : Body
+        Body as described.
     geometry : Geometry
+        Geometry of the mechanism, linear or of second order.
     like : ModalBasis, optional
-        Of a body little different, whose modes these are to follow in order and sign: see `ModalBasis.like`.
+        Modes of a slightly different body, which these modes follow in order and sign: see `ModalBasis.like`.
 
     Raises
     ------
     InputError
-        A mass matrix that is not positive definite.
+        The mass matrix is not positive definite.
     """
     try:
         shape = body_shape(body)
@@ -161,9 +165,9 @@ def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = N
 
 
 def _check_mass(name: str, body: ShapeIntegrals) -> None:
-    """The mass matrix of a whole body, undeformed, is positive definite beyond rounding.
+    """Check that the mass matrix of a whole undeformed body is positive definite beyond rounding.
 
-    It is not where what is left of its inertia about its centre of mass is rounding beside that about its origin.
+    It is not if the inertia about its centre of mass is rounding against the inertia about its origin.
     """
     rigid = [[body.m, 0.0, -body.S1[1]], [0.0, body.m, body.S1[0]], [-body.S1[1], body.S1[0], body.I0 + body.J]]
     mass = np.real(np.array(rigid))
@@ -188,7 +192,7 @@ def _not_definite(name: str) -> InputError:
 def make_marker(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], ref: PointRef
 ) -> Marker:
-    """The material point of a name; for the ground, a place without a body."""
+    """Return the material point of a name; for the ground, a fixed position without a body."""
     if ref.on_ground:
         return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point]) * 1.0, np.zeros((2, 0)), np.zeros(0))
     i = index[ref.body]
@@ -199,7 +203,7 @@ def make_marker(
 
 
 def end_markers(index: int, body: BodyCoordinates) -> tuple[Marker, ...]:
-    """First and last end of a beam or bar, first and last point of a modal body; none for a rigid body."""
+    """Return the first and last end of a beam or bar, first and last point of a modal body; none for a rigid body."""
     if body.mesh is None:
         return tuple(_point_marker(index, body, point) for point in body.shape.ends)
     return node_marker(index, body, 0), node_marker(index, body, body.mesh.n_elements)
@@ -210,7 +214,7 @@ def _point_marker(index: int, body: BodyCoordinates, point: PointShape) -> Marke
 
 
 def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
-    """The material point at a node of a beam, counted from its first end."""
+    """Return the material point at a node of a beam; nodes count from its first end."""
     mesh, points = body.mesh, body.points
     assert mesh is not None
     x = mesh.nodes[node]
@@ -220,9 +224,9 @@ def node_marker(index: int, body: BodyCoordinates, node: int) -> Marker:
 
 
 def transverse_pieces(body: BodyCoordinates) -> Array:
-    """Transverse displacement of a beam's centre line per modal coordinate: (elements, 6, nf).
+    """Return the transverse displacement of a beam's centre line per modal coordinate: (elements, 6, nf).
 
-    Coefficients of ascending powers of the distance from the element's first node.
+    Entries are coefficients of ascending powers of the distance from the element's first node.
     """
     mesh = body.mesh
     assert mesh is not None
@@ -236,18 +240,18 @@ def transverse_pieces(body: BodyCoordinates) -> Array:
 
 
 def element_at(nodes: Array, place: Array) -> NDArray[np.int64]:
-    """Index of the element at places of any shape along a beam, the end ones beyond its ends."""
+    """Return the index of the element at positions of any shape along a beam; the end elements beyond its ends."""
     return np.searchsorted(np.real(nodes[1:-1]), np.real(place), side="right")
 
 
 def transverse_rows(nodes: Array, pieces: Array, place: Array, derivative: int) -> Array:
-    """Transverse displacement per modal coordinate, or a derivative by the place: (..., nf) for places (...)."""
+    """Return the transverse displacement per modal coordinate, or a derivative: (..., nf) at positions (...)."""
     element = element_at(nodes, place)
     return piece_rows(pieces, element, place - nodes[element], derivative)
 
 
 def piece_rows(pieces: Array, element: NDArray[np.int64], z: Array, derivative: int = 0) -> Array:
-    """Polynomials of elements, as of `transverse_pieces`, or a derivative, at distances z from their first nodes."""
+    """Evaluate polynomials of elements (see `transverse_pieces`) or a derivative at distances z from first nodes."""
     coefficients = np.polynomial.polynomial.polyder(np.eye(pieces.shape[1]), derivative)
     powers = [sum(c * z**p for p, c in enumerate(column) if c) + 0.0 * z for column in coefficients.T]
     return np.einsum("...p,...pj->...j", np.stack(powers, axis=-1), pieces[element])

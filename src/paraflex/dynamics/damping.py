@@ -1,25 +1,25 @@
-"""The damping matrix of a flexible body: that of its modes with its joints held, in the coordinates of its frame.
+"""Damping matrix of a flexible body from the damping ratios of its modes with its joints held.
 
-Damping ratios belong to a vibration, and how a body vibrates is a matter of how it is held, not of the frame that its
-deformation is described in. Its points are held as its joints hold them, the bodies on their other sides at rest:
+Damping ratios belong to vibrations. How a body vibrates depends on how it is held, not on the frame in which its
+deformation is described. Its points are held as its joints hold them, with the bodies on the other side at rest:
 
-- a revolute joint holds the point, a weld the slope there too, and so does a prescribed angle;
-- a rail (prismatic joint) holds the slope and what is normal to the rail, with a prescribed travel all;
-- a pin in another body's slot or on another beam is held across the body, and in both directions if prescribed;
-- the pin of a rod without mass (distance joint) is held across the body;
-- only the first of several points held in both directions is held along the line to the others: joints are not so far
-  apart by force that a bar could not stretch;
-- nothing is held by what slides along the body itself, by motors, springs, dampers or gears, or by a joint to bodies
-  that reach the ground through this body alone: what hangs on it.
+- A revolute joint holds the point. A weld holds the slope as well, and so does a prescribed angle.
+- A rail (prismatic joint) holds the slope and the direction normal to the rail; with a prescribed travel, everything.
+- A pin in another body's slot or on another beam is held across the body; if prescribed, in both directions.
+- The pin of a massless rod (distance joint) is held across the body.
+- Of several points held in both directions only the first is held along the line to the others: a bar can stretch
+  between its joints.
+- Members that slide along the body itself, motors, springs, dampers and gears hold nothing. Neither do joints to bodies
+  that reach the ground through this body alone: they hang on it.
 
-With the mass-normalised modes psi_k of the body so held, at rest and undeformed, their frequencies omega_k and damping
-coefficients d_k,
+Let psi_k be the mass-normalised modes of the undeformed body so held, omega_k their frequencies and d_k their damping
+coefficients. Then
 
     D = sum_k (d_k / omega_k^4) (K psi_k) (K psi_k)^T + c K_rest,   c = d_1 / omega_1^2,
 
-K_rest being the stiffness that no psi_k has a share in: that of the static shapes which its joints force upon a body
-that is held by more than it needs to be. K psi_k is a force, to which rigid motion is nothing: D is the same matrix of
-the deformation in every frame.
+where K_rest is the stiffness outside the span of all psi_k: that of the static shapes imposed by the joints of a body
+with redundant supports. K psi_k is a force, which rigid motion does not change: D is the same matrix of the deformation
+in every frame.
 """
 
 from __future__ import annotations
@@ -40,15 +40,20 @@ _ROUNDED_ENTRY = 1e-9
 def damping_matrix(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
 ) -> Array:
-    """Damping matrix of a body in its modal coordinates (nf, nf) [1/s], exactly diagonal if it is so to rounding.
+    """Return the damping matrix of a body in its modal coordinates (nf, nf) [1/s].
+
+    A matrix that is diagonal to rounding is returned exactly diagonal.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism of the body, whose joints hold it.
     bodies : tuple of BodyCoordinates
+        Coordinates of all bodies.
     index : dict
-        Number of each body by name.
+        Index of each body by name.
     name : str
+        Name of the body.
     """
     body, described = bodies[index[name]], mechanism.body(name)
     if isinstance(described, RigidBody) or described.damping is None or body.nf == 0:
@@ -59,7 +64,7 @@ def damping_matrix(
         return np.diag(beta * squares)
     held = np.array(list(_conditions(mechanism, bodies, index, name))).reshape(-1, 3 + body.nf)
     omega, modes = held_modes(body, held)
-    # Of the held modes (nf, k), in coordinates with stiffness diag(squares).
+    # Held modes are (nf, k), in coordinates with the stiffness diag(squares).
     lost = described.damping.coefficients(omega) / omega**2
     forces = squares[:, None] * modes / omega
     rest = lost[0] if lost.size else 0.0
@@ -67,7 +72,7 @@ def damping_matrix(
 
 
 def _without_rounding(matrix: Numbers) -> Numbers:
-    """The symmetric matrix, with zeros for off-diagonal entries of the size of rounding."""
+    """Return the symmetric matrix with off-diagonal entries of the size of rounding set to zero."""
     sizes = np.sqrt(np.abs(np.real(np.diag(matrix))))
     small = np.abs(np.real(matrix)) <= _ROUNDED_ENTRY * np.outer(sizes, sizes)
     np.fill_diagonal(small, False)
@@ -77,7 +82,7 @@ def _without_rounding(matrix: Numbers) -> Numbers:
 def _conditions(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
 ) -> Iterator[Numbers]:
-    """Conditions of a body's joints as rows on (r, phi, u) of the undeformed body: see the module."""
+    """Yield the conditions of a body's joints as rows on (r, phi, u), undeformed: see the module docstring."""
     pinned: list[Marker] = []
     across: list[Marker] = []
     driven = {prescribed.joint for prescribed in mechanism.prescribed}

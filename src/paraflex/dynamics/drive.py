@@ -1,4 +1,4 @@
-"""The degrees of freedom that sets of motors drive at a pose."""
+"""Degrees of freedom that sets of motors drive at a pose."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass
 from paraflex.dynamics.state import State
 from paraflex.dynamics.system import System
 
-# Smallest part of the largest effect that motors must have in every direction, squared: that of `actuation.allocation`.
+# Smallest effect of motors in any direction, squared, as a fraction of the largest: as in `actuation.allocation`.
 _WEAK = 1e-12
 _SETS_TRIED, _SETS_KEPT = 20_000, 1000
 
@@ -26,15 +26,15 @@ class Reach:
     Attributes
     ----------
     freedoms : int
-        Of the mechanism at the pose.
+        Degrees of freedom of the mechanism at the pose.
     all_motors : int
-        Freedoms that all motors together reach.
+        Number of them driven by all motors together.
     modes : mapping of str to int
-        The same for each mode of the mechanism.
+        Number of them driven in each mode of the mechanism.
     sets : tuple of tuple of str
-        Sets of motors of which none can be left out, and which reach every freedom; none where no set does.
+        Minimal sets of motors that drive every degree of freedom; empty if no set does.
     more : bool
-        Whether there are others: they were not all looked for.
+        Whether the search was stopped at its limit, so that further sets may exist.
     """
 
     freedoms: int
@@ -45,11 +45,19 @@ class Reach:
 
 
 def reach(system: System, state: State, freedoms: int) -> Reach:
-    """Degrees of freedom that motors drive at a pose, and the smallest sets of motors that drive all of them.
+    """Return the degrees of freedom driven by motors at a pose, and the smallest sets of motors that drive all.
 
-    With S the columns of the motors' joint coordinates and Z a basis of the motions that constraints allow, motors
-    reach as many as the rank of B = Z^T S; it is that of S^T Z (Z^T M Z)^-1 Z^T S, accelerations per torque, which asks
-    for no basis.
+    With S the columns of the motors' joint coordinates and Z a basis of the admissible motions, motors drive as many as
+    the rank of B = Z^T S. This is the rank of S^T Z (Z^T M Z)^-1 Z^T S, accelerations per torque, which needs no basis.
+
+    Parameters
+    ----------
+    system : System
+        System of the mechanism.
+    state : State
+        State whose pose is examined.
+    freedoms : int
+        Degrees of freedom of the mechanism at the pose.
     """
     mechanism = system.mechanism
     motors = [motor.name for motor in mechanism.motors]
@@ -71,6 +79,6 @@ def reach(system: System, state: State, freedoms: int) -> Reach:
 
 
 def _rank(effect: Array, chosen: Sequence[int]) -> int:
-    """Number of independent directions in which the chosen motors act."""
+    """Return the number of independent directions in which the chosen motors act."""
     values = np.linalg.eigvalsh(effect[np.ix_(chosen, chosen)]) if len(chosen) else np.zeros(0)
     return int(np.sum(values > _WEAK * values.max(initial=0.0)))

@@ -26,11 +26,11 @@ _MAX_ITERATIONS = 50
 _SMALLEST_MOVE = 1e-10
 # ... and the residual of the forces is less than this fraction of the largest.
 _BALANCED = 1e-6
-# Differences that the Jacobian is taken by; forces are linear in multipliers and nearly so in small displacements.
+# Step of the finite differences for the Jacobian; forces are linear in multipliers and nearly so in displacements.
 _DIFFERENCE = 1e-6
-# No link is moved by more than this in one iteration [sizes of the mechanism, rad].
+# Longest move of a link in one iteration [sizes of the mechanism, rad].
 _LONGEST_STEP = 0.3
-# Up to so many unknowns a dense Jacobian, for which least squares handles dependent columns, is fast enough.
+# Up to this number of unknowns a dense Jacobian is fast enough; least squares then handles dependent columns.
 _MOST_DENSE = 400
 _NO_EQUILIBRIUM = "no static equilibrium is found near the start"
 _HOLD = "start nearer to it, keep the angles of more joints, or make links and springs stiffer"
@@ -47,19 +47,25 @@ Motion = Callable[[Array], tuple[Array, Array]]
 @checked_arguments()
 @solvable("an equilibrium")
 def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -> State:
-    """The state of rest nearest a start: all forces in balance, joints closed, the angles of held joints kept.
+    """Find the state of rest nearest a start: forces in balance, joints closed, held joints at their angles.
 
-    Newton's iteration on forces and constraints, with the Jacobian by differences. Motors that hold may do so with any
-    torque; those that do not hold give none. A mechanism that nothing holds in some direction must be held there by
-    its weight or springs.
+    Newton's iteration solves for forces and constraints, with the Jacobian by finite differences. Motors of held joints
+    exert whatever torque is needed; all others exert none. If no joint holds the mechanism in some direction, its
+    weight or springs must.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     start : State
-        Its q is where the search begins; its v does not matter.
+        State whose q starts the search; its v has no effect.
     held : sequence of str
-        Joints whose angle or travel, slopes of beams included, stays as it is.
+        Joints whose angle or travel, slopes of beams included, is kept.
+
+    Returns
+    -------
+    State
+        Equilibrium at the time of the start, at rest.
 
     Raises
     ------
@@ -71,19 +77,19 @@ def static_equilibrium(system: System, start: State, held: Sequence[str] = ()) -
 
 @solvable("an equilibrium")
 def moving_equilibrium(system: System, start: State, motion: Motion) -> Array:
-    """The pose (n,) nearest a start at which forces balance the inertia forces of a motion.
+    """Find the pose (n,) nearest a start at which forces balance the inertia forces of a motion.
 
-    The iteration of `static_equilibrium` with M a + h(q, v) among the forces, dampers and friction at joints too;
-    v and a follow every iteration.
+    The iteration is that of `static_equilibrium` with M a + h(q, v) among the forces, and dampers and friction at
+    joints; v and a are updated in every iteration.
 
     Parameters
     ----------
     system : System
-        All its rigid freedoms prescribed.
+        System with all its rigid degrees of freedom prescribed.
     start : State
-        Its q is where the search begins.
+        State whose q starts the search.
     motion : callable
-        v and a (n,) at a pose (n,), such as the constraints allow.
+        Function that returns v and a (n,) at a pose (n,), consistent with the constraints.
 
     Raises
     ------
@@ -107,8 +113,8 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
     n, m = system.n, system.m
     residual = _Residual(system, start, held)
     z = np.concatenate([start.q, np.zeros(m + len(held))])
-    # Without dimension: forces by the energy of the mass at the mechanism's size and the slowest vibration of a body;
-    # modes such that their stiffness is one.
+    # Dimensionless: forces by the energy of the total mass at the mechanism's size and the slowest vibration of a body;
+    # modes scaled to unit stiffness.
     energy = system.total_mass * (system.size * system.slowest) ** 2
     units = np.append(1.0 / system.row_units, np.ones(len(held)))
     scale, by_force = np.append(system.units, energy * units), np.append(system.units / energy, units)
@@ -122,8 +128,8 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
         jacobian = np.column_stack(
             [(by_force * residual(z + _DIFFERENCE * unit) - value) / _DIFFERENCE for unit in np.diag(scale)]
         )
-        # Rows of soft springs have large entries. Dependent rows and motors that hold one another leave multipliers
-        # open: those of least norm.
+        # Rows of soft springs have large entries. Dependent rows and motors that work against one another leave
+        # multipliers undetermined: least squares gives those of least norm.
         largest = np.max(np.abs(jacobian), axis=1)
         largest[largest == 0.0] = 1.0
         change = scale * np.linalg.lstsq(jacobian / largest[:, None], -value / largest, rcond=1e-12)[0]
@@ -135,7 +141,7 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
 
 
 def _sparse_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
-    """The same with sparse matrices; springs at joints are stiffness here, not multipliers."""
+    """Find the equilibrium with sparse matrices; springs at joints are stiffness here, not multipliers."""
     forces, elastic = RestingForces(system, start.time), stiffness_diagonal(system)
     signals = moment_signals(system.mechanism, start.time)
     kept, _ = _joints(system, held, start.q)
@@ -178,12 +184,12 @@ def _solve(K: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, f: Array, r: 
 
 
 def largest_move(system: System, change: Array) -> float:
-    """The largest displacement or turn of links by a change of coordinates [sizes of the mechanism, rad]."""
+    """Return the largest displacement or rotation of links by a change of coordinates [sizes of the mechanism, rad]."""
     return max(float(np.max(np.abs(change / system.units)[body.offset : body.offset + 3])) for body in system.bodies)
 
 
 def _joints(system: System, held: Sequence[str], q: Array) -> tuple[Array, Array]:
-    """Coordinates of the held joints (held,) and their derivatives (held, n)."""
+    """Return the coordinates of the held joints (held,) and their derivatives (held, n)."""
     found = [joint_coordinate(system, name, q[None]) for name in held]
     rows = np.array([joint.rows[0] for joint in found]).reshape(-1, system.n)
     return np.array([joint.value[0] for joint in found]), rows
@@ -200,7 +206,7 @@ class _Residual:
         self.workspace, self.torques = system.workspace(), np.zeros(inputs_of(mechanism).acting)
         self.v, self.a = np.zeros((2, system.n))
         self.largest_effort = 0.0
-        # Rows of friction come with a scale of their own, none by default.
+        # The scale of friction rows is set separately and has no default.
         self.workspace.compliance[:] = system.packed.rows["compliance"]
 
     def __call__(self, z: Array) -> Array:

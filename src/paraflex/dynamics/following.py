@@ -1,4 +1,4 @@
-"""Start of prescribed motions away from an assembly: its pose is moved there by continuation, on its branch."""
+"""Start of prescribed motions away from an assembly: the pose is moved there by continuation, on its own branch."""
 
 from __future__ import annotations
 
@@ -22,28 +22,31 @@ from paraflex.mechanism import PrescribedAngle
 POSITION_STIFFNESS = 1e6
 # Prescribed motions nearer to the pose than this start there [sizes of the mechanism, rad].
 _NEAR = 1e-9
-# Poses nearer to one another than this are one [sizes of the mechanism, rad].
+# Poses nearer to one another than this are equal [sizes of the mechanism, rad].
 _SAME = 1e-5
-# Longest predicted step [sizes of the mechanism, rad], shortest as a part of the way, largest number of steps.
+# Longest predicted step [sizes of the mechanism, rad], shortest as a fraction of the way, largest number of steps.
 _LONGEST, _SHORTEST, _MAX_STEPS = 0.25, 1e-9, 2000
-# Drives nearer to where they start than this, where steps shorten without end, start at a singular pose.
+# Where steps shrink indefinitely, drives nearer to their start than this start at a singular pose.
 _BARELY = 1e-4
-# A pose whose least singular value is this part of the largest, and as near to a singular pose, is that; and a move for
-# the slope of that value.
+# A pose whose least singular value is below this fraction of the largest, and as close to a singular pose, is taken as
+# singular; and the step of the finite difference for the slope of that value.
 _SINGULAR, _PROBE = 3e-6, 1e-4
-# A step is accepted if its correction, and the change of the direction, are smaller than these parts of it.
+# A step is accepted if its correction and the change of its direction are below these fractions of it.
 _CORRECTION, _TURN = 0.25, 0.5
 
 
 def follow_drives(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Move a pose until prescribed motions are at their values, along the poses that the joints allow.
 
-    Whole turns of a drive are added to the angle of the body it turns; if the rest of the way is barred, or gears turn
-    other bodies too, all of it is followed.
+    Whole turns of a drive are added to the angle of the body it turns. If the shorter way is barred, or gears turn
+    other bodies too, the motion is followed all the way.
 
     Parameters
     ----------
-    system, signals
+    system : System
+        System of the mechanism.
+    signals : Signals
+        Signals with the prescribed values.
     t : float
         Time of the values [s].
     q : (n,) array
@@ -52,24 +55,24 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> Array
     Returns
     -------
     (n,) array
-        Coordinates with the drives at their values; as given if closing the loops from there leads to the same pose, or
-        if they close nowhere near.
+        Coordinates with the drives at their values. The given ones if closing the loops from there leads to the same
+        pose, or if the loops do not close nearby.
 
     Raises
     ------
     AssemblyError
-        A limit of reach bars the way, or a pose where branches meet.
+        A limit of reach, or a pose where branches meet, bars the way.
     """
     away = _away(system, signals, t, q)
     joints = [one.joint for one in system.mechanism.prescribed]
-    # Motions of one joint that disagree are at no pose.
+    # Contradicting motions of one joint have no pose.
     if system.gap(away) <= _NEAR or len(set(joints)) < len(joints):
         return q
     limits = []
     for begun in _ways(system, signals, t, q, away):
         found, limit = _follow(system, signals, t, begun)
         if found is not None:
-            # Where closing at once leads to the same pose it is left to the caller, with fewer roundings.
+            # If closing the loops directly leads to the same pose, the caller does so, with less rounding.
             direct, _ = assemble(
                 system, signals, t, q, partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
             )
@@ -84,25 +87,25 @@ def follow_drives(system: System, signals: Signals, t: float, q: Array) -> Array
 
 
 def driven_rows(system: System) -> Iterator[tuple[PrescribedAngle, int]]:
-    """Prescribed motions, each with the number of its constraint row."""
+    """Yield the prescribed motions, each with the number of its constraint row."""
     signals = system.packed.rows["signal"].tolist()
     for motion, signal in zip(system.mechanism.prescribed, inputs_of(system.mechanism).prescribed, strict=True):
         yield motion, signals.index(signal)
 
 
 def drives_at(system: System, q: Array, rows: set[int]) -> str:
-    """Prescribed motions of the given constraint rows by name, with the values of their joints; empty for none."""
+    """List the prescribed motions of constraint rows by name, with the values of their joints; empty for none."""
     driven = (one for one, row in driven_rows(system) if row in rows)
     return ", ".join(f"{one.name} at {value_text(system, one.joint, q)}" for one in driven)
 
 
 def _away(system: System, signals: Signals, t: float, q: Array) -> Array:
-    """Coordinates of driven joints less their prescribed values in their rows (m,), zero in the others."""
+    """Return the coordinates of driven joints less their prescribed values in their rows (m,), zero in the others."""
     return np.where(system.packed.rows["signal"] >= 0, system.constraints(signals, t, q)[0], 0.0)
 
 
 def _ways(system: System, signals: Signals, t: float, q: Array, away: Array) -> Iterator[Array]:
-    """Poses from which drives are followed: the shorter way to where they start, all of it, the other way round."""
+    """Yield poses from which to follow drives: the shorter way to their start, the whole way, the other way round."""
     shorter = _turned(system, signals, t, q, away)
     yield shorter
     if not np.array_equal(shorter, q):
@@ -113,7 +116,7 @@ def _ways(system: System, signals: Signals, t: float, q: Array, away: Array) -> 
 
 
 def _turned(system: System, signals: Signals, t: float, q: Array, away: Array, *, other_way: bool = False) -> Array:
-    """The pose with whole turns of drives, to go on the shorter or the other way; as it is if constraints bar turns."""
+    """Return the pose with whole turns of drives for the shorter or other way; unchanged if constraints bar turns."""
     turned = q.copy()
     for motion, row in driven_rows(system):
         joint = system.mechanism.joint(motion.joint)
@@ -128,7 +131,7 @@ def _turned(system: System, signals: Signals, t: float, q: Array, away: Array, *
 
 
 def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array | None, str]:
-    """The pose with the drives at their values, by predictor and corrector; None with the limit if it is barred."""
+    """Return the pose with the drives at their values, by predictor-corrector; None with the limit if barred."""
     change_at = partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
     away = _away(system, signals, t, q)
 
@@ -155,7 +158,7 @@ def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array
         if step < _SHORTEST:
             break
     if (1.0 - part) * system.gap(away) < _BARELY:
-        # Where branches meet steps shorten without end.
+        # Steps shrink indefinitely where branches meet.
         found = pose_at(1.0, pose)
         if found is not None and np.max(np.abs(found - pose) / system.units) < np.sqrt(_BARELY):
             return found, ""
@@ -165,7 +168,7 @@ def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array
 
 
 def _side(system: System, q: Array) -> float:
-    """Sign of det Phi_q for a rigid mechanism in which all is driven: it changes where branches meet. Else zero."""
+    """Return the sign of det Phi_q of a fully driven rigid mechanism, which changes where branches meet; else zero."""
     rows = system.packed.rows["kind"] == CONSTRAINT
     rigid = [body.offset + k for body in system.bodies for k in range(3)]
     if np.sum(rows) != len(rigid) or len(rigid) > DENSE_ROWS:
@@ -174,9 +177,9 @@ def _side(system: System, q: Array) -> float:
 
 
 def _sharpened(system: System, q: Array) -> Array:
-    """The singular pose that a closed pose is at but for the root of rounding; else the pose itself.
+    """Return the singular pose within the square root of rounding of a closed pose; else the pose itself.
 
-    Along the direction in which loops hardly open their gap is a square, but the least singular value a line.
+    The gap of the loops is quadratic along the direction in which they hardly open; the least singular value is linear.
     """
     rows = system.packed.rows["kind"] == CONSTRAINT
     if not 0 < np.sum(rows) <= min(DENSE_ROWS, system.n):

@@ -1,4 +1,4 @@
-"""A body under conditions, rows on its coordinates (r, phi, u) undeformed: vibrations with them held, static shapes."""
+"""Vibrations and static shapes of a body under conditions: rows on its undeformed coordinates (r, phi, u)."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker
 from paraflex.fem.eigen import eigenpairs
 
-# Conditions with less than this fraction independent of the others are redundant.
+# Conditions with an independent part smaller than this fraction are redundant.
 _DEPENDENT = 1e-9
 
 
 def place_rows(marker: Marker) -> Numbers:
-    """Derivative of a marker's place in the undeformed body by (r, phi, u), (2, 3 + nf)."""
+    """Return the derivative of a marker's position in the undeformed body by (r, phi, u), (2, 3 + nf)."""
     x, y = marker.x0
     return np.hstack([np.array([[1.0, 0.0, -y], [0.0, 1.0, x]]), marker.N])
 
 
 def slope_rows(marker: Marker) -> Numbers:
-    """Derivative of the turn of a marker's material by (r, phi, u), (1, 3 + nf)."""
+    """Return the derivative of the rotation of a marker's material by (r, phi, u), (1, 3 + nf)."""
     return np.concatenate([[0.0, 0.0, 1.0], marker.slope])[None]
 
 
 def held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]:
-    """Frequencies (k,) and flexible part (nf, k) of the mass-normalised elastic modes of a body under conditions.
+    """Return frequencies (k,) and flexible parts (nf, k) of mass-normalised elastic modes of a body under conditions.
 
-    `held` has a row a condition on its coordinates (r, phi, u), which are zero together.
+    `held` has one row per condition on its coordinates (r, phi, u); all conditions are zero together.
     """
     s, nf = body.integrals, body.nf
     mass = np.eye(3 + nf, dtype=np.result_type(s.S2, held))
@@ -47,7 +47,7 @@ def held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]:
 
 
 def null_space(rows: Numbers) -> Numbers:
-    """Columns (n, n - rank) that span the null space of rows (k, n) of one scale."""
+    """Return columns (n, n - rank) that span the null space of rows (k, n) of similar scale."""
     if not rows.size:
         return np.eye(rows.shape[1])
     size = np.linalg.norm(np.real(rows), axis=1)
@@ -57,19 +57,19 @@ def null_space(rows: Numbers) -> Numbers:
     rank = int(np.sum(np.abs(np.diag(upper)) > _DEPENDENT))
     rows = rows[order[:rank]]
     free = scipy.linalg.null_space(np.real(rows), rcond=_DEPENDENT)
-    # Of a complex step the imaginary part follows the conditions.
+    # The imaginary part of a complex step follows the conditions.
     return free - rows.T @ np.linalg.solve(rows @ rows.T, rows @ free)
 
 
 def static_shapes(body: BodyCoordinates, held: Numbers) -> Numbers:
-    """Flexible part (nf, k) of the static shapes of a body under forces in balance at its conditions.
+    """Return the flexible parts (nf, k) of the static shapes of a body under self-balanced forces at its conditions.
 
-    They are all that the conditions can force upon it: k is their number less that of the rigid motions they hold.
+    They are all deflections that the conditions can impose; k is their number less that of the rigid motions they hold.
     """
     balanced = null_space(held[:, :3].T)
     return held[:, 3:].T @ balanced / (body.modes.omega**2)[:, None]
 
 
 def _unit(rows: Numbers) -> Array:
-    """Rows of size one, of a complex step without it."""
+    """Return the rows normalised to length one, without the imaginary part of a complex step."""
     return np.real(rows) / np.linalg.norm(np.real(rows), axis=1)[:, None]

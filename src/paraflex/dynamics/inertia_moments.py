@@ -1,15 +1,15 @@
-"""What the inertia of a vibrating beam adds to its section moments beyond its shape functions.
+"""Correction of section moments of a vibrating beam for its distributed inertia, beyond its shape functions.
 
-The moment E I w'' of an element is a cubic, which cannot follow the inertia -rho A W_j u_j'' of its own deflection
-W_j u_j. As under a force that slides along the beam (`dynamics.contacts`) what is left out is the exact moment of the
-load under the statically determinate supports of the body's frame, less that of the coordinate it deflects,
+The moment E I w'' of an element is a cubic, which cannot follow the inertia -rho A W_j u_j'' of the element's own
+deflection W_j u_j. As for a force that slides along the beam (`dynamics.contacts`), the missing part is the exact
+moment of the load with the statically determinate supports of the body frame, less that of the coordinate it deflects,
 
     R_j(x) = E I W_j''(x) / omega_j^2 - (K_j(x) - S_j(x))
     K_j(x) = int_x^L rho A W_j (xi - x) dxi + sum_{x_p > x} (m_p W_j(x_p) (x_p - x) + J_p W_j'(x_p))
 
-with S_j = (1 - x/L) K_j(0) between two pins and none else: shapes of a free frame are in balance. R_j vanishes of an
-exact shape of vibration. With one element, at 10 rad/s from the motor of a beam on a hub whose frequencies are 5.7 and
-18.1 rad/s, the moment at its root is 0.3 % off instead of 13 %; with eight elements 1e-10 instead of 2e-5.
+with S_j = (1 - x/L) K_j(0) between two pins and zero otherwise: shapes of a free frame are in balance. R_j vanishes for
+an exact mode shape. For a beam on a hub with frequencies of 5.7 and 18.1 rad/s, driven by the motor at 10 rad/s, the
+moment at the root with one element is 0.3 % off instead of 13 %; with eight elements 1e-10 instead of 2e-5.
 
 Bisplinghoff, Ashley (1962), Principles of Aeroelasticity, 9.2 (mode acceleration); Craig, Kurdila (2006), Fundamentals
 of Structural Dynamics, 2nd ed., 11.4.
@@ -26,9 +26,9 @@ from paraflex.mechanism import FlexibleBeam
 
 
 def inertia_moments(beam: FlexibleBeam, body: BodyCoordinates) -> Array:
-    """R_j, the moment [N m] to add for a unit of the acceleration across the beam of every coordinate.
+    """Return R_j, the moment [N m] to add per unit acceleration across the beam of each coordinate: (elements, 8, nf).
 
-    (elements, 8, nf): coefficients of ascending powers of the distance from the element's first node, as those of
+    Entries are coefficients of ascending powers of the distance from the element's first node, as in
     `transverse_pieces`.
     """
     nodes, pieces, nf = beam.mesh.nodes, transverse_pieces(body), body.nf

@@ -1,4 +1,4 @@
-"""Order of the functions of time: motors first, then loads in time, then prescribed motions."""
+"""Order of the signals: motors first, then loads in time, then prescribed motions."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from paraflex.mechanism import Mechanism
 
 
 class Inputs(NamedTuple):
-    """Numbers of a mechanism's signals, in the order of `pack_signals`, by which kernels find them.
+    """Numbers of a mechanism's signals, by which kernels find them, in the order of `pack_signals`.
 
     Attributes
     ----------
     motors, loads, prescribed : range
-        In the order of the mechanism's own; of loads those components that are laws in time.
+        Signal numbers in the mechanism's own order; for loads, of the components that are laws in time.
     """
 
     motors: range
@@ -22,12 +22,12 @@ class Inputs(NamedTuple):
 
     @property
     def acting(self) -> int:
-        """Number of forces and torques given in time: those of motors, and components of loads."""
+        """Number of forces and torques given in time: motors and load components."""
         return self.prescribed.start
 
 
 def inputs_of(mechanism: Mechanism) -> Inputs:
-    """The numbers of a mechanism's signals."""
+    """Return the numbers of a mechanism's signals."""
     motors = len(mechanism.motors)
     acting = motors + sum(len(load.laws) for load in mechanism.loads)
     return Inputs(range(motors), range(motors, acting), range(acting, acting + len(mechanism.prescribed)))

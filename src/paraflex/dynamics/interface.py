@@ -23,15 +23,26 @@ def interface_rows(
     constraints: Sequence[Constraint],
     name: str,
 ) -> Numbers:
-    """Rows on the coordinates (r, phi, u) of a body: places and turns of its points that something acts on, each once.
+    """Return rows on (r, phi, u) of a body: positions and rotations of its points that members act on, each once.
 
-    Those of joints, prescribed motions, gears, springs, dampers and friction follow from the constraints they make;
-    motors, loads and lumps come to these, and the place of the end-effector, which paths are for.
+    Rows for joints, prescribed motions, gears, springs, dampers and friction follow from their constraints. Motors,
+    loads and lumps add to these, and so does the position of the end-effector, which paths refer to.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Mechanism of the body.
+    bodies : sequence of BodyCoordinates
+        Coordinates of all bodies.
+    constraints : sequence of Constraint
+        Constraints of the mechanism.
+    name : str
+        Name of the body.
 
     Raises
     ------
     InputError
-        Something slides along the body: it acts everywhere.
+        A member slides along the body, which therefore has no fixed interface.
     """
     acting = dict.fromkeys((ref.point, rows) for ref, rows in _acting(mechanism, constraints) if ref.body == name)
     index = {body.name: i for i, body in enumerate(bodies)}
@@ -42,7 +53,7 @@ def interface_rows(
 
 
 def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator[tuple[PointRef, Rows]]:
-    """Points, and rows of what works there: forces on their places, moments on their turns."""
+    """Yield points and the rows of the loads there: forces act on positions, moments on rotations."""
     for term in (term for constraint in constraints for term in constraint.terms):
         if term.carrier in ("frame", "track"):
             beam = None if term.a.on_ground else mechanism.body(term.a.body)
@@ -54,7 +65,7 @@ def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator
                 )  # fmt: skip
         if term.kind != ANGLE:
             yield from ((term.a, place_rows), (term.b, place_rows))
-        # What slides along an axis pushes beside the point that carries it.
+        # A member that slides along an axis exerts its force off the point that carries the axis.
         if term.kind != POINT and term.carrier != "nothing":
             yield term.a, slope_rows
         if term.kind == ANGLE:

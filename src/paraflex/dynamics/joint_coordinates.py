@@ -1,4 +1,4 @@
-"""The coordinate on which a joint's motor acts: the angle of a revolute joint, the travel of a joint that slides."""
+"""Coordinate on which a joint's motor acts: the angle of a revolute joint, the travel of a sliding joint."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from paraflex.mechanism import Joint, PointRef
 
 
 class JointCoordinate(NamedTuple):
-    """A joint's coordinate over time [rad, m], (k,), its rate, and its derivative by all coordinates, (k, n)."""
+    """Coordinate of a joint over time [rad, m], (k,), its rate, (k,), and its derivative by all coordinates, (k, n)."""
 
     value: Array
     rate: Array
@@ -21,7 +21,7 @@ class JointCoordinate(NamedTuple):
 
 
 def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None) -> JointCoordinate:
-    """The coordinate of a joint for coordinates (k, n) and velocities (k, n); at rest without these.
+    """Return the coordinate of a joint for coordinates (k, n) and velocities (k, n); zero velocities by default.
 
     Slopes of beams are included. Angle: that of body b less that of body a. Travel: e . (p_b - p_a), e the axis.
     """
@@ -44,41 +44,41 @@ def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None
 
 
 def value_text(system: System, name: str, q: Array) -> str:
-    """The coordinate of a joint at q (n,), with its unit."""
+    """Format the coordinate of a joint at q (n,), with its unit."""
     value = float(joint_coordinate(system, name, q[None]).value[0])
     return f"{value:.6g} {'m' if system.mechanism.slides(name) else 'rad'}"
 
 
 def place_along_beam(system: System, name: str, q: Array) -> Array:
-    """Distance from the beam's first end (k,) of the point of a sliding joint, in the undeformed beam [m]."""
+    """Return the distance (k,) of a sliding joint's point from the beam's first end, in the undeformed beam [m]."""
     joint = system.mechanism.joint(name)
     return joint_coordinate(system, name, q).value + system.marker(joint.a).x0[0]
 
 
 def axis_marker(system: System, joint: Joint) -> Marker:
-    """Carrier of a joint's axis: the material at point a; for a sliding joint the body's frame there."""
+    """Return the carrier of a joint's axis: the material at point a; for a sliding joint the body's frame there."""
     marker = system.marker(joint.a)
     return marker.on_frame if joint.follows_beam else marker
 
 
 def axis_angle(system: System, joint: Joint, q: Array) -> Array:
-    """Angle (k,) of a joint's axis in the ground frame [rad]."""
+    """Return the angle (k,) of a joint's axis in the ground frame [rad]."""
     return _marker_angle(system, axis_marker(system, joint), q)[0] + joint.direction
 
 
 def line_direction(system: System, joint: Joint, q: Array) -> Array:
-    """Unit vector (k, 2) from point a of a joint to its point b, not by a norm, as q may have complex steps."""
+    """Return the unit vector (k, 2) from point a of a joint to point b; without a norm, for complex steps."""
     a, b = (marker_position(system, system.marker(ref), q) for ref in (joint.a, joint.b))
     return (b - a) / np.sqrt(np.sum((b - a) ** 2, axis=1))[:, None]
 
 
 def material_angle(system: System, ref: PointRef, q: Array) -> Array:
-    """Angle (k,) of the material at a point, that of its body and the slope; zero on the ground [rad]."""
+    """Return the angle (k,) of the material at a point, that of its body plus the slope; zero on the ground [rad]."""
     return _marker_angle(system, system.marker(ref), q)[0]
 
 
 def _marker_angle(system: System, marker: Marker, q: Array) -> tuple[Array, Array]:
-    """Angle of the material at a point (k,), and its derivative (k, n)."""
+    """Return the angle of the material at a point (k,), and its derivative (k, n)."""
     rows = np.zeros(q.shape, dtype=np.result_type(q, marker.slope))
     if marker.body == GROUND_INDEX:
         return np.zeros(q.shape[0]), rows
@@ -89,7 +89,7 @@ def _marker_angle(system: System, marker: Marker, q: Array) -> tuple[Array, Arra
 
 
 def marker_place(system: System, marker: Marker, q: Array) -> tuple[Array, Array]:
-    """Position (k, 2) of a material point in the ground frame, and its derivative (k, 2, n): [1, R E s, R ds/du]."""
+    """Return the position (k, 2) of a point in the ground frame, and its derivative (k, 2, n): [1, R E s, R ds/du]."""
     rows = np.zeros((q.shape[0], 2, q.shape[1]), dtype=np.result_type(q, marker.x0, marker.N))
     position = marker_position(system, marker, q)
     if marker.body == GROUND_INDEX:
@@ -108,7 +108,7 @@ def marker_place(system: System, marker: Marker, q: Array) -> tuple[Array, Array
 
 
 def marker_position(system: System, marker: Marker, q: Array) -> Array:
-    """Position (k, 2) of a material point in the ground frame."""
+    """Return the position (k, 2) of a material point in the ground frame."""
     if marker.body == GROUND_INDEX:
         return np.broadcast_to(marker.x0, (q.shape[0], 2))
     body = system.bodies[marker.body]

@@ -1,8 +1,8 @@
-"""Forces and moments between the bodies of a joint, from all members in it.
+"""Forces and moments between the bodies of a joint, from all its members.
 
-Constraints have Phi of body b less that of body a and stand on the left of the equations, M q'' + ... + Phi_q^T lambda:
--lambda acts on body b. So do the multipliers of prescribed motions, springs, dampers, friction and gears, of these
-the weights of their joints times these; a motor's torque or force acts on b as it is.
+A constraint has Phi of body b less that of body a, and Phi_q^T lambda is on the left-hand side of M q'' + ... + Phi_q^T
+lambda: -lambda acts on body b. The same holds for the multipliers of prescribed motions, springs, dampers, friction
+and, times the weight of the joint, of gears. A motor's torque or force acts on b with its own sign.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from paraflex.mechanism import Joint
 
 
 class JointLoads(NamedTuple):
-    """Forces and moments of the first body of each joint on its second.
+    """Forces and moments that the first body of each joint exerts on its second.
 
     Attributes
     ----------
     force : (k, joints, 2) array
-        At the joint's point of the second body, in the ground frame [N].
+        Force at the joint's point on the second body, in the ground frame [N].
     moment : (k, joints) array
-        About that point, positive anticlockwise [N m].
+        Moment about that point, positive anticlockwise [N m].
     """
 
     force: Array
@@ -41,13 +41,13 @@ class JointLoads(NamedTuple):
 
 
 class JointParts(NamedTuple):
-    """What acts in a joint.
+    """Members that act in a joint.
 
     Attributes
     ----------
     terms : sequence of RowTerm
-        Of its constraints and of its springs, dampers, friction, gears and prescribed motion, with their multipliers'
-        numbers.
+        Terms of its constraints, springs, dampers, friction, gears and prescribed motion, with the numbers of their
+        multipliers.
     motors : sequence of int
         Numbers of its motors.
     """
@@ -56,7 +56,7 @@ class JointParts(NamedTuple):
     motors: Sequence[int]
 
     def alone(self) -> JointParts:
-        """The parts where no other joint's multipliers and motors are given: these in the order of `rows`, `motors`."""
+        """Renumber the parts for arrays of this joint's multipliers and motors only, ordered as `rows` and `motors`."""
         place = {row: i for i, row in enumerate(self.rows)}
         terms = [RowTerm([place[row] for row in rows], term) for rows, term in self.terms]
         return JointParts(terms, range(len(self.motors)))
@@ -68,23 +68,27 @@ class JointParts(NamedTuple):
 
 
 def joint_parts(system: System, name: str) -> JointParts:
-    """What acts in a joint by its name."""
+    """Return the members that act in a joint, given by name."""
     motors = [k for k, motor in enumerate(system.mechanism.motors) if motor.joint == name]
     return JointParts(system.row_terms.get(name, ()), motors)
 
 
 def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> JointLoads:
-    """Forces and moments in joints by name: of constraints, motors, springs, dampers, friction and gears.
+    """Return forces and moments in joints: of constraints, motors, springs, dampers, friction and gears.
 
-    The second body does the opposite to the first at the same place. Springs and dampers between points (linear
-    springs) are not in a joint and do not count.
+    The second body exerts the opposite on the first at the same position. Springs and dampers between points (linear
+    springs) are not part of a joint and are not included.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     names : sequence of str
+        Names of the joints.
     q : (k, n) array
+        Coordinates.
     multipliers : (k, m) array
+        Multipliers.
     torques : (k, motors) array
         Torque or force of every motor.
     """
@@ -97,7 +101,7 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
 def load_in(
     system: System, name: str, parts: JointParts, q: Array, multipliers: Array, torques: Array
 ) -> tuple[Array, Array]:
-    """Force (k, 2) and moment (k,) in one joint, as `joint_loads`; all may have complex steps."""
+    """Return force (k, 2) and moment (k,) in one joint, as `joint_loads`; all arguments may have complex steps."""
     joint, kind = system.mechanism.joint(name), np.result_type(q, multipliers, torques)
     force, moment = np.zeros((len(q), 2), kind), np.zeros(len(q), kind)
     for rows, term in parts.terms:
@@ -117,7 +121,7 @@ def load_in(
 
 
 class Undetermined(NamedTuple):
-    """Components of loads that redundant constraints share in any way.
+    """Load components that are shared arbitrarily among redundant constraints.
 
     Attributes
     ----------
@@ -135,9 +139,10 @@ class Undetermined(NamedTuple):
 def undetermined_loads(
     system: System, names: Sequence[str], q: Array, acting: NDArray[np.int64] | None = None
 ) -> Undetermined:
-    """Loads of joints by name and of all drives that redundant rows, of those acting, share in any way.
+    """Find the loads of joints and of all drives that redundant rows share arbitrarily.
 
-    Rows are redundant in all poses (k, n) or in none that is looked at: the first one shows it.
+    Rows are redundant in all poses (k, n) or in none: the search ends at the first pose without redundant rows.
+    `acting` restricts the rows, all by default.
     """
     drives = system.mechanism.prescribed
     shapes = (len(names), 2), (len(names),), (len(drives),)
@@ -157,21 +162,21 @@ def undetermined_loads(
 
 
 def drive_torques(system: System, multipliers: Array) -> Array:
-    """Torque [N m] or force [N] of every prescribed motion (k, drives), on its joint's second body."""
+    """Return the torque [N m] or force [N] of every prescribed motion (k, drives), on its joint's second body."""
     return -multipliers[:, np.array([row for _, row in driven_rows(system)], int)]
 
 
 class LoadErrors(NamedTuple):
-    """How far the loads of joints and drives may be off.
+    """Error bounds of the loads of joints and drives.
 
     Attributes
     ----------
     force : (joints,) array
-        Of the constraint forces of each joint [N].
+        Error of the constraint forces of each joint [N].
     moment : (joints,) array
-        Of its constraint moments [N m].
+        Error of its constraint moments [N m].
     drive : (drives,) array
-        Of the torque [N m] or force [N] of each prescribed motion.
+        Error of the torque [N m] or force [N] of each prescribed motion.
     """
 
     force: Array
@@ -180,7 +185,7 @@ class LoadErrors(NamedTuple):
 
 
 def load_errors(system: System, names: Sequence[str], errors: Array) -> LoadErrors:
-    """Bounds for the loads of joints by name and of all drives, from those of the multipliers (m,)."""
+    """Return error bounds of the loads of joints and of all drives, from those of the multipliers (m,)."""
     force, moment = np.zeros(len(names)), np.zeros(len(names))
     for i, name in enumerate(names):
         for rows, term in joint_parts(system, name).terms:
@@ -192,14 +197,14 @@ def load_errors(system: System, names: Sequence[str], errors: Array) -> LoadErro
 
 
 class FrameLoad(NamedTuple):
-    """What a mechanism does to the ground, its shaking force and moment.
+    """Shaking force and moment: the load that a mechanism exerts on the ground.
 
     Attributes
     ----------
     force : (k, 2) array
-        [N]
+        Shaking force [N].
     moment : (k,) array
-        About the origin of the ground frame, positive anticlockwise [N m].
+        Shaking moment about the origin of the ground frame, positive anticlockwise [N m].
     """
 
     force: Array
@@ -207,16 +212,18 @@ class FrameLoad(NamedTuple):
 
 
 def frame_load(system: System, places: Array, loads: JointLoads, q: Array, v: Array) -> FrameLoad:
-    """Sum of what joints and springs between points do to the ground.
+    """Sum the loads of joints and springs between points on the ground.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     places : (k, joints, 2) array
-        Of the joints of `loads`, on their second bodies [m].
+        Positions of the joints of `loads`, on their second bodies [m].
     loads : JointLoads
-        Of the first joints of the system's mechanism, those that are on the ground among them.
+        Loads of the first joints of the system's mechanism, all joints on the ground among them.
     q, v : (k, n) arrays
+        Coordinates and velocities.
     """
     mechanism = system.mechanism
     force, moment = np.zeros((len(q), 2)), np.zeros(len(q))
@@ -243,20 +250,20 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _direction(system: System, term: Term, q: Array) -> Array:
-    """Derivative (k, 2) of a row along an axis by the place of point b."""
+    """Return the derivative (k, 2) of an axis row by the position of point b."""
     joint = system.mechanism.joint(term.joint)
     if term.carrier == "nothing":
         return line_direction(system, joint, q)
     along = axis_angle(system, joint, q)
     direction = _unit(along + term.direction - joint.direction)
     if term.carrier == "track":
-        # Normal to the deformed beam at the place of the point.
+        # Normal to the deformed beam at the position of the point.
         direction = direction - _track_slope(system, joint, q)[:, None] * _unit(along)
     return direction
 
 
 def _track_slope(system: System, joint: Joint, q: Array) -> Array:
-    """Slope (k,) of a beam in its frame, at the place of the point that slides on it."""
+    """Return the slope (k,) of a beam in its frame, at the position of the point that slides on it."""
     body = system.body(joint.a.body)
     assert body.mesh is not None
     away = marker_place(system, system.marker(joint.b), q)[0] - q[:, body.position]

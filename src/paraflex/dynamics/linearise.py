@@ -1,8 +1,8 @@
-"""Small vibrations of a mechanism about a pose: natural frequencies and shapes of the assembled system at rest.
+"""Small vibrations of a mechanism about a pose: natural frequencies and mode shapes of the assembled system at rest.
 
-With lambda the constraint forces at rest, displacements x that the constraints allow, C x = 0, obey
+With lambda the constraint forces at rest, admissible displacements x, C x = 0, satisfy
 
-    M x'' + K x + C^T mu = 0,   K = d/dq (K_elastic u + springs - weight - loads + Phi_q^T lambda), lambda kept
+    M x'' + K x + C^T mu = 0,   K = d/dq (K_elastic u + springs - weight - loads + Phi_q^T lambda), lambda constant
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix as Sparse
 
 
-# With more coordinates a dense eigenvalue problem takes minutes, and only the lowest frequencies are computed.
+# Beyond this number of coordinates a dense eigenvalue problem takes minutes: only the lowest are computed.
 DENSE_COORDINATES, LOWEST = 600, 10
-# What a mechanism let go may start with and still be called balanced [m/s^2].
+# Acceleration after release below which a mechanism counts as balanced [m/s^2].
 BALANCED = 1e-5
 # A squared frequency below this fraction of the typical one is that of a free motion.
 _FREE = 1e-9
-# Constraint rows, scaled, with a smaller singular value than this part of the largest follow from the others.
+# Scaled constraint rows with a smaller singular value than this fraction of the largest are redundant.
 _DEPENDENT = 1e-10
-# So few freedoms have a basis of random displacements, Lanczos' method needs more; those that held motors take show by
-# their size, squared.
+# Up to this number of degrees of freedom random displacements are the basis, as Lanczos' method needs more; directions
+# blocked by held motors are recognised by their size, squared.
 _FEW, _INDEPENDENT = 30, 1e-12
-# The first shift in typical squares: one alone could cancel a diagonal entry of a stiffness that is negative.
+# First shift in typical squares; a shift of one could cancel the diagonal entry of a negative stiffness.
 _ABOVE = 2.0
-# A shift is reduced by this while many squares are below it, down to this part of the typical square.
+# Factor that reduces the shift while many squares are below it, and its least fraction of the typical square.
 _DESCENT, _LEAST = 1e-2, 1e-13
-# What rounding leaves of the square of a free motion, as a part of its terms.
+# Rounding error of the square of a free motion, as a fraction of its terms.
 _ROUNDING = 1e-14
-# Most tenfold increases of the shift until the shifted stiffness is positive definite.
+# Largest number of tenfold increases of the shift until the shifted stiffness is positive definite.
 _SHIFTS = 15
 
 
@@ -56,15 +56,14 @@ class Vibration:
     Attributes
     ----------
     squares : (k,) array
-        Squares of the natural frequencies, ascending [rad^2/s^2]. Zero is a free motion, a negative one a motion that
-        grows.
+        Squares of the natural frequencies, ascending [rad^2/s^2]. Zero for a free motion, negative for an unstable one.
     shapes : (n, k) array
-        Displacements of the coordinates, of unit modal mass.
+        Mode shapes: displacements of the coordinates, of unit modal mass.
     acceleration : float
-        What the mechanism would start with if let go, root mean square over the mass [m/s^2]: zero at an equilibrium.
-        Elsewhere the frequencies are those of a mechanism held in place by forces that do not change.
+        Initial acceleration of the mechanism if released, root mean square over the mass [m/s^2]; zero at an
+        equilibrium. Elsewhere the frequencies are those of a mechanism held in place by constant forces.
     complete : bool
-        Whether these are all, not only the lowest.
+        Whether these are all vibrations, not only the lowest.
     """
 
     squares: Array
@@ -74,7 +73,7 @@ class Vibration:
 
     @property
     def frequencies(self) -> Array:
-        """Natural frequencies (k,) [rad/s], zero for motions that are free or grow."""
+        """Natural frequencies (k,) [rad/s], zero for free and unstable motions."""
         return np.sqrt(np.maximum(self.squares, 0.0))
 
 
@@ -88,19 +87,20 @@ def natural_frequencies(
     torque_at: Sequence[str] = (),
     count: int | None = None,
 ) -> Vibration:
-    """Undamped small vibrations about a pose, as if at rest there.
+    """Compute the undamped small vibrations about a pose, as if at rest there.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     state : State
-        A closed pose: its q, at its time for prescribed angles. Its v does not matter.
+        Closed pose: its q, and its time for prescribed angles. Its v has no effect.
     held : sequence of str
         Joints whose angles, slopes of beams included, are kept.
     torque_at : sequence of str
-        Joints with motors of constant torque, as much as holds the pose: they turn freely about that.
+        Joints with motors of constant torque that holds the pose: they rotate freely about it.
     count : int, optional
-        How many of the lowest; all by default, or ten where there are more than 600 coordinates.
+        Number of the lowest vibrations; all by default, or ten for more than 600 coordinates.
     """
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
     efforts = _joint_rows(system, state.q, [*held, *torque_at])
@@ -120,10 +120,10 @@ def natural_frequencies(
 
 
 def slowest_deflection(system: System, q: Array) -> float:
-    """Angular frequency of the slowest vibration of an assembled mechanism by its beams alone [rad/s].
+    """Return the lowest angular frequency of an assembled mechanism by the stiffness of its beams alone [rad/s].
 
-    Without springs, loads and weight. Infinite where nothing vibrates; the least of its beams alone where there are
-    more than 600 coordinates.
+    Springs, loads and weight are left out. The result is infinite if nothing vibrates. For more than 600 coordinates it
+    is the lowest frequency of a single beam.
     """
     elastic = stiffness_diagonal(system)
     if not np.any(elastic > 0.0):
@@ -139,13 +139,13 @@ def slowest_deflection(system: System, q: Array) -> float:
 
 
 def _joint_rows(system: System, q: Array, joints: Sequence[str]) -> Sparse:
-    """Derivatives (joints, n) of the joints' angles or travels, each once."""
+    """Return the derivatives (joints, n) of the joints' angles or travels, each once."""
     rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
     return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
 
 
 class Inertia(NamedTuple):
-    """What forces at rest need: the mass (n, n), Phi_q (m, n), and derivatives (joints, n) of joints' coordinates."""
+    """Mass (n, n), Phi_q (m, n), and derivatives (joints, n) of joint coordinates, as forces at rest require."""
 
     mass: Sparse
     constraints: Sparse
@@ -158,11 +158,11 @@ class RestForces(NamedTuple):
     Attributes
     ----------
     multipliers : (m,) array
-        Of joints and springs.
+        Multipliers of joints and springs.
     efforts : (joints,) array
         Torques and forces of motors at joints.
     acceleration : float
-        See `Vibration`.
+        Acceleration after release: see `Vibration`.
     """
 
     multipliers: Array
@@ -171,7 +171,7 @@ class RestForces(NamedTuple):
 
 
 def forces_at_rest(system: System, state: State, inertia: Inertia) -> RestForces:
-    """Constraint forces at a pose at rest, motors at the joints of `inertia` holding it."""
+    """Return the constraint forces at a pose at rest, held by motors at the joints of `inertia`."""
     forces, lam = RestingForces(system, state.time), np.zeros(system.m)
     springs = forces.springs
     lam[springs] = forces(state.q, lam)[1] / system.packed.rows["compliance"][springs]
@@ -183,7 +183,7 @@ def forces_at_rest(system: System, state: State, inertia: Inertia) -> RestForces
 
 
 def typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
-    """A reference for squares of frequencies: the lowest of any body, else by springs and weight, else one."""
+    """Return a reference for squared frequencies: the lowest of any body, else that by springs and weight, else one."""
     if np.any(elastic > 0.0):
         return float(np.min(elastic[elastic > 0.0]))
     largest = float(np.max(np.abs(other.diagonal()) / np.asarray(M.diagonal()), initial=0.0))
@@ -191,16 +191,17 @@ def typical_square(elastic: Array, other: Sparse, M: Sparse) -> float:
 
 
 def all_modes(K: Sparse, M: Sparse, C: Sparse, elastic: Array, typical: float) -> tuple[Array, Array]:
-    """All squares (f,), ascending, and shapes (n, f), in a basis of the `admissible` motions: see `undamped_modes`."""
+    """Return all squares (f,), ascending, and shapes (n, f), from the `admissible` motions: see `undamped_modes`."""
     basis = admissible(C, M, elastic, typical)
     squares, shapes = undamped_modes(basis.T @ (M @ basis), basis.T @ (K @ basis), typical)
     return squares, basis @ shapes
 
 
 def admissible(C: Sparse, M: Sparse, elastic: Array, typical: float) -> Array:
-    """Displacements (n, f) that span those which rows C (m, n) allow, stiff coordinates scaled down.
+    """Return a basis (n, f) of the displacements that rows C (m, n) allow, with stiff coordinates scaled down.
 
-    Places and turns are scaled by the root of their mass, as elastic coordinates are, whatever the mechanism's size.
+    Positions and angles are scaled by the root of their mass, as elastic coordinates are, for any size of the
+    mechanism.
     """
     scale = 1.0 / np.sqrt(np.asarray(M.diagonal()) + elastic / typical)
     rows = C.toarray() * scale
@@ -210,10 +211,10 @@ def admissible(C: Sparse, M: Sparse, elastic: Array, typical: float) -> Array:
 
 
 def undamped_modes(mass: Array, stiffness: Array, typical: float) -> tuple[Array, Array]:
-    """Squares of natural frequencies (f,), ascending, and shapes (f, f) of unit mass, of symmetric matrices.
+    """Return squared natural frequencies (f,), ascending, and shapes (f, f) of unit mass, for symmetric matrices.
 
-    1 / (square + shift) is sought: low frequencies keep all their digits beside high ones. Those of less than a part
-    of the typical square are zero.
+    The eigenvalues computed are 1 / (square + shift), so that low frequencies keep all their digits beside high ones.
+    Squares below a fraction of the typical square are set to zero.
     """
     if not mass.size:
         return np.zeros(0), np.zeros((0, 0))
@@ -225,7 +226,7 @@ def undamped_modes(mass: Array, stiffness: Array, typical: float) -> tuple[Array
 
 
 def _shift(mass: Array, stiffness: Array, typical: float) -> float:
-    """Multiple of the mass that makes the stiffness positive definite when added to it."""
+    """Return a multiple of the mass that makes the stiffness positive definite when added to it."""
     shift = typical
     for _ in range(_SHIFTS):
         if np.linalg.eigvalsh(stiffness + shift * mass)[0] > 0.0:
@@ -235,14 +236,14 @@ def _shift(mass: Array, stiffness: Array, typical: float) -> float:
 
 
 def _inverse(solver: Saddle, n: int) -> scipy.sparse.linalg.LinearOperator:
-    """Linear map from forces to admissible displacements."""
+    """Return the linear map from forces to admissible displacements."""
     return scipy.sparse.linalg.LinearOperator(
         (n, n), matvec=lambda x: solver.solve(x.ravel())[0], dtype=np.dtype(float)
     )
 
 
 class Slowest(NamedTuple):
-    """The lowest squares, ascending, shapes of unit modal mass, and the shift by which they were found [rad^2/s^2]."""
+    """Lowest squares, ascending, their shapes of unit modal mass, and the shift used to find them [rad^2/s^2]."""
 
     squares: Array
     shapes: Array
@@ -250,9 +251,9 @@ class Slowest(NamedTuple):
 
 
 def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> Slowest:
-    """The lowest squares, of at most a number of freedoms.
+    """Return the lowest squares of a mechanism with a given number of degrees of freedom.
 
-    By Lanczos' method on the inverse; of few freedoms in a basis of them all.
+    Lanczos' method is applied to the shifted inverse; few degrees of freedom are solved in a basis of all of them.
     """
     n, random = int(np.asarray(M.diagonal()).size), np.random.default_rng(0)
     if not freedoms:
@@ -279,10 +280,10 @@ def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedom
 def _low_shift(
     K: Sparse, M: Sparse, C: Sparse, typical: float, count: int
 ) -> tuple[float, scipy.sparse.linalg.LinearOperator]:
-    """A shift above which there are all but a few squares, and the shifted inverse.
+    """Return a shift with few squares below it, and the shifted inverse.
 
-    The lowest squares of a chain of a thousand links are far below those of a link, so far that Lanczos' method would
-    not tell them apart from there.
+    The lowest squares of a chain of a thousand links are so far below those of one link that Lanczos' method could not
+    separate them from a shift of that size.
     """
     n = int(np.asarray(M.diagonal()).size)
     block, shift = np.random.default_rng(0).standard_normal((n, count)), _ABOVE * typical

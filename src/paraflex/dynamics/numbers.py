@@ -1,4 +1,4 @@
-"""The numbers of a record of arrays as one vector, and back, to differentiate all of them at once."""
+"""Conversion of a record of arrays to one vector of its numbers and back, to differentiate by all of them at once."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ R = TypeVar("R", bound=tuple[Any, ...])
 
 
 def numbers_of(record: tuple[Any, ...]) -> Array:
-    """Every floating-point number of a named tuple of arrays, records and numbers, in order, as a vector."""
+    """Return every floating-point number of a named tuple of arrays, records and numbers, in order, as a vector."""
     return np.concatenate([np.zeros(0), *(np.ravel(part) for part in _parts(record))])
 
 
 def with_numbers(record: R, numbers: Array) -> R:
-    """The same named tuple with other numbers, as `numbers_of` orders them; whole numbers stay."""
+    """Return the named tuple with other numbers, ordered as by `numbers_of`; integers are unchanged."""
     fields, at = [], 0
     for field in record:
         new, at = _replaced(field, numbers, at)
@@ -28,7 +28,7 @@ def with_numbers(record: R, numbers: Array) -> R:
 
 
 def same_layout(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
-    """Whether two named tuples of a kind differ in their floating-point numbers only."""
+    """Return whether two named tuples of a kind differ in their floating-point numbers only."""
     return all(_same(x, y) for x, y in zip(a, b, strict=True))
 
 

@@ -1,4 +1,4 @@
-"""A system's constraints, motors and bodies as the records of the kernels; names of the rows."""
+"""Records for the kernels from a system's constraints, motors and bodies; names of the rows."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
 from paraflex.mechanism import AngleLaw, Joint, Mechanism, PointRef
 
-# Fields of a line that are those of a spring between points.
+# Fields of a line that a spring between points defines.
 _OF_SPRINGS = ("stiffness", "length", "damping")
 
 
 def pack_system(
     mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], constraints: list[Constraint]
 ) -> tuple[PackedSystem, tuple[str, ...]]:
-    """Records and arrays for the kernels, and the name of every constraint row."""
+    """Return the records and arrays for the kernels, and the name of every constraint row."""
     size = mechanism_size(bodies)
     packer = _Packer(mechanism, bodies, index, size)
     for constraint in constraints:
@@ -75,11 +75,11 @@ def pack_system(
         G2=_flat([body.integrals.G2 for body in bodies]),
         shape=np.concatenate([np.zeros((3, 0)), *(np.vstack([m.N, m.slope]) for m in markers)], axis=1),
         columns=_flat(columns),
-        # Of each body columns of G2 and I2, one after the other (nf, 2 stride).
+        # Per body: columns of G2 and of I2, one after the other (nf, 2 stride).
         products=_flat([np.hstack([_padded(b.integrals.G2.T), _padded(b.integrals.I2.T)]) for b in bodies]),
         bending=_flat([_padded(each) for each in bent]) if any(_is_full(body) for body in bodies) else None,
-        # Of all mass points of a body Nx, Ny and N2' by coordinate (nf, 3 pitch), weights by Gauss point (slopes,
-        # pitch), place along the beam, mass and moment of inertia (3, pitch).
+        # All mass points of a body: Nx, Ny and N2' by coordinate (nf, 3 pitch); weights by Gauss point (slopes, pitch);
+        # position along the beam, mass and moment of inertia (3, pitch).
         places=_flat([np.hstack([_padded(rows.T) for rows in (p.N[:, 0], p.N[:, 1], p.slope)]) for p in points]),
         spans=_flat([_padded(p.weights.T) for p in points]),
         inertias=_flat([_padded(np.stack([p.x, p.mass, p.inertia])) for p in points]),
@@ -91,7 +91,7 @@ def pack_system(
 
 
 class _Packer:
-    """Gathers the records of a system, joint by joint."""
+    """Builder of a system's records, joint by joint."""
 
     def __init__(
         self, mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], size: float
@@ -110,7 +110,7 @@ class _Packer:
         return len(self.markers) - 1
 
     def end(self, ref: PointRef, end: str) -> dict[str, float]:
-        """One end of a line or an axis: a marker, or a place on the ground."""
+        """Return one end of a line or an axis: a marker, or a position on the ground."""
         if ref.on_ground:
             x, y = self.mechanism.ground[ref.point]
             return {end: -1, f"{end}x": x, f"{end}y": y}
@@ -154,7 +154,7 @@ class _Packer:
     def add_axis(self, term: Term, row: int = -1, signal: int = -1) -> int:
         ends, carrier, track = self.end(term.a, "a") | self.end(term.b, "b"), term.carrier, -1
         if carrier in ("frame", "track"):
-            # The frame has no slope of its own, and a track counts from its origin.
+            # The frame has no slope of its own, and a track is measured from the frame's origin.
             fixed = self.markers[int(ends["a"])].on_frame
             self.markers[int(ends["a"])] = fixed if carrier == "frame" else replace(fixed, x0=np.zeros(2))
         if carrier == "track":
@@ -175,7 +175,7 @@ class _Packer:
 
 
 def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
-    """Deflections of beams that points slide on: records, breaks and coefficients."""
+    """Return records, breaks and coefficients of the deflections of beams that points slide on."""
     breaks = [body.mesh.nodes for body in bodies if body.mesh is not None]
     pieces = [transverse_pieces(body) for body in bodies]
     starts = zip(*(np.cumsum([0, *(part.size for part in parts)]).tolist() for parts in (breaks, pieces)), strict=True)
@@ -187,7 +187,7 @@ def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
 
 
 def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float]]:
-    """Components of loads that are numbers, and the signals of those that are laws in time."""
+    """Return records of loads: constant components as numbers, laws in time as signal numbers."""
     signals, made = iter(inputs_of(mechanism).loads), []
     for load in mechanism.loads:
         record: dict[str, float] = dict.fromkeys(("x_signal", "y_signal", "torque_signal"), -1)
@@ -208,23 +208,23 @@ def _modal_rows(body: BodyCoordinates) -> Array:
 
 
 def _is_full(body: BodyCoordinates) -> bool:
-    """Whether the iteration matrix of a body is dense."""
+    """Return whether the iteration matrix of a body is dense."""
     return body.points is not None or _coupled_damping(body).size > 0
 
 
 def _coupled_damping(body: BodyCoordinates) -> Array:
-    """Damping matrix of a body without its diagonal, rows padded; no rows if it is diagonal."""
+    """Return a body's damping matrix without its diagonal, rows padded; no rows if it is diagonal."""
     rest = body.damping - np.diag(np.diag(body.damping))
     return _padded(rest) if np.any(rest) else np.zeros((0, padded(body.nf)))
 
 
 def _flat(matrices: list[Array]) -> Array:
-    """All entries, row by row, of one matrix after the other."""
+    """Return all entries of the matrices, row by row, one matrix after the other."""
     return np.concatenate([np.zeros(0), *(matrix.ravel() for matrix in matrices)])
 
 
 def _padded(matrix: Array) -> Array:
-    """The matrix with columns of zeros up to whole vectors."""
+    """Return the matrix padded with columns of zeros to whole vectors."""
     rows, columns = matrix.shape
     out = np.zeros((rows, padded(columns)), dtype=matrix.dtype)
     out[:, :columns] = matrix
@@ -232,7 +232,7 @@ def _padded(matrix: Array) -> Array:
 
 
 def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[Array]:
-    """Contribution of the coordinates to the sums of each body, (nf, width): see `kernel.sums`."""
+    """Return the contribution of the coordinates to the sums of each body, (nf, width): see `kernel.sums`."""
     rows = [[_modal_rows(body)[:FIRST_MARKER]] for body in bodies]
     for marker in markers:
         rows[marker.body].append(np.vstack([marker.N, marker.slope]))
@@ -240,12 +240,12 @@ def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list
 
 
 def _mass_points(body: BodyCoordinates) -> tuple[int, int]:
-    """Number of mass points, and of the Gauss points that lead them."""
+    """Return the numbers of mass points and of the Gauss points whose slopes shorten them."""
     return (0, 0) if body.points is None else body.points.weights.shape
 
 
 def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:
-    """Records of dictionaries by field, zero where one has none; complex where a number is."""
+    """Convert dictionaries by field to records, zero for missing fields; complex if any number is."""
     blank = dict.fromkeys(dtype.names or (), 0)
     rows = [tuple((blank | value).values()) for value in values]
     if any(isinstance(number, complex) for row in rows for number in row):
@@ -286,12 +286,12 @@ def _body_records(bodies, ports, motor_sides, columns) -> NDArray[np.void]:
 
 
 def _lanes(parts: int) -> int:
-    """Lanes of a body's Jacobian rows, with three more for its rigid coordinates."""
+    """Return the number of lanes of a body's Jacobian rows, with three more for its rigid coordinates."""
     return padded(parts + 3)
 
 
 def _own_sizes(body: BodyCoordinates, parts: int) -> dict[str, int]:
-    """Length of a body's part of each array, by the field that holds its start."""
+    """Return the length of a body's part of each array, by the field that holds its start."""
     size, full = 3 + body.nf, _is_full(body)
     points, slopes = _mass_points(body)
     return {
@@ -341,7 +341,7 @@ def _port_records(ports) -> NDArray[np.void]:
 
 
 def _with_envelope(rows: list[dict], ports: list[list[dict]]) -> list[dict]:
-    """Constraint rows with the envelope of the Schur complement: rows of one body are coupled."""
+    """Add the envelope of the Schur complement to constraint rows: rows of one body are coupled."""
     first = list(range(len(rows)))
     for body_ports in ports:
         low = min((port["row"] for port in body_ports), default=0)

@@ -1,4 +1,4 @@
-"""Motion of named points and beam tips from coordinates over time, for all instants at once."""
+"""Motion of named points and beam tips from coordinates over time, vectorised over samples."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from paraflex.mechanism import PointRef
 
 
 class PointMotion(NamedTuple):
-    """Position [m], velocity [m/s], acceleration [m/s^2] in the ground frame, each (k, 2)."""
+    """Position [m], velocity [m/s] and acceleration [m/s^2] in the ground frame, each (k, 2)."""
 
     position: Array
     velocity: Array
@@ -21,12 +21,12 @@ class PointMotion(NamedTuple):
 
 
 def point_motion(system: System, ref: PointRef, q: Array, v: Array, a: Array) -> PointMotion:
-    """Motion of a named point for coordinates (k, n) and their derivatives."""
+    """Return the motion of a named point for coordinates (k, n) and their derivatives."""
     return marker_motion(system, system.marker(ref), q, v, a)
 
 
 def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) -> PointMotion:
-    """Motion of a material point of a body for coordinates (k, n) and their derivatives.
+    """Return the motion of a material point of a body for coordinates (k, n) and their derivatives.
 
     p = r + R s, p' = r' + R (phi' E s + N u'), p'' = r'' + R (phi'' E s - phi'^2 s + 2 phi' E N u' + N u'').
     """
@@ -55,12 +55,12 @@ def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) 
 
 
 def tip_deflection(system: System, name: str, q: Array) -> Array:
-    """Axial [m] and transverse [m] displacement and slope [rad] of a beam's last end: (k, 3).
+    """Return axial [m] and transverse [m] displacement and slope [rad] of a beam's last end: (k, 3).
 
-    From where it would be were the beam straight along its tangent at the first end, whatever its reference condition.
-    Zero for a body without flexible coordinates. The axial displacement is the stretch, less the shortening by bending
-    where the geometry is of second order. Of a modal body, displacements along x and y and turn of its last point
-    against its first; NaN where it has no two points apart.
+    Displacements count from the position of the end on the straight beam along its tangent at the first end, whatever
+    its reference condition. They are zero for a body without flexible coordinates. The axial displacement is the
+    stretch, less the shortening by bending for second-order geometry. For a modal body, the columns are displacements
+    along x and y and rotation of its last point relative to its first; NaN if it has no two distinct points.
     """
     body = system.body(name)
     if body.nf == 0:

@@ -1,6 +1,6 @@
-"""Assembly of a mechanism: coordinates projected onto Phi = 0, then rates onto Phi' = 0, by the least change of either.
+"""Assembly of a mechanism: least change of coordinates onto Phi = 0, then of rates onto Phi' = 0.
 
-Every pose of this package that is not a step of a run is found here: assemblies, starts, poses near a path.
+Every pose of this package except the steps of a run is found here: assemblies, starts, poses near a path.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
 from paraflex.kernel.stage import equations
 
 Sparse = scipy.sparse.csr_matrix
-# Function from wanted rows (m,) to the smallest change.
+# Function from the wanted rows (m,) to the smallest change.
 LeastChange = Callable[[Array], Array]
 
 _MAX_ITERATIONS = 50
-# Closure error that counts as closed [rad], and as a part of the mechanism's size: thousands of rounding errors.
+# Error below which a closure is closed [rad], and as a fraction of the mechanism's size: thousands of roundings.
 CLOSED = 1e-12
-# Projections of rates: the second removes the rounding error of the first.
+# Number of projections of rates: the second removes the rounding error of the first.
 _PROJECTIONS = 2
-# Masses count as no less than this part of the whole.
+# Least mass of a body in the metric, as a fraction of the whole.
 _LEAST_MASS = 1e-7
-# Joints named in an error.
+# Largest number of joints named in an error.
 NAMED = 6
 _GAP_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
 # Remedy for contradicting constraints.
 AGREE = "leave one of these joints, gears or prescribed motions out, or choose places and laws that agree"
-# Largest residual of rates of constraints (sizes of the mechanism, rad; s), as a fraction of the wanted rates.
+# Largest residual of constraint rates (sizes of the mechanism, rad; s), as a fraction of the wanted rates.
 _CONFLICT = 1e-6
 
 
@@ -52,29 +52,31 @@ def assemble(
     longest: float = math.inf,
     offset: Array | float = 0.0,
 ) -> tuple[Array, Array]:
-    """Newton's iteration on Phi(q, t) = 0, each step the least change in some measure.
+    """Solve Phi(q, t) = offset by Newton's iteration, each step the least change in some metric.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     signals : Signals
+        Signals with the prescribed values.
     t : float
-        [s]
+        Time [s].
     q : (n,) array
-        Where it begins.
+        Coordinates at which the iteration starts.
     change_at : callable
-        The least change of the free coordinates at coordinates (n,), say by `constraint_change`.
+        Least change of the free coordinates at coordinates (n,), for example by `constraint_change`.
     free : (n,) array of bool, optional
         Coordinates that may change; all by default.
     longest : float
-        No step is longer [sizes of the mechanism, rad].
+        Longest step [sizes of the mechanism, rad]; no limit by default.
     offset : (m,) array
         Values that the constraints are to have, zero by default.
 
     Returns
     -------
     q, phi
-        Coordinates, and what is left of the constraints there: see `closed`.
+        Coordinates, and the residual of the constraints there: see `closed`.
     """
     q, free = q.copy(), np.ones(system.n, dtype=bool) if free is None else free
     phi = system.constraints(signals, t, q)[0] - offset
@@ -88,21 +90,21 @@ def assemble(
 
 
 def closed(system: System, q: Array, phi: Array) -> bool:
-    """Whether residuals (m,) of constraints at q are rounding, of the size of the mechanism or of distant places."""
+    """Return whether residuals (m,) of constraints at q are rounding, for the mechanism's size or its distance."""
     far = max(float(np.max(np.abs(q[body.position]), initial=system.size)) for body in system.bodies) / system.size
     return system.gap(phi) < CLOSED * far
 
 
 def shortened(step: Array, longest: float) -> float:
-    """A step without dimension, shortened to the longest one allowed."""
+    """Return the factor that shortens a dimensionless step to the longest one allowed, at most one."""
     return min(1.0, longest / max(float(np.max(np.abs(step), initial=0.0)), np.finfo(float).tiny))
 
 
 def link_metric(system: System, q: Array, stiffness: float, *, every_spring: bool = False) -> Sparse:
-    """M + stiffness K / omega^2 with the slowest vibration omega of a body; `every_spring` adds springs at joints.
+    """Return M + stiffness K / omega^2, omega the slowest vibration of a body; `every_spring` adds springs at joints.
 
-    With a large stiffness (without dimension) links keep their shape, at any size of the mechanism.
-    Bodies weigh no less than a part of the whole: what light ones carry from one heavy body to another would be lost.
+    With a large stiffness (dimensionless) links keep their shape, at any size of the mechanism. Bodies have at least a
+    fraction of the total mass: otherwise the coupling of heavy bodies through light ones would be lost in rounding.
     """
     mass = sparse_mass(system, q)
     held, least = mass.diagonal(), _LEAST_MASS * system.total_mass
@@ -119,17 +121,18 @@ def link_metric(system: System, q: Array, stiffness: float, *, every_spring: boo
 
 
 def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.0) -> LeastChange:
-    """The smallest x in a metric with rows x = wanted (m,); least squares for dependent rows.
+    """Return the solver for the smallest x in a metric with rows x = wanted (m,); least squares for dependent rows.
 
-    With damping it goes less far, as Levenberg and Marquardt have it: a fraction of the mean diagonal entry of
-    rows metric^-1 rows^T.
+    Damping shortens the change, as in the Levenberg-Marquardt method.
 
     Parameters
     ----------
     metric, rows : (n, n) and (m, n) sparse matrices
+        Metric, and constraint rows.
     units : (m,) array
-        Of the rows: angles and lengths would differ by the square of the mechanism's size.
+        Units of the rows: otherwise angles and lengths would differ by the square of the mechanism's size.
     damping : float
+        Damping, as a fraction of the mean diagonal entry of rows metric^-1 rows^T; none by default.
     """
     rows = Sparse(scipy.sparse.diags(1.0 / units) @ rows)
     if units.size > DENSE_ROWS:
@@ -141,7 +144,7 @@ def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.
     schur = dense @ weighted
     if damping:
         schur += damping * np.mean(np.diag(schur)) * np.eye(units.size)
-    # Rows of one size: those of links without mass would make others look dependent.
+    # Rows scaled to equal size: those of massless links would make others look dependent.
     size = np.sqrt(np.diag(schur))
     scale = 1.0 / np.where(size > 0.0, size, 1.0)
     schur *= scale[:, None] * scale
@@ -157,7 +160,7 @@ def constraint_change(
     every_spring: bool = False,
     free: NDArray[np.bool_] | None = None,
 ) -> LeastChange:
-    """`least_change` in `link_metric` with the rows Phi_q, of all coordinates or the free ones (n,)."""
+    """Return `least_change` in `link_metric` with the rows Phi_q, for all coordinates or the free ones (n,)."""
     metric = link_metric(system, q, stiffness, every_spring=every_spring)
     rows = constraint_jacobian(system, q)
     if free is not None:
@@ -166,21 +169,21 @@ def constraint_change(
 
 
 def project(change: LeastChange, x: Array, left: Callable[[Array], Array]) -> Array:
-    """The rates nearest to x (n,) with zero residual `left` (m,), which is linear in them."""
+    """Return the rates nearest to x (n,) with zero residual `left` (m,), which is linear in them."""
     for _ in range(_PROJECTIONS):
         x = x - change(left(x))
     return x
 
 
 def second_rates(system: System, signals: Signals, t: float, q: Array, v: Array, a: Array) -> Array:
-    """Phi'' (m,) at accelerations (n,); zero in the rows of springs and dampers."""
+    """Return Phi'' (m,) at accelerations (n,); zero in the rows of springs and dampers."""
     workspace, torques = system.workspace(), np.zeros(inputs_of(system.mechanism).acting)
     equations(system.packed, signals, t, INDEX_1, q, v, a, np.zeros(system.m), torques, workspace)
     return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
 
 
 def joint_gaps(system: System, phi: Array) -> dict[str, float]:
-    """Residuals of joints, gears and prescribed motions by name [m, rad], the largest first, down to a tenth of it."""
+    """Return residuals of joints, gears and drives by name [m, rad], descending to a tenth of the largest."""
     gaps: dict[str, float] = {}
     for row, value in zip(system.rows, phi.tolist(), strict=True):
         gaps[joint_of_row(row)] = math.hypot(gaps.get(joint_of_row(row), 0.0), value)
@@ -189,22 +192,22 @@ def joint_gaps(system: System, phi: Array) -> dict[str, float]:
 
 
 def gap_unit(system: System, phi: Array) -> str:
-    """The unit of the largest number among constraint rows (m,)."""
+    """Return the unit of the largest number among constraint rows (m,)."""
     return row_unit(system.rows[int(np.argmax(np.abs(phi)))])
 
 
 def row_unit(row: str) -> str:
-    """The unit of a constraint row's residual, by the row's name."""
+    """Return the unit of a constraint row's residual, from the row's name."""
     return "rad" if row.endswith(" angle") else "m"
 
 
 def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array, left: Array) -> None:
-    """Raise if a projection leaves a larger residual of rows (m,) than rounding explains.
+    """Raise an error if a projection leaves a larger residual of rows (m,) than rounding explains.
 
     Raises
     ------
     InconsistentConstraintsError
-        It names joints, gears and prescribed motions that depend on one another.
+        Constraints contradict one another; the error names the joints, gears and prescribed motions involved.
     """
     if not system.gap(left) > _CONFLICT * max(1.0, system.gap(wanted)):
         return
@@ -213,7 +216,7 @@ def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array
 
 
 def contradiction(system: System, wanted: Array, found: Dependence, what: str) -> str:
-    """Names and size of the largest contradiction: the dropped row furthest from the value its sources imply."""
+    """Describe the largest contradiction: that of the dropped row furthest from the value its sources imply."""
     if found.dropped.size:
         conflict = np.abs(found.conflict(wanted))
         k = int(np.argmax(conflict))

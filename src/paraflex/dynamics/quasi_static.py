@@ -1,4 +1,4 @@
-"""A balanced start: static equilibrium if drives are at rest, else the deflection in their motion."""
+"""Balanced start: static equilibrium if drives are at rest, else the quasi-static deflection in their motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import AngleLaw, Load, PrescribedAngle
 from paraflex.mechanism.laws import HeldAngle
 
-# How far the mechanism moves for a central difference [sizes of the mechanism, rad].
+# Motion of the mechanism for a central difference [sizes of the mechanism, rad].
 _DIFFERENCE_MOVE = 1e-3
 
 
@@ -33,7 +33,7 @@ class JointMotion(NamedTuple):
 
 @dataclass(frozen=True)
 class DrivenAngle:
-    """An angle [rad], or a travel [m], with its rate and acceleration at a time [s]."""
+    """Angle [rad] or travel [m] with its rate and acceleration at a time [s], continued with constant acceleration."""
 
     time: float
     value: float
@@ -41,7 +41,7 @@ class DrivenAngle:
     knots: tuple[float, ...] = ()
 
     def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Value, rate and acceleration at times t."""
+        """Return value, rate and acceleration at times t."""
         s, (rate, acceleration) = t - self.time, self.motion
         return (
             self.value + rate * s + 0.5 * acceleration * s**2,
@@ -51,9 +51,9 @@ class DrivenAngle:
 
 
 def joint_motions(system: System, q: Array, v: Array, a: Array, joints: Iterable[str]) -> dict[str, JointMotion]:
-    """Rates and accelerations of joints in a motion q, v, a (n,), J v and J a + J' v.
+    """Return rates J v and accelerations J a + J' v of joints in a motion q, v, a (n,).
 
-    Of angles J is constant; of travels J' v comes from differences along the motion.
+    J is constant for angles; for travels J' v is computed by finite differences along the motion.
     """
     motions = {}
     step = 1e-4 / max(1.0, float(np.max(np.abs(v), initial=0.0)))
@@ -66,31 +66,31 @@ def joint_motions(system: System, q: Array, v: Array, a: Array, joints: Iterable
 
 
 def balanced_state(system: System, start: State, driven: Mapping[str, JointMotion]) -> State:
-    """The start from which links hardly vibrate.
+    """Return a start from which links hardly vibrate.
 
-    Where every drive is at rest that is `static_equilibrium`: they are held at the angles they have. Where one of them
-    moves, links are deflected as that motion needs them, q with
+    If every drive is at rest, it is `static_equilibrium` with the joints held at their angles. If a drive moves, links
+    are deflected quasi-statically for its motion, q with
 
         M a + h(q, v) + K q + Phi_q^T lambda = Q(q, v),   Phi(q, t) = 0,   Phi' = 0,   Phi'' = 0,
 
     v and a the motion of the drives with links that keep their shape (the least v and a in the metric M + s K that
-    constraints allow). Weight, loads and inertia forces are balanced, dampers and friction at joints included. The
-    velocities of the start are those at which this pose moves on with the drives, by central differences, projected on
-    the constraints: those of drives are their laws' to rounding. What is left out are the inertia forces of the
-    changing shape, a fraction (Omega / omega)^2 of the deflection for drives of angular frequency Omega and links
-    of omega.
+    constraints allow). Weight, loads and inertia forces are balanced, with dampers and friction at joints. The
+    velocities of the start are those with which this pose follows the drives, by central differences, projected onto
+    the constraints: velocities of drives equal their laws to rounding. The inertia forces of the changing shape are
+    neglected, a fraction (Omega / omega)^2 of the deflection for drives of angular frequency Omega and links of omega.
 
-    Springs at joints count as elastic. Where drives leave other freedoms their motion is not given: the pose is then
-    that of static equilibrium, with the velocities of least kinetic energy.
+    Springs at joints count as elastic. If drives leave other degrees of freedom, the motion of these is not given: the
+    pose is then that of static equilibrium, with the velocities of least kinetic energy.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     start : State
-        Where the search begins; its v does not matter.
+        State that starts the search; its v has no effect.
     driven : mapping of str to JointMotion
-        Joints, besides those with a prescribed law, that keep the coordinate they have at the start, slopes of beams
-        included, and how they move there.
+        Joints, besides those with a prescribed law, that keep their coordinate of the start, slopes of beams included,
+        and their motion there.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def balanced_state(system: System, start: State, driven: Mapping[str, JointMotio
 
 
 def _moving(drives: System, start: State) -> State:
-    """The moving equilibrium, with its velocities."""
+    """Return the moving equilibrium, with its velocities."""
 
     def at(time: float, q: Array) -> Array:
         return moving_equilibrium(drives, State(time, q, np.zeros_like(q)), _Motion(drives, time))
@@ -124,19 +124,19 @@ def _moving(drives: System, start: State) -> State:
 
 
 class _Motion:
-    """Velocities and accelerations that drives give a system whose links keep their shape."""
+    """Velocities and accelerations imposed by drives on a system whose links keep their shape."""
 
     def __init__(self, system: System, time: float) -> None:
         self.system, self.time, self.signals = system, time, moment_signals(system.mechanism, time)
 
     def __call__(self, q: Array) -> tuple[Array, Array]:
-        """Velocities and accelerations (n,) at coordinates (n,)."""
+        """Return velocities and accelerations (n,) at coordinates (n,)."""
         change, rest = self._change(q), np.zeros(self.system.n)
         v = project(change, rest, partial(self._rates, q))
         return v, project(change, rest, partial(second_rates, self.system, self.signals, self.time, q, v))
 
     def velocities(self, q: Array, near: Array | None = None) -> Array:
-        """Admissible velocities (n,) at coordinates (n,) nearest to others, by default to zero."""
+        """Return the admissible velocities (n,) at coordinates (n,) nearest to given ones, by default to zero."""
         return project(self._change(q), np.zeros(self.system.n) if near is None else near, partial(self._rates, q))
 
     def _change(self, q: Array) -> LeastChange:
@@ -147,7 +147,7 @@ class _Motion:
 
 
 def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> System:
-    """The same system with the joints driven too, each by a smooth law with its motion at the start, as are loads."""
+    """Return the system with the joints driven too; drives and loads follow smooth laws from the start."""
     own = tuple(
         replace(prescribed, law=_smooth(prescribed.law, start.time)) for prescribed in system.mechanism.prescribed
     )
@@ -171,7 +171,7 @@ def _smooth(law: AngleLaw, time: float) -> DrivenAngle:
 
 
 def _prescribes_all(drives: System, start: State) -> bool:
-    """Whether drives and springs at joints determine the motion of rigid bodies."""
+    """Return whether drives and springs at joints determine the motion of rigid bodies."""
     mechanism = drives.mechanism
     taken = {prescribed.joint for prescribed in mechanism.prescribed}
     springs = {spring.joint for spring in mechanism.springs} - taken

@@ -1,4 +1,4 @@
-"""Redundant constraint rows: which rows follow from which others, and multipliers of least norm."""
+"""Redundant constraint rows: dependences between rows, and multipliers of least norm."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from paraflex.dynamics.system import System
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.packed import CONSTRAINT
 
-# A constraint row whose independent part is smaller than this fraction of the largest follows from the others.
+# A constraint row with an independent part smaller than this fraction of the largest is redundant.
 DEPENDENT = 1e-9
-# The same where rows are compared by the squares of their sizes, which hold half of the digits.
+# The same for rows compared by the squares of their sizes, which hold half of the digits.
 _DEPENDENT_SQUARED = 1e-12
-# Up to so many rows a dense factorisation with pivots is as fast as a sparse one, and finer.
+# Up to this number of rows a dense factorisation with pivoting is as fast as a sparse one, and more accurate.
 DENSE_ROWS = 400
-# Rows with less than this part in a dependence have none in it.
+# Rows with a smaller share of a dependence than this take no part in it.
 NO_PART = 1e-6
 
 
@@ -31,9 +31,9 @@ class Dependence:
     Attributes
     ----------
     kept, dropped : arrays of int
-        Row numbers. There is a choice: the rows dropped are those that a factorisation comes to last.
+        Row numbers. The choice is not unique: dropped rows are the last pivots of a factorisation.
     coefficients : (kept, dropped) array
-        Each dropped row of Phi_q is this combination of the kept ones.
+        Coefficients by which each dropped row of Phi_q is a combination of the kept ones.
     """
 
     kept: NDArray[np.int64]
@@ -46,23 +46,23 @@ class Dependence:
         return self.kept.size
 
     def sources(self, k: int) -> NDArray[np.int64]:
-        """Row numbers from which the k-th dropped row follows."""
+        """Return the row numbers of which the k-th dropped row is a combination."""
         part = np.abs(self.coefficients[:, k])
         return self.kept[part > NO_PART * max(1.0, part.max(initial=0.0))]
 
     def conflict(self, residual: Array) -> Array:
-        """Residual of each dropped row less that implied by the rows it follows from; residual (m,)."""
+        """Return the residual of each dropped row less that implied by its sources; residual (m,)."""
         return residual[self.dropped] - self.coefficients.T @ residual[self.kept]
 
     def least_norm(self, multipliers: Array) -> Array:
-        """Multipliers (m,) of the same constraint forces with the least sum of squares."""
+        """Return multipliers (m,) of the same constraint forces with the least sum of squares."""
         free = self.self_stresses(np.ones(multipliers.size)).T
         return multipliers - free @ np.linalg.lstsq(free, multipliers, rcond=None)[0]
 
     def self_stresses(self, units: Array) -> Array:
-        """Multipliers (dropped, m) that exert no force, the largest times units (m,) of size one.
+        """Return multipliers (dropped, m) that exert no force, the largest times units (m,) being one.
 
-        What redundant rows carry is determined up to these.
+        Multipliers of redundant rows are determined up to these.
         """
         out = np.zeros((self.dropped.size, units.size))
         out[:, self.kept], out[:, self.dropped] = -self.coefficients.T, np.eye(self.dropped.size)
@@ -70,7 +70,7 @@ class Dependence:
 
 
 def constraint_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
-    """Phi_q (m, n) at q as a sparse matrix; zero in the rows of springs and dampers."""
+    """Return Phi_q (m, n) at q as a sparse matrix; zero in the rows of springs and dampers."""
     return sparse_jacobian(system, q) if system.m > DENSE_ROWS else scipy.sparse.csr_matrix(system.jacobian(q))
 
 
@@ -78,18 +78,20 @@ def dependence(
     system: System, q: Array, threshold: float = DEPENDENT, count: int | None = None,
     acting: NDArray[np.int64] | None = None,
 ) -> Dependence:  # fmt: skip
-    """Redundant constraint rows at q.
+    """Find the redundant constraint rows at q.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     q : (n,) array
+        Coordinates of the pose.
     threshold : float
-        A row does where its independent part is smaller than this, as a fraction of the largest.
+        Independent part below which a row is redundant, as a fraction of the largest.
     count : int, optional
-        How many rows do, in place of the threshold, where that is known.
+        Number of redundant rows if known, in place of the threshold.
     acting : (c,) array, optional
-        The constraint rows that count; all by default.
+        Constraint rows that are considered; all by default.
     """
     rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0] if acting is None else acting
     if rigid.size == 0:
@@ -100,10 +102,10 @@ def dependence(
 
 
 def _dense(system: System, q: Array, rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
-    """Dependence by a QR factorisation of Phi_q^T with pivots, without dimension."""
+    """Find the dependence by a pivoted QR factorisation of the dimensionless Phi_q^T."""
     units, columns = system.row_units[rigid], system.units.copy()
     for body in system.bodies:
-        # Elastic coordinates are of unit modal mass: with this unit they move points by about the size.
+        # Elastic coordinates have unit modal mass: in this unit they move points by about the size.
         columns[body.flexible] *= system.size * np.sqrt(np.real(body.integrals.m))
     jacobian = system.jacobian(q)[rigid] * columns / units[:, None]
     factors = scipy.linalg.qr(jacobian.T, mode="r", pivoting=True)
@@ -116,7 +118,7 @@ def _dense(system: System, q: Array, rigid: NDArray[np.int64], threshold: float,
 
 
 def _sparse(system: System, q: Array, rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
-    """Dependence by the Cholesky factor of Phi_q M^-1 Phi_q^T as in runs, row by row within its envelope."""
+    """Find the dependence by the Cholesky factor of Phi_q M^-1 Phi_q^T as in runs, row by row within its envelope."""
     workspace = system.workspace()
     factor_system(system.packed, 0.0, q, workspace)
     rows = system.packed.rows[rigid]
@@ -139,12 +141,12 @@ def _sparse(system: System, q: Array, rigid: NDArray[np.int64], threshold: float
 
 
 def redundant_rows(system: System, q: Array, threshold: float = DEPENDENT) -> list[str]:
-    """Names of constraint rows that follow from others at q: see `dependence`."""
+    """Return the names of the redundant constraint rows at q: see `dependence`."""
     return sorted(system.rows[i] for i in dependence(system, q, threshold).dropped)
 
 
 def involved(system: System, found: Dependence, k: int) -> list[str]:
-    """Joints, gears and prescribed motions, these first, of the k-th dropped row and its sources."""
+    """Return the drives, joints and gears, in this order, of the k-th dropped row and its sources."""
     rows = [found.dropped[k], *found.sources(k)]
     names = dict.fromkeys(joint_of_row(system.rows[row]) for row in rows)
     prescribed = {motion.name for motion in system.mechanism.prescribed}
@@ -152,5 +154,5 @@ def involved(system: System, found: Dependence, k: int) -> list[str]:
 
 
 def joint_of_row(row: str) -> str:
-    """The joint or prescribed motion that a row belongs to: "B1" of "B1 x"."""
+    """Return the joint or prescribed motion that a row belongs to: "B1" for "B1 x"."""
     return row.rsplit(" ", 1)[0]

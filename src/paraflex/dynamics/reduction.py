@@ -1,8 +1,8 @@
 """Error of modal reduction in the rotation of a body under moments at its joints.
 
-Modes of a body in its frame are free of moments where the frame does not clamp it: those of the pinned frame at both
-ends. A series of them converges to the turn of an end under a moment with the first power of 1/modes only, where the
-deflection under forces converges with its third, and a beam clamped by a weld is too stiff by as much.
+Modes of a body in its frame are free of moments where the frame does not clamp it: with the pinned frame, at both ends.
+Their series converges to the rotation of an end under a moment with the first power of 1/modes only, while the
+deflection under forces converges with the third. A beam clamped by a weld is too stiff by the same error.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from paraflex.dynamics.coordinates import BodyCoordinates
 from paraflex.dynamics.system import System
 from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, RigidBody, grouped, joints_named
 
-# Smaller missing fractions of a rotation are not reported.
+# Missing fractions of a rotation below this are not reported.
 _MISSED = 0.05
 
 
@@ -26,12 +26,13 @@ class MissedTurn(NamedTuple):
     Attributes
     ----------
     point : PointRef
+        Point of the body.
     cause : str
-        What brings a moment in there.
+        Member that exerts a moment there.
     modes : int
-        How many the body keeps.
+        Number of modes kept of the body.
     part : float
-        Of the static turn against the body frame under a moment there, what the modes kept do not tell.
+        Fraction missing from the static rotation against the body frame under a moment there.
     """
 
     point: PointRef
@@ -41,9 +42,9 @@ class MissedTurn(NamedTuple):
 
 
 def missed_turns(system: System) -> list[MissedTurn]:
-    """Points at which reduced bodies rotate by five per cent too little under a moment there, body by body.
+    """Return the points at which reduced bodies rotate over five per cent too little under a moment, body by body.
 
-    Coordinates that were chosen for a motion are judged by their runs.
+    Bases chosen for a motion (`Mechanism.bases`) are not examined: their runs show their error.
     """
     found: dict[PointRef, MissedTurn] = {}
     for point, cause in _moments(system.mechanism):
@@ -77,7 +78,7 @@ def _missed(body: BodyCoordinates, system: System, point: PointRef) -> float:
 
 
 def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
-    """Points of bodies at which joints or loads apply moments, and their names."""
+    """Yield the points of bodies at which joints or loads apply moments, with their descriptions."""
     causes = [
         (f"the {'rail' if joint.slides else joint.kind} {joint.name}", joint)
         for joint in mechanism.joints

@@ -1,4 +1,4 @@
-"""The reference length for tolerances of a mechanism."""
+"""Reference length for the tolerances of a mechanism."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from paraflex.dynamics.coordinates import BodyCoordinates
 
 
 def mechanism_size(bodies: tuple[BodyCoordinates, ...]) -> float:
-    """The largest distance between two points of a body, rounded to a power of two, by which division is exact [m].
+    """Return the largest distance between two points of a body, rounded to a power of two for exact division [m].
 
-    Where no body has two points apart, the largest radius of gyration about a body's origin.
+    If no body has two distinct points, it is the largest radius of gyration about a body's origin.
     """
     size = max(map(_extent, bodies))
     if not size > 0.0:
@@ -22,7 +22,7 @@ def mechanism_size(bodies: tuple[BodyCoordinates, ...]) -> float:
 
 
 def _extent(body: BodyCoordinates) -> float:
-    """Length of a beam; for another body the largest distance between two of its named points [m]."""
+    """Return the length of a beam; for another body the largest distance between two of its named points [m]."""
     if body.mesh is not None:
         return float(np.real(body.mesh.nodes[-1] - body.mesh.nodes[0]))
     places = np.array([np.real(point.x0) for point in body.shape.points.values()], dtype=float).reshape(-1, 2)

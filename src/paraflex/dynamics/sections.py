@@ -1,20 +1,20 @@
 """Section forces and stresses along beams, from the shape functions of the element.
 
-At a station of a beam the bending moment is M = E I w'', the axial force N = E A u', of deformations in the body frame.
-Linear axial shape functions make N constant within an element, and right there in the mean; how it changes within the
-element follows from what its mass resists, N'(x) = rho A (a - g) . e_x, the mean kept:
+At a station of a beam the bending moment is M = E I w'' and the axial force N = E A u', from deformations in the body
+frame. Linear axial shape functions make N constant within an element, correct on average. Its change within the element
+follows from the inertia of its mass, N'(x) = rho A (a - g) . e_x, with the same mean:
 
     N(x) = E A u' + c(x) - 1/l int_0^l c dx,    c(x) = int_0^x rho A (a - g) . e_x dx
 
-with the acceleration a of the centre line, s'' + phi'' E s - phi'^2 s + 2 phi' E s' + r''. Of second-order geometry u
-is the stretch of the centre line, so that N is that of the element; the shortening by bending is left out of a.
+with the acceleration a of the centre line, s'' + phi'' E s - phi'^2 s + 2 phi' E s' + r''. In second-order geometry u
+is the stretch of the centre line, so that N is that of the element; the shortening by bending is neglected in a.
 
-To the moment adds what shape functions leave out of it: of the inertia of the deflection (`dynamics.inertia_moments`),
-and of the force of a joint that slides along the beam (`dynamics.contacts`). The section under such a joint is one more
-place, which moves.
+Two corrections complete the moment: for the inertia of the deflection (`dynamics.inertia_moments`), and for the force
+of a joint that slides along the beam (`dynamics.contacts`). The section under such a joint is an additional, moving
+station.
 
 Cook, Malkus, Plesha, Witt (2002), Concepts and Applications of Finite Element Analysis, 4th ed., 2.9 and 3.12 (loads
-between nodes added to what nodal displacements give).
+between nodes superposed on the results of nodal displacements).
 """
 
 from __future__ import annotations
@@ -34,32 +34,33 @@ from paraflex.fem.element import axial_shape, transverse_shape
 from paraflex.fem.integrals import GAUSS_POINTS
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Material, Section
 
-# Pieces between stations: of a beam at least, and of an element. The largest moment between two of the stations of a
-# beam under a uniform load is missed by at most 1/256 of itself.
+# Fewest pieces between stations: per beam, and per element. Under a uniform load the largest moment between two
+# stations exceeds that at the stations by at most 1/256 of itself.
 _BEAM_PIECES, _ELEMENT_PIECES = 16, 4
-# Coordinates that hold less than this part of what a uniform tension stretches do not give the axial force.
+# Coordinates with less than this fraction of the stretch under uniform tension do not give the axial force.
 _STRETCHES = 0.95
 Shape = Callable[[Array, float, int], Array]
-# An element and places in it, as fractions of its length.
+# An element and positions in it, as fractions of its length.
 _Places = tuple[int, Array]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
 class SectionLoads(NamedTuple):
-    """Loads of sections (k, stations and contacts), real or with a complex step, and what these sections are.
+    """Loads of sections (k, stations and contacts), real or with a complex step, and properties of these sections.
 
-    First those of all stations, then those under each joint that slides along a beam.
+    All stations come first, then the sections under each joint that slides along a beam.
 
     Attributes
     ----------
     moment : array
-        Bending moment, positive where it bends the beam anticlockwise going from its first end to its last [N m].
+        Bending moment, positive if it bends the beam anticlockwise in the direction from its first end to its last [N
+        m].
     force : array
-        Axial force, positive in tension; NaN of beams whose coordinates do not stretch [N].
+        Axial force, positive in tension; NaN for beams whose coordinates do not stretch [N].
     x : array
         Distance from the beam's first end [m].
     area, modulus, strength : arrays
-        See `Sections`.
+        Section and material properties: see `Sections`.
     """
 
     moment: Array
@@ -73,14 +74,14 @@ class SectionLoads(NamedTuple):
     def stress(self) -> Array:
         """Largest magnitude of the stress in each section, |N| / A + |M| c / I [Pa].
 
-        Of bending alone where there is no axial force; NaN where the outermost fibre is not known.
+        It is due to bending alone where the axial force is NaN; NaN where the outermost fibre is not known.
         """
         return np.abs(np.nan_to_num(self.force)) / np.real(self.area) + np.abs(self.moment) / np.real(self.modulus)
 
 
 @dataclass(frozen=True)
 class Sections:
-    """Stations along the flexible beams of a system: ends of all elements, on both sides of every node, and between.
+    """Stations along the flexible beams of a system: on both sides of every node, and between nodes.
 
     Attributes
     ----------
@@ -91,11 +92,11 @@ class Sections:
     x : (s,) array
         Distance from the beam's first end [m].
     area, modulus : (s,) arrays
-        Of the section: area [m^2] and I / c [m^3], NaN where the outermost fibre is not known.
+        Area [m^2] and section modulus I / c [m^3]; the latter is NaN where the outermost fibre is not known.
     strength : (s,) array
-        Of the material, NaN where it is not known [Pa].
+        Strength of the material, NaN where it is not known [Pa].
     parts : tuple
-        What `loads` needs of each beam.
+        Data of each beam for `loads`.
     """
 
     bodies: tuple[str, ...]
@@ -107,7 +108,7 @@ class Sections:
     parts: tuple[_Beam, ...]
 
     def loads(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionLoads:
-        """Loads of sections for coordinates (k, n), their derivatives, and the multipliers (k, m)."""
+        """Return the loads of sections for coordinates (k, n), their derivatives, and the multipliers (k, m)."""
         still, moving, first = [], [], 0
         for part in self.parts:
             own = slice(first, first := first + len(part.moment))
@@ -124,15 +125,16 @@ class Sections:
 
 
 class _Beam(NamedTuple):
-    """A beam's moment and axial force per flexible coordinate (s, nf), and what the shape functions leave out of them.
+    """Moment and axial force of a beam per flexible coordinate (s, nf), and the corrections of its shape functions.
 
     Attributes
     ----------
     resisted : (s, nf) array, optional
         Moment per acceleration of each coordinate across the beam.
     change : _Change, optional
-        How the axial force changes within elements.
+        Change of the axial force within elements.
     contacts : Contacts, optional
+        Joints that slide along the beam.
     """
 
     body: str
@@ -144,9 +146,10 @@ class _Beam(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """Mass per length (s,) [kg/m], and c less its mean for a unit of it.
+    """Mass per length (s,) [kg/m], and c less its mean per unit of it.
 
-    Of accelerations as the shapes along and across the beam (s, nf), as the place x, and as one (s,).
+    c is given for accelerations with the shapes along and across the beam (s, nf), equal to x (s,), and equal to one
+    (s,).
     """
 
     mass: Array
@@ -157,9 +160,9 @@ class _Change(NamedTuple):
 
 
 def sections_of(system: System) -> Sections | None:
-    """Stations of a system's flexible beams; None where there are none.
+    """Return the stations of a system's flexible beams; None if there are none.
 
-    Rigid and modal bodies have no section forces: nothing is known of the inside of these.
+    Rigid and modal bodies have no section forces: their internal structure is not known.
     """
     return system.once("sections", lambda: _sections(system))
 
@@ -188,7 +191,7 @@ def _sections(system: System) -> Sections | None:
 
 
 class SectionAt(NamedTuple):
-    """One section of a flexible beam, at a place (1,) a little within its element."""
+    """A section of a flexible beam, at a position (1,) slightly inside its element."""
 
     section: Section
     material: Material
@@ -196,9 +199,9 @@ class SectionAt(NamedTuple):
     place: Array
 
     def loads(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array]:
-        """Bending moment and axial force (k,) for coordinates (k, n), their derivatives, and multipliers.
+        """Return bending moment and axial force (k,) for coordinates (k, n), their derivatives, and multipliers.
 
-        The latter of what slides along the beam alone, one for each of `sliding_joints`.
+        The multipliers are those of joints sliding along the beam only, one for each of `sliding_joints`.
         """
         body, part = system.body(self.part.body), self.part
         u, added = q[:, body.flexible], 0.0
@@ -212,7 +215,7 @@ class SectionAt(NamedTuple):
 
 
 def section_at(system: System, name: str, x: float) -> SectionAt | None:
-    """The section of a beam at a distance from its first end, at a node that of the next element; None if rigid."""
+    """Return the section of a beam at a distance from its first end, at a node in the next element; None if rigid."""
     described, body, place = system.mechanism.body(name), system.body(name), np.array([x])
     assert isinstance(described, FlexibleBeam | AssumedModesBeam)
     if not body.nf:
@@ -220,7 +223,7 @@ def section_at(system: System, name: str, x: float) -> SectionAt | None:
     if isinstance(described, AssumedModesBeam):
         return SectionAt(described.section, described.material, _assumed(described, body, place), place)
     nodes = described.mesh.nodes
-    # A place at a node but for rounding is at the node.
+    # A position at a node up to rounding is at the node.
     e = int(np.clip(np.searchsorted(nodes, x + 1e-12 * nodes[-1], side="right") - 1, 0, nodes.size - 2))
     z = min(max((x - nodes[e]) / (nodes[e + 1] - nodes[e]), 0.0), 1.0)
     part, _, (section,), (material,) = _meshed(described, body, [(e, np.array([z]))])
@@ -234,7 +237,7 @@ def section_at(system: System, name: str, x: float) -> SectionAt | None:
 def _stations(
     described: FlexibleBeam | AssumedModesBeam, system: System
 ) -> tuple[_Beam, Array, Sequence[Section], Sequence[Material]]:
-    """Rows, places, sections and materials of a beam's stations."""
+    """Return rows, positions, sections and materials of a beam's stations."""
     body = system.body(described.name)
     if isinstance(described, FlexibleBeam):
         mesh = described.mesh
@@ -248,7 +251,7 @@ def _stations(
 
 
 def _assumed(described: AssumedModesBeam, body: BodyCoordinates, x: Array) -> _Beam:
-    """Rows of the sections of a bar of assumed modes at places x (s,)."""
+    """Return the rows of the sections of a bar of assumed modes at positions x (s,)."""
     D, shapes, bent = body.integrals.D, described.shapes, len(described.transverse)
     E = described.material.youngs_modulus
     moment = E * described.section.second_moment * shapes.transverse_rows(x, derivative=2) @ D[:bent]
@@ -262,7 +265,7 @@ def _assumed(described: AssumedModesBeam, body: BodyCoordinates, x: Array) -> _B
 def _meshed(
     beam: FlexibleBeam, body: BodyCoordinates, at: Sequence[_Places]
 ) -> tuple[_Beam, Array, Sequence[Section], Sequence[Material]]:
-    """See `_stations`; of the sections at places in some elements."""
+    """Return rows, positions, sections and materials at positions in some elements: see `_stations`."""
     mesh, D = beam.mesh, body.integrals.D
     section, material, spans = beam.section, beam.material, beam.spans
     sections = section if isinstance(section, tuple) else (section,) * mesh.n_spans
@@ -291,18 +294,18 @@ def _meshed(
 
 
 def _stretches(body: BodyCoordinates, lengthened: Array, flexibility: float) -> bool:
-    """Whether the coordinates hold what a uniform tension stretches: 1/k of them against that of the beam."""
+    """Return whether the coordinates represent uniform tension: their compliance against the beam's."""
     part = np.sum(np.real(lengthened / body.modes.omega) ** 2)
     return bool(part >= _STRETCHES * np.real(flexibility))
 
 
 def _change(beam: FlexibleBeam, D: Array, at: Sequence[_Places], mass: Array) -> _Change:
-    """Integrals from each element's first node to its stations, less their means over it."""
+    """Return integrals from each element's first node to its stations, less their means over the element."""
     mesh = beam.mesh
     along, across, place, one = [], [], [], []
     for e, z in at:
         length = mesh.nodes[e + 1] - mesh.nodes[e]
-        # To the stations, then the mean over the element, 1/l int (l - x) dx.
+        # First to the stations, then the mean over the element, 1/l int (l - x) dx.
         x = np.outer(z, 0.5 * (_POINTS + 1.0)) * length
         weights = np.outer(z, 0.5 * _WEIGHTS) * length
         whole, share = 0.5 * (_POINTS + 1.0) * length, 0.25 * _WEIGHTS * (1.0 - _POINTS) * length
@@ -322,7 +325,7 @@ def _change(beam: FlexibleBeam, D: Array, at: Sequence[_Places], mass: Array) ->
 def _loads(
     system: System, part: _Beam, sections: Sequence[Array], q: Array, v: Array, a: Array, multipliers: Array
 ) -> SectionLoads:
-    """Loads of a beam's stations, then of its sections under what slides along it."""
+    """Return the loads of a beam's stations, then of its sections under joints that slide along it."""
     x, *kinds = (np.broadcast_to(each, (len(q), each.size)) for each in sections)
     u, contacts = q[:, system.body(part.body).flexible], part.contacts
     force = _axial(system, part, q, v, a)
@@ -332,7 +335,7 @@ def _loads(
         return SectionLoads(u @ part.moment.T + resisted, force, x, *kinds)
     load = contacts.load(system, q, multipliers)
     place = load.place
-    # Without what the forces deflect quasi-statically, then with the moments of these as they are.
+    # Deflection without the quasi-static part of the contact forces, whose exact moments are added instead.
     u = u - load.deflected
     moment = np.hstack([u @ part.moment.T + resisted, contacts.moment(place, u, across)])
     elements = np.repeat(np.arange(len(contacts.stiffness)), len(sections[0]) // len(contacts.stiffness))
@@ -346,12 +349,12 @@ def _loads(
 
 
 def _across(body: BodyCoordinates, q: Array, v: Array, a: Array) -> Array:
-    """Acceleration across the beam (k, nf) per shape: u'' - phi'^2 u."""
+    """Return the acceleration across the beam (k, nf) per shape: u'' - phi'^2 u."""
     return a[:, body.flexible] - v[:, body.angle, None] ** 2 * q[:, body.flexible]
 
 
 def _axial(system: System, part: _Beam, q: Array, v: Array, a: Array) -> Array:
-    """Axial force at a beam's stations."""
+    """Return the axial force at a beam's stations."""
     body = system.body(part.body)
     u = q[:, body.flexible]
     if part.force is None:

@@ -1,7 +1,7 @@
-"""Readings of sensors for coordinates over time, and their exact derivatives at a state.
+"""Sensor readings from coordinates over time, and their exact derivatives at a state.
 
-Every sensor reads from the few bodies, constraint rows and motors that it depends on; its derivatives are found by
-complex steps in these alone. Squire, Trapp (1998), Using complex variables to estimate derivatives of real functions.
+Every sensor reads from the few bodies, constraint rows and motors that it depends on; complex steps in these alone give
+its derivatives. Squire, Trapp (1998), Using complex variables to estimate derivatives of real functions.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _STEP = 1e-30
 
 
 class MotionSamples(NamedTuple):
-    """What sensors read from: coordinates (k, n) and their derivatives, multipliers (k, m), torques (k, motors)."""
+    """Inputs of sensors: coordinates (k, n) and their derivatives, multipliers (k, m), torques (k, motors)."""
 
     q: Numbers
     v: Numbers
@@ -38,7 +38,7 @@ class MotionSamples(NamedTuple):
 
 
 class SensorRows(NamedTuple):
-    """Derivatives of readings, sparse: (sensors, n) by q, v and a, (sensors, m), (sensors, motors)."""
+    """Sparse derivatives of readings: (sensors, n) by q, v and a, (sensors, m) and (sensors, motors)."""
 
     q: scipy.sparse.csr_matrix
     v: scipy.sparse.csr_matrix
@@ -48,7 +48,7 @@ class SensorRows(NamedTuple):
 
 
 class _Needed:
-    """Names of what a sensor reads, found by letting it read zeros: a `mechanism.sensors.Moving`."""
+    """Recorder of the bodies, joints and beams that a sensor reads: a `mechanism.sensors.Moving` of zeros."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
@@ -106,12 +106,12 @@ class _Needed:
 
 
 class _Local:
-    """A sensor in a system of the bodies alone that it depends on.
+    """Sensor in a reduced system with only the bodies that it depends on.
 
     Attributes
     ----------
     columns : MotionSamples of (c,) arrays
-        Numbers of the coordinates, multipliers and motors that it depends on.
+        Indices of the coordinates, multipliers and motors that it depends on.
     """
 
     def __init__(self, system: System, sensor: Sensor) -> None:
@@ -128,7 +128,7 @@ class _Local:
         of_bodies = np.concatenate(columns)
         rows: list[int] = []
         motors: list[int] = []
-        # Of joints their parts and where their rows and motors begin; of beams where the rows of what slides on it do.
+        # Loads of each joint with its columns of multipliers and motors; columns of the contacts on each beam.
         self.parts: dict[str, tuple[JointParts, slice, slice]] = {}
         for name in needed.loads:
             parts = joint_parts(system, name)
@@ -147,16 +147,16 @@ class _Local:
         )
 
     def taken(self, given: MotionSamples) -> MotionSamples:
-        """Its own columns of those of a system."""
+        """Select the sensor's own columns from the samples of a system."""
         return MotionSamples(*(values[:, own] for values, own in zip(given, self.columns, strict=True)))
 
     def read(self, at: MotionSamples) -> Numbers:
-        """Readings (k,) from its own columns."""
+        """Return the readings (k,) from the own columns of samples."""
         return self._sensor.read(_Moving(self, at))
 
 
 class _Moving:
-    """Quantities of a local system in motion: a `mechanism.sensors.Moving`."""
+    """Quantities of a reduced system in motion: a `mechanism.sensors.Moving`."""
 
     def __init__(self, local: _Local, at: MotionSamples) -> None:
         self._local, self._system, self._at = local, local.system, at
@@ -191,7 +191,7 @@ class _Moving:
         return self._at.q[:, self._system.body(body).angle]
 
     def strain(self, beam: str, at: float | str, distance: float | None) -> Numbers:
-        """N / E A - distance M / E I; without N where its coordinates do not stretch."""
+        """Return N / E A - distance M / E I, without N if the beam has no axial coordinates."""
         described = self._system.mechanism.body(beam)
         assert isinstance(described, FlexibleBeam | AssumedModesBeam)
         at_place = self._local.section_at(beam, described.points[at] if isinstance(at, str) else at)
@@ -225,13 +225,14 @@ class _Moving:
 
 
 class SensorReader:
-    """Readings of some sensors of a system, for one call after another.
+    """Readings of sensors of a system, prepared for repeated calls.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     sensors : sequence of Sensor, optional
-        By default those of the mechanism.
+        Sensors to read; those of the mechanism by default.
 
     Raises
     ------
@@ -249,7 +250,7 @@ class SensorReader:
         self.of_torques: bool = any(each.columns.torques.size for each in self._locals)
 
     def __call__(self, q: Numbers, v: Numbers, a: Numbers, multipliers: Numbers, torques: Numbers) -> Numbers:
-        """See `sensor_readings`."""
+        """Return the readings: see `sensor_readings`."""
         given = MotionSamples(q, v, a, multipliers, torques)
         readings = [each.read(each.taken(given)) for each in self._locals]
         return np.stack(readings, axis=1) if readings else np.zeros((len(q), 0))
@@ -264,22 +265,25 @@ def sensor_readings(
     torques: Numbers,
     sensors: Sequence[Sensor] | None = None,
 ) -> Numbers:
-    """Readings (k, sensors), each in its unit (`Mechanism.sensor_unit`); complex where something given is.
+    """Return readings (k, sensors), each in its unit (`Mechanism.sensor_unit`); complex if any argument is.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     q, v, a : (k, n) arrays
+        Coordinates, velocities and accelerations.
     multipliers : (k, m) array
+        Multipliers.
     torques : (k, motors) array
         Torque or force of every motor.
     sensors : sequence of Sensor, optional
-        By default those of the mechanism.
+        Sensors to read; those of the mechanism by default.
 
     Raises
     ------
     InputError
-        A sensor of what the mechanism does not have.
+        A sensor refers to a member that the mechanism does not have.
     """
     return SensorReader(system, sensors)(q, v, a, multipliers, torques)
 
@@ -293,20 +297,23 @@ def sensor_rows(
     torques: Array,
     sensors: Sequence[Sensor] | None = None,
 ) -> SensorRows:
-    """Derivatives of the readings at one state by all that they are read from, exact but for rounding.
+    """Return the derivatives of the readings at one state by all their inputs, exact up to rounding.
 
     Parameters
     ----------
     system, sensors
-        As for `sensor_readings`.
+        System and sensors as for `sensor_readings`.
     q, v, a : (n,) arrays
+        Coordinates, velocities and accelerations.
     multipliers : (m,) array
+        Multipliers.
     torques : (motors,) array
+        Torque or force of every motor.
 
     Raises
     ------
     InputError
-        A sensor of what the mechanism does not have.
+        A sensor refers to a member that the mechanism does not have.
     """
     state = MotionSamples(*(np.asarray(each)[None] for each in (q, v, a, multipliers, torques)))
     found = _locals(system, sensors)
@@ -324,7 +331,7 @@ def sensor_rows(
 
 
 def _sparse(rows: Sequence[tuple[Array, Array]], width: int) -> scipy.sparse.csr_matrix:
-    """A matrix of rows that are given by their columns and the values there."""
+    """Return the matrix of rows given by their columns and the values there."""
     counts = [columns.size for columns, _ in rows]
     columns = np.concatenate([np.zeros(0, int), *(columns for columns, _ in rows)])
     values = np.concatenate([np.zeros(0), *(values for _, values in rows)])

@@ -14,7 +14,7 @@ from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam, ModalBody, 
 
 
 class PointShape(NamedTuple):
-    """A material point: its place in the undeformed body (2,) and shape rows (2, own), (own,) of own coordinates."""
+    """A material point: undeformed position (2,), shape rows (2, own), slope row (own,) in own coordinates."""
 
     x0: Array
     N: Array
@@ -28,16 +28,17 @@ class BodyShape:
     Attributes
     ----------
     integrals : ShapeIntegrals
+        Shape integrals of the body.
     mesh : BeamMesh or None
-        Of a flexible beam, whose named points are nodes.
+        Mesh of a flexible beam, whose named points are nodes.
     points : mapping of str to PointShape
         Named points of any other body.
     ends : tuple of PointShape
-        First and last end of what has such but no mesh, else none.
+        First and last end of a body that has ends but no mesh, else empty.
     slopes : (k, own) array
-        Slope rows at places along the body that tell how far it bends.
+        Slope rows at positions along the body that show how far it bends.
     line : tuple of PointShape
-        Of a bar of assumed modes, places along its centre line.
+        Positions along the centre line of a bar of assumed modes, else empty.
     """
 
     integrals: ShapeIntegrals
@@ -49,12 +50,12 @@ class BodyShape:
 
 
 def body_shape(body: Body) -> BodyShape:
-    """Integrals and points of a body.
+    """Return the integrals and points of a body.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        A mass matrix that is not positive definite.
+        The mass matrix is not positive definite.
     """
     if isinstance(body, RigidBody):
         points = {
@@ -76,7 +77,7 @@ def body_shape(body: Body) -> BodyShape:
 
 
 def beam_lumps(beam: FlexibleBeam) -> list[Lump]:
-    """Lumps of a beam at its nodes."""
+    """Return the lumps of a beam at its nodes."""
     points = beam.mesh.points
     return [Lump(points[lump.point], lump.mass, lump.inertia) for lump in beam.lumps]
 

@@ -1,4 +1,4 @@
-"""Functions of time for the kernels: motor torques, loads and prescribed angles as piecewise quintics."""
+"""Time profiles for the kernels: motor torques, loads and prescribed angles as piecewise quintics."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from paraflex.errors import InputError
 from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.mechanism import AngleLaw, Mechanism, TabulatedLaw
 
-# Breaks of a prescribed law: its quintic Hermite pieces are this short, as a fraction of the run, and are halved as
-# often as it takes, within these numbers, until their middles are as near to the law, relative to its largest value.
+# Initial number of quintic Hermite pieces of a prescribed law per run, and largest numbers of pieces and halvings.
+# Pieces are halved until their midpoints are within _NEAR_LAW of the law, relative to its largest value, or within
+# _NEARLY_LAW if errors no longer fall to the fraction _FALLING.
 _LAW_PIECES, _MOST_PIECES, _HALVINGS = 2000, 500_000, 20
 _NEAR_LAW, _NEARLY_LAW, _FALLING = 1e-10, 1e-3, 0.25
-# What rounding leaves of terms of a prescribed motion that cancel [rad or m], or of larger values a part of these.
+# Rounding error of cancelling terms of a prescribed motion [rad or m]; relative to values above one.
 LEFT = 2e-14
 _SHORTEST_PIECE = 1e-6
 _DEGREE = 5
@@ -26,22 +27,23 @@ _DEGREE = 5
 
 @dataclass(frozen=True)
 class InputSignals:
-    """One piecewise polynomial: breaks (k + 1,) and coefficients (k, 6), ascending powers of t - break."""
+    """A piecewise polynomial: breaks (k + 1,) and coefficients (k, 6), ascending powers of t - break."""
 
     breaks: Array
     coefficients: Array
 
 
 def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array, left: float = 0.0) -> InputSignals:
-    """The quintic Hermite interpolant of values with two derivatives; each of them is reproduced at t.
+    """Return the quintic Hermite interpolant of values with two derivatives, all three exact at t.
 
     Parameters
     ----------
     t, value, rate, acceleration : (k + 1,) arrays
-        Times strictly increasing [s].
+        Times, strictly increasing [s], and the values with their first and second derivatives there.
     left : float
-        Rounding error of values, relative to those above one. Where a change of value over a piece differs from that of
-        the rates by no more, the latter is taken: the second derivative of the rounding would be an acceleration.
+        Rounding error of values, relative to those above one; zero by default. If the change of value over a piece
+        agrees with that of the rates within this error, the latter is used: the second derivative of the rounding error
+        would appear as an acceleration.
     """
     h = np.diff(t)
     c0, c1, c2 = value[:-1], rate[:-1], 0.5 * acceleration[:-1]
@@ -58,7 +60,7 @@ def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array, 
 
 
 def constant_signals(values: Sequence[float], end: float) -> list[InputSignals]:
-    """Constant signals on [0, end]."""
+    """Return constant signals on [0, end]."""
     signals = []
     for value in values:
         coefficients = np.zeros((1, _DEGREE + 1))
@@ -68,31 +70,32 @@ def constant_signals(values: Sequence[float], end: float) -> list[InputSignals]:
 
 
 def no_signals(packed: PackedSystem) -> Signals:
-    """Zero for every motor torque and prescribed value of a packed system."""
+    """Return zero for every motor torque and prescribed value of a packed system."""
     numbers = [packed.rows["signal"], packed.motor_sides["signal"]]
     return _pack(constant_signals([0.0] * (1 + max(int(group.max(initial=-1)) for group in numbers)), 1.0))
 
 
 def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: float) -> tuple[Signals, list[float]]:
-    """Motor torques and the mechanism's loads in time and prescribed angles, for the kernels.
+    """Pack motor torques and the mechanism's loads in time and prescribed angles for the kernels.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism with its loads and prescribed motions.
     torques : sequence of InputSignals
-        One a motor; see `Inputs` for their order.
+        Torque of each motor; see `Inputs` for their order.
     end : float
-        Of the run [s].
+        End of the run [s].
 
     Returns
     -------
     Signals, knots
-        The knots are the times at which a law is not smooth.
+        Packed signals, and the times at which a law is not smooth.
 
     Raises
     ------
     InputError
-        A law that does not cover the run or is not finite in it.
+        A law does not cover the run or is not finite in it.
     """
     signals, knots = list(torques), []
     for place, law in _laws(mechanism):
@@ -103,22 +106,23 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
 
 
 def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tuple[InputSignals, list[float]]:
-    """A law in time on [0, end] as a signal, and the times between which it is smooth.
+    """Convert a law in time on [0, end] to a signal and the times between which it is smooth.
 
     Parameters
     ----------
     place : str
-        In a file, for errors.
+        Position of the law in a file, for errors.
     law : AngleLaw
+        Law in time.
     end : float
-        [s]
+        End of the run [s].
     left : float
-        Rounding error of its values, below which pieces are not refined.
+        Rounding error of its values, below which pieces are not refined; zero by default.
 
     Raises
     ------
     InputError
-        It does not cover the run or is not finite in it.
+        The law does not cover the run or is not finite in it.
     """
     inner = sorted(knot for knot in law.knots if 0.0 < knot < end)
     if isinstance(law, TabulatedLaw) and law.linear:
@@ -127,8 +131,8 @@ def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tupl
         lines[:, 0], lines[:, 1] = value[:-1], np.diff(value) / np.diff(t)
         return InputSignals(t, lines), [stop for stop in law.stops if 0.0 < stop < end]
     if getattr(law, "breaks", None) is not None:
-        left = 0.0  # quintic as it is
-    # The law or a derivative may jump at a knot: pieces on either side take its one-sided limits.
+        left = 0.0  # quintic already
+    # The law or a derivative may jump at a knot: the pieces on either side take its one-sided limits.
     parts = []
     for a, b in pairwise([0.0, *inner, end]):
         parts.append(_refined(place, law, _grid(law, a, b, end), left))
@@ -137,15 +141,15 @@ def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tupl
 
 
 def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
-    """Quintic pieces of a law between breaks, halved where it changes too fast for them.
+    """Return quintic pieces of a law between breaks, halved where the law changes too fast for them.
 
     Raises
     ------
     InputError
-        See `law_signal`; or it changes so fast that pieces are too many.
+        The law fails as in `law_signal`, or it changes so fast that there are too many pieces.
     """
     a, b = t[0], t[-1]
-    # At the ends of a stretch values and derivatives are those within it.
+    # Values and derivatives at the ends of a smooth interval are those inside it.
     low, high = max(a + 1e-12 * (b - a), np.nextafter(a, b)), min(b - 1e-12 * (b - a), np.nextafter(b, a))
     last = np.inf
     for _ in range(_HALVINGS):
@@ -159,7 +163,7 @@ def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
         size, worst = np.max(np.abs(value)), np.max(off)
         near = max(_NEAR_LAW * size, left)
         coarse = off > near
-        # Rounding, and kinks, do not fall with the length of pieces.
+        # Errors of rounding and of kinks do not decrease with the length of pieces.
         if worst <= near or (worst <= _NEARLY_LAW * size and worst > _FALLING * last):
             return pieces
         last = worst
@@ -173,12 +177,12 @@ def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
 
 
 def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float]]:
-    """The signals of `pack_signals` without motor torques."""
+    """Return the signals of `pack_signals` without motor torques."""
     return pack_signals(mechanism, _no_torques(mechanism, end), end)
 
 
 def moment_signals(mechanism: Mechanism, time: float) -> Signals:
-    """Signals valid at one time: no torques; laws with their rate and acceleration."""
+    """Return signals valid at one time: no torques; laws with their rate and acceleration."""
     signals = _no_torques(mechanism, 1.0)
     for place, law in _laws(mechanism):
         value, rate, acceleration = (float(x[0]) for x in _evaluate(place, law, np.array([time])))
@@ -188,15 +192,16 @@ def moment_signals(mechanism: Mechanism, time: float) -> Signals:
 
 
 def acting_loads(mechanism: Mechanism, t: Array, *, before: bool = False) -> Array:
-    """What acts (k, acting) at times by the components of loads that are laws in time, zero for motors [N, N m].
+    """Return the load components (k, acting) that are laws in time, at given times; zero for motors [N, N m].
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism of the loads.
     t : (k,) array
-        [s]
+        Times [s].
     before : bool
-        Just before these times, where a load may jump.
+        Whether to evaluate just before these times, where a load may jump.
     """
     inputs = inputs_of(mechanism)
     acting = np.zeros((t.size, inputs.acting))
@@ -207,7 +212,7 @@ def acting_loads(mechanism: Mechanism, t: Array, *, before: bool = False) -> Arr
 
 
 def _laws(mechanism: Mechanism) -> Iterator[tuple[str, AngleLaw]]:
-    """Laws of loads, then of prescribed motions, each with its place in a file."""
+    """Yield the laws of loads, then of prescribed motions, each with its position in a file."""
     yield from ((f"load.{load.name}", law) for load in mechanism.loads for law in load.laws)
     yield from ((f"prescribed.{one.name}", one.law) for one in mechanism.prescribed)
 
@@ -217,11 +222,11 @@ def _no_torques(mechanism: Mechanism, end: float) -> list[InputSignals]:
 
 
 def _grid(law: AngleLaw, a: float, b: float, end: float) -> Array:
-    """Breaks of a law's pieces on [a, b]: its own if it is a quintic between them, else many."""
+    """Return the breaks of a law's pieces on [a, b]: its own if it is a quintic between them, else many."""
     breaks = getattr(law, "breaks", None)
     if breaks is None:
         return np.linspace(a, b, max(8, round(_LAW_PIECES * (b - a) / end)) + 1)
-    # A piece of nearly no length would have no accurate second derivative.
+    # A piece of nearly zero length would have no accurate second derivative.
     margin = _SHORTEST_PIECE * (b - a)
     return np.array([a, *(t for t in breaks if a + margin < t < b - margin), b])
 

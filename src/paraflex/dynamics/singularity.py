@@ -1,4 +1,4 @@
-"""Distance of a pose from a singular position, of the constraints or of the mechanism with motors held."""
+"""Distance of a pose from a singular configuration, of the constraints or of the mechanism with motors held."""
 
 from __future__ import annotations
 
@@ -13,30 +13,32 @@ from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import CONSTRAINT
 
-# Rows with a smaller singular value than this are redundant everywhere; closure errors are far smaller.
+# Rows with a smaller singular value than this are redundant at all poses; closure errors are far smaller.
 _DEPENDENT = 1e-6
 
 
 @dataclass(frozen=True)
 class SingularityMeasure:
-    """Distance from a singular position, without dimension: 0 there, at most 1.
+    """Dimensionless distance from a singular configuration: 0 there, at most 1.
 
-    Rows of Phi_q, and with motors those of their joints' coordinates, restricted to the motion of bodies that keep
-    their present shape: flexible ones give way at a singular position, and hide it. Lengths are measured by kinetic
-    energy, rows scaled to length one. The measure is a singular value of that matrix:
+    The matrix has the rows of Phi_q and, with motors, those of their joint coordinates, restricted to the motion of
+    bodies that keep their present shape: flexible bodies yield at a singular configuration and hide it. Lengths are
+    scaled by kinetic energy, rows to length one. The measure is a singular value of this matrix:
 
-    - of constraints alone the smallest that is not zero where the measure starts: rows that follow from others
-      everywhere are left out. Zero where constraints lose rank.
-    - with motors the smallest of all columns: how much, at least, a motion of unit energy turns held motors or opens
-      joints. Zero where the mechanism can move though they are held (Type II), and where they are too few.
+    - Constraints alone: the smallest that is not zero at the start; rows that are redundant at all poses are left out.
+      It is zero where constraints lose rank.
+    - With motors: the smallest of all columns, which bounds from below how much a motion of unit energy turns held
+      motors or opens joints. It is zero where the mechanism can move with motors held (Type II), and if there are too
+      few motors.
 
     Attributes
     ----------
     system : System
+        System of the mechanism.
     start : (n,) array
-        A pose that is not singular.
+        Coordinates of a pose that is not singular.
     motors : tuple of str
-        Held; none for the constraints alone.
+        Motors that are held; none by default, for the constraints alone.
     """
 
     system: System
@@ -44,7 +46,7 @@ class SingularityMeasure:
     motors: tuple[str, ...] = ()
 
     def __call__(self, q: Array) -> Array:
-        """Distances of poses (k, n): (k,)."""
+        """Return the distances (k,) of poses (k, n)."""
         if self._number == 0:
             return np.zeros(len(q)) if self.motors else np.ones(len(q))
         return np.array([self._values(pose)[self._number - 1] for pose in q])
@@ -62,7 +64,7 @@ class SingularityMeasure:
         return np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
 
     def _scaled(self, q: Array) -> Array:
-        """The matrix (rows, 3 bodies) by displacements and rotations of centres of mass, scaled by inertia."""
+        """Return the matrix (rows, 3 bodies) by displacements and rotations of centres of mass, scaled by inertia."""
         rows, parts = self._rows(q), self._bodies
         at = parts.offsets
         x, y, turn = rows[:, at], rows[:, at + 1], rows[:, at + 2]
@@ -105,7 +107,7 @@ class SingularityMeasure:
 
 @dataclass(frozen=True)
 class _Bodies:
-    """For every undeformed body: start of its coordinates, roots of mass and inertia, its centre of mass."""
+    """Properties of every undeformed body: start of its coordinates, roots of mass and inertia, its centre of mass."""
 
     offsets: NDArray[np.int64]
     root_m: Array

@@ -19,11 +19,11 @@ from paraflex.errors import AssemblyError, InconsistentConstraintsError, Proport
 from paraflex.limits import solvable
 from paraflex.mechanism import Assembly
 
-# How far a body turns, or moves as a part of the mechanism's size, to look whether a pose is a special one.
+# Rotation of a body, or displacement relative to the mechanism's size, of the poses that test for a special pose.
 _NUDGE = 1e-2
 _DIRECTIONS = 3
-# A pose so found is closed to this [sizes of the mechanism, rad], is off by a part of the way tried, and has a rank
-# that shows beside both.
+# A pose so found is closed to this [sizes of the mechanism, rad], lies at a certain fraction of the distance tried, and
+# has a rank threshold above both errors.
 _CLOSED, _BACK, _DEPENDENT = 1e-10, 3.0, 1e-6
 
 
@@ -34,19 +34,21 @@ class Closure:
     Attributes
     ----------
     assembly : str
+        Name of the assembly.
     gap_before : float
-        Largest gap of a joint with the angles as given, put together along the tree of joints [m, rad].
+        Largest gap of a joint with the angles as given, assembled along the tree of joints [m, rad].
     position, velocity : float
-        Largest |Phi| and |Phi'| once closed [m, rad; 1/s]; NaN for what could not be computed.
+        Largest |Phi| and |Phi'| once closed [m, rad; 1/s]; NaN if not computed.
     gap : float
-        Largest that remains where the loops do not close [m, rad]; zero where they do.
+        Largest remaining gap if the loops do not close [m, rad]; zero if they do.
     where : tuple of str
         Joints, gears and prescribed motions with such gaps.
     problem : str
-        Why there is no start; empty for none.
+        Reason why there is no start; empty for none.
     state : State or None
+        Consistent start; None if there is none.
     remedy : str
-        What to do about the problem.
+        Remedy for the problem.
     """
 
     assembly: str
@@ -66,14 +68,23 @@ class Closure:
 
     @property
     def undecided(self) -> bool:
-        """Whether the loops close and yet velocities do not follow: those of [start] may."""
+        """Whether the loops close but velocities are not determined; those of [start] may be."""
         return self.state is None and self.gap == 0.0
 
 
 def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure:
-    """Close an assembly, and report the gaps; it raises nothing if the assembly cannot be closed.
+    """Close an assembly and report the gaps; no error is raised if the assembly cannot be closed.
 
-    Take the rigid mechanism to learn what lengths and places allow: beams are not stretched to fit.
+    The rigid mechanism shows whether lengths and positions fit: its links are not stretched to fit.
+
+    Parameters
+    ----------
+    system : System
+        System of the mechanism, usually of the rigid one.
+    assembly : Assembly
+        Assembly to close.
+    time : float
+        Time of prescribed motions [s].
     """
     signals, nan = moment_signals(system.mechanism, time), math.nan
     q = reference_pose(system, assembly)
@@ -92,14 +103,14 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
 
 @dataclass(frozen=True)
 class Redundancy:
-    """A constraint that follows from others.
+    """A redundant constraint row.
 
     Attributes
     ----------
     row : str
-        Its name ("B1 x"): one of several that could be named, the one a factorisation comes to last.
+        Name of the row ("B1 x"). The choice is not unique: it is the last pivot of a factorisation.
     joint : str
-        Whose it is.
+        Joint of the row.
     among : tuple of str
         All joints, gears and prescribed motions that depend on one another there, this one included.
     """
@@ -111,20 +122,11 @@ class Redundancy:
 
 @dataclass(frozen=True)
 class Mobility:
-    """Degrees of freedom that the constraints leave.
-
-    Attributes
-    ----------
-    bodies : int
-    constraints : int
-        Constraint rows, of joints, gears and prescribed motions.
-    rank : int
-        Of the constraint Jacobian at the pose.
-    redundant : tuple of Redundancy
-        As many as constraints less rank.
-    lasting : int or None
-        Freedoms a little further along: fewer than at the pose where that is a special (singular) one, none where no
-        way on was found. None if the pose leaves no freedom to move along, so that its neighbours cannot be seen.
+    """1> Degrees of freedom left by the constraints.
+    + bodies: Number of bodies. + constraints: Number of constraint rows of joints, gears and prescribed motions. +
+    rank: Rank of the constraint Jacobian at the pose. + redundant: Redundant constraints, as many as constraints less
+    rank. + lasting: Degrees of freedom at nearby poses: fewer than at a special (singular) pose, none if no nearby pose
+    is found. None if the pose is redundant and has no degree of freedom, so that its neighbours cannot be examined.
     """
 
     bodies: int
@@ -145,25 +147,32 @@ class Mobility:
 
     @property
     def lasting_redundant(self) -> int:
-        """Redundant constraints that are not those of a special pose only."""
+        """Number of redundant constraints, without those that are redundant at a special pose only."""
         return len(self.redundant) - (self.freedoms - self.lasting if self.special and self.lasting is not None else 0)
 
     @property
     def special(self) -> bool:
-        """Whether some of the freedoms exist at this pose only."""
+        """Whether some of the degrees of freedom exist at this pose only."""
         return self.lasting is not None and self.lasting < self.freedoms
 
 
 @solvable("degrees of freedom")
 def mobility(system: System, state: State) -> Mobility:
-    """Degrees of freedom and redundant constraints of a rigid mechanism at a closed pose.
+    """Compute the degrees of freedom and redundant constraints of a rigid mechanism at a closed pose.
 
-    Whether a pose is special is found by moving on from it: a short way in a few directions that the constraints allow
-    there, closing the loops again, and taking the rank anew.
+    A pose is recognised as special by a small move in a few directions that the constraints allow there: the loops are
+    closed again, and the rank is computed anew.
+
+    Parameters
+    ----------
+    system : System
+        System of the rigid mechanism.
+    state : State
+        State whose pose is closed.
     """
     here = dependence(system, state.q)
     redundant = tuple(_redundancies(system, here))
-    # Where no constraint depends on others the rank cannot be larger elsewhere.
+    # If no constraint is redundant here, the rank cannot be larger elsewhere.
     lasting: int | None = system.n - here.rank
     if redundant and lasting:
         ranks = [dependence(system, q, _DEPENDENT).rank for q in _poses_nearby(system, state)]
@@ -180,7 +189,7 @@ def _redundancies(system: System, found: Dependence) -> Iterator[Redundancy]:
 
 
 def _poses_nearby(system: System, state: State) -> Iterator[Array]:
-    """Closed poses a short distance away, in random directions within the null space of the constraints."""
+    """Yield closed poses a short distance away, in random directions within the null space of the constraints."""
     signals, random = moment_signals(system.mechanism, state.time), np.random.default_rng(0)
     M = sparse_mass(system, state.q)
     solver = Saddle(M, sparse_jacobian(system, state.q))
@@ -196,6 +205,6 @@ def _poses_nearby(system: System, state: State) -> Iterator[Array]:
             q = close_downhill(system, signals, state.time, state.q + sign * move)
             gap = system.gap(system.constraints(signals, state.time, q)[0])
             gone = q - state.q
-            # An isolated pose: closing the loops leads back to it.
+            # At an isolated pose closing the loops leads back to it.
             if gap < _CLOSED and move @ (M @ move) < _BACK**2 * (gone @ (M @ gone)):
                 yield q

@@ -1,7 +1,7 @@
-"""Mass matrix and constraint Jacobian as sparse matrices, and the linear system they form.
+"""Sparse mass matrix and constraint Jacobian, and the linear system they form.
 
-A mechanism of thousands of bodies has a few entries a row: what is done at a single pose (closing loops, ranks,
-frequencies) then costs what the entries cost, not the square of the coordinates.
+A mechanism of thousands of bodies has a few entries per row. The cost of work at a single pose (closing loops, ranks,
+frequencies) then grows with the number of entries, not with the square of the number of coordinates.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import OMEGA2, PackedSystem, make_scratch
 from paraflex.mechanism import is_hinge
 
-# Diagonal element in place of zero for a dependent row, as a fraction of entries of size one, so that the factor
-# exists; iterative refinement removes its effect.
+# Diagonal element in place of zero, as a fraction of entries of size one, so that a factor exists with dependent rows;
+# iterative refinement removes its effect.
 _REGULAR = 1e-10
 _REFINEMENTS = 8
-# More right-hand sides at once have BLAS start threads, which on a busy machine take a thousand times as long.
+# With more right-hand sides at once BLAS starts threads, which on a busy machine take a thousand times as long.
 _COLUMNS = 16
-# Unknowns up to which a dense matrix takes milliseconds.
+# Number of unknowns up to which a dense matrix takes milliseconds.
 _MOST_DENSE = 1000
-# Refinement goes on while it shrinks the residual at least this much.
+# Refinement continues while it reduces the residual at least by this factor.
 _WORTH_WHILE = 0.5
 
 
 def without_stiffness(packed: PackedSystem) -> PackedSystem:
-    """The same system with zero bending stiffness of beams, as their stiffness, known exactly, dominates all else."""
+    """Return the system with zero bending stiffness: beam stiffness, known exactly, would dominate all other terms."""
     modal = packed.modal.copy()
     modal[OMEGA2] = 0.0
     return packed._replace(modal=modal)
 
 
 def body_masses(system: System, q: Array) -> list[Array]:
-    """Mass matrix (3 + nf, 3 + nf) of every body at q.
+    """Return the mass matrix (3 + nf, 3 + nf) of every body at q.
 
-    The equations of motion are linear in the accelerations, and no body's depend on another's: a unit acceleration of
-    one coordinate of every body gives a column of every matrix.
+    The equations of motion are linear in the accelerations, and those of a body do not depend on other bodies: a unit
+    acceleration of one coordinate of every body gives a column of every matrix.
     """
     bare = without_stiffness(system.packed)
     bare = bare._replace(gravity=np.zeros(2), loads=bare.loads[:0], lines=bare.lines[:0])
@@ -58,12 +58,12 @@ def body_masses(system: System, q: Array) -> list[Array]:
 
 
 def sparse_mass(system: System, q: Array) -> scipy.sparse.csr_matrix:
-    """Mass matrix (n, n) at q, one block per body."""
+    """Return the mass matrix (n, n) at q, one block per body."""
     return scipy.sparse.csr_matrix(scipy.sparse.block_diag(body_masses(system, q), format="csr"))
 
 
 def stiffness_diagonal(system: System) -> Array:
-    """Elastic stiffness (n,) of each coordinate: omega^2 of modal ones, zero of rigid ones."""
+    """Return the elastic stiffness (n,) of each coordinate: omega^2 for modal ones, zero for rigid ones."""
     diagonal = np.zeros(system.n)
     for body in system.bodies:
         diagonal[body.flexible] = body.modes.omega**2
@@ -71,9 +71,9 @@ def stiffness_diagonal(system: System) -> Array:
 
 
 def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -> scipy.sparse.csr_matrix:
-    """Elastic stiffness (n, n) of links: omega^2 of modes, J^T k J of the springs between finite segments.
+    """Return the elastic stiffness (n, n) of links: omega^2 of modes, J^T k J of the springs between finite segments.
 
-    With every spring those at other joints as well.
+    `every_spring` adds the springs at other joints.
     """
     mechanism, stiffness = system.mechanism, scipy.sparse.diags(stiffness_diagonal(system))
     springs = [one for one in mechanism.springs if every_spring or is_hinge(mechanism.joint(one.joint))]
@@ -85,10 +85,10 @@ def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -
 
 
 def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
-    """Phi_q (m, n) at q; zero in the rows of springs and dampers.
+    """Return Phi_q (m, n) at q; zero in the rows of springs and dampers.
 
-    Phi' at rest but for one coordinate is a column. Bodies that no row ties are moved at once, so that the number of
-    columns to compute does not grow with the number of bodies; it holds for whatever kinds of joint there are.
+    A column is Phi' with unit velocity of one coordinate. Bodies that share no row are moved at once, so that the
+    number of evaluations does not grow with the number of bodies. This holds for all kinds of joints.
     """
     row, owner = tied_bodies(system)
     offset = np.array([body.offset for body in system.bodies])
@@ -116,7 +116,7 @@ def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
 
 
 def tied_bodies(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of a constraint row and a body that it touches, as two arrays."""
+    """Return the pairs of a constraint row and a body that it involves, as two arrays."""
     ports = system.packed.ports
     owner = system.packed.markers["body"][ports["marker"]]
     pairs = np.column_stack([np.repeat(ports["row"], ports["rows"]), np.repeat(owner, ports["rows"])])
@@ -127,7 +127,7 @@ def tied_bodies(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def neighbours(system: System, more: Iterable[Sequence[int]] = ()) -> list[set[int]]:
-    """For each body itself, all that share a row with it, and all that share one of more groups of bodies."""
+    """Return for each body the set of itself and of the bodies that share a row, or a group of `more`, with it."""
     rows: dict[int, list[int]] = {}
     for row, body in zip(*(part.tolist() for part in tied_bodies(system)), strict=True):
         rows.setdefault(row, []).append(body)
@@ -139,19 +139,19 @@ def neighbours(system: System, more: Iterable[Sequence[int]] = ()) -> list[set[i
 
 
 def bodies_acted_on(system: System) -> list[set[int]]:
-    """For each body itself and all that rows and springs between points tie to it: where its forces act."""
+    """Return for each body the bodies on which its forces act: itself, and those tied to it by rows or springs."""
     index = system.index
     ends = [(spring.a, spring.b) for spring in system.mechanism.linear_springs]
     return neighbours(system, [[index[ref.body] for ref in pair if not ref.on_ground] for pair in ends])
 
 
 def apart_colours(tied: list[set[int]]) -> NDArray[np.int64]:
-    """A colour for every body, such that two of one colour act on no body in common."""
+    """Return a colour for every body, such that two bodies of one colour act on no common body."""
     return greedy_colours([set().union(*(tied[other] for other in others)) for others in tied])
 
 
 def greedy_colours(neighbours: list[set[int]]) -> NDArray[np.int64]:
-    """A colour for every body, different from those of its neighbours."""
+    """Return a colour for every body, different from those of its neighbours."""
     colours = np.full(len(neighbours), -1)
     for body, others in enumerate(neighbours):
         taken = {int(colours[other]) for other in others if other != body}
@@ -160,16 +160,17 @@ def greedy_colours(neighbours: list[set[int]]) -> NDArray[np.int64]:
 
 
 class Saddle:
-    """The factored system [[W, C^T], [C, -damping]] [x; mu] = [f; r], W symmetric (n, n), C (m, n).
+    """Factorised saddle-point system [[W, C^T], [C, -damping]] [x; mu] = [f; r], W symmetric (n, n), C (m, n).
 
-    Rows and columns are scaled to entries of one size. Dependent rows of C are allowed: the multipliers are then one of
-    many, and where r contradicts itself C x = r holds in the sense of least squares of the scaled rows.
+    Rows and columns are scaled to entries of one size. Rows of C may be dependent: the multipliers are then one
+    solution of many, and for contradicting r, C x = r holds in the least-squares sense of the scaled rows.
 
     Parameters
     ----------
     W, C : sparse matrices
+        Symmetric block and constraint rows.
     damping : (m,) array, optional
-        In the scale of C W^-1 C^T.
+        Damping in the scale of C W^-1 C^T; none by default.
     """
 
     def __init__(self, W: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, damping: Array | None = None) -> None:
@@ -203,18 +204,19 @@ class Saddle:
 
 
 class Factor:
-    """A factored square matrix that need not be symmetric; its rows are scaled to size one.
+    """Factorisation of a square matrix that need not be symmetric, with rows scaled to size one.
 
     Parameters
     ----------
     matrix : (n, n) sparse matrix
+        Matrix to factorise.
     units : (n,) array
-        What one of each unknown is measured in.
+        Unit of each unknown.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        It is singular.
+        The matrix is singular.
     """
 
     def __init__(self, matrix: scipy.sparse.csr_matrix, units: Array) -> None:
@@ -224,7 +226,7 @@ class Factor:
         scaled = scipy.sparse.csc_matrix(scipy.sparse.diags(self._rows) @ scaled)
         scaled.eliminate_zeros()
         self._matrix = scaled
-        # Where no pivots can be found whatever the numbers, SuperLU writes beyond its memory now and then.
+        # If there is no full set of pivots for any values, SuperLU occasionally writes beyond its memory.
         if scipy.sparse.csgraph.structural_rank(scipy.sparse.csr_matrix(abs(scaled))) < units.size:
             raise np.linalg.LinAlgError("structurally singular")
         try:
@@ -240,7 +242,7 @@ class Factor:
 
     @property
     def condition(self) -> float:
-        """Estimate of the condition number of the scaled matrix, in the norm of column sums."""
+        """Estimate of the condition number of the scaled matrix, in the 1-norm."""
         n = self._units.size
         inverse = scipy.sparse.linalg.LinearOperator(
             (n, n), matvec=self._factor.solve, rmatvec=lambda x: self._factor.solve(x, "T"), dtype=np.dtype(float)
@@ -249,13 +251,13 @@ class Factor:
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant; not to be compared with those of matrices whose entries are elsewhere."""
+        """Sign of the determinant; comparable only between matrices of the same sparsity pattern."""
         odd = sum(_is_odd(order) for order in (self._factor.perm_r, self._factor.perm_c))
         return float(np.prod(np.sign(self._factor.U.diagonal()))) * (-1.0) ** odd
 
 
 def solved(matrix: scipy.sparse.csr_matrix, units: Array, right: Array) -> Array:
-    """Solution (n,) of one right-hand side (n,) with a matrix that may be singular: dense where that is fast enough.
+    """Solve for one right-hand side (n,) with a matrix that may be singular, densely if that is fast enough.
 
     Raises
     ------
@@ -273,7 +275,7 @@ def solved(matrix: scipy.sparse.csr_matrix, units: Array, right: Array) -> Array
 
 
 def _is_odd(order: NDArray[np.int64]) -> bool:
-    """Whether a permutation is made of an odd number of exchanges."""
+    """Return whether a permutation consists of an odd number of transpositions."""
     cycles = scipy.sparse.csgraph.connected_components(
         scipy.sparse.csr_matrix((np.ones(order.size), (np.arange(order.size), order)), shape=(order.size,) * 2)
     )[0]

@@ -1,4 +1,4 @@
-"""Starts where branches meet: change points, with the two velocities possible, and dead centres of drives."""
+"""Starts at which branches meet: change points with two possible velocities, and dead centres of drives."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from paraflex.dynamics.system import System
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism.laws import ConstantSpeed, HeldAngle
 
-# Curvatures and rates below this part of the largest are rounding.
+# Curvatures and rates below this fraction of the largest are rounding.
 _ROUNDING = 1e-7
-# Rows with less than this part in a dependence near a singular position have none.
+# Rows with a smaller share of a dependence near a singular configuration than this take no part in it.
 _PART = 1e-2
 _BESIDE = "start prescribed motions beside this pose and within the mechanism's reach"
 _TWO_BRANCHES = "give one of these rates in [start.velocity.angular], or start beside this pose"
@@ -29,9 +29,9 @@ class Special(NamedTuple):
     Attributes
     ----------
     cause, remedy : str
-        A description of the pose, and the remedy; all fields are empty for any other pose.
+        Description of the pose, and the remedy; all fields are empty for any other pose.
     velocities : tuple of (n,) arrays
-        Of the branches; empty where none leads on.
+        Velocities of the branches; empty if no branch continues.
     drives : str
         Prescribed motions at a dead centre, with the values of their joints.
     """
@@ -43,17 +43,23 @@ class Special(NamedTuple):
 
 
 def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, wanted: Array) -> Special:
-    """Whether the branches of a motion meet at a pose.
+    """Find whether the branches of a motion meet at a pose.
 
     Velocities v0 + x n, n the null vector of the rows, have accelerations if w Phi''(v0 + x n) = 0, a quadratic
-    equation in x; w is the combination of the rows of Phi_q that vanishes.
+    equation in x; w is the vanishing combination of the rows of Phi_q.
 
     Parameters
     ----------
+    system : System
+        System of the mechanism.
+    signals : Signals
+        Signals with the prescribed values.
+    t : float
+        Time [s].
     q : (n,) array
         Closed coordinates.
     rows, wanted : (k, n) array or sparse matrix, and (k,) array
-        Phi_q and rows of given velocities, and what rows v is to be.
+        Phi_q and the rows of given velocities, and the wanted values of rows v.
     """
     found = dependence(system, q) if 0 < system.m <= DENSE_ROWS else None
     if found is None or not found.dropped.size:
@@ -102,7 +108,7 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
 
 
 def branches_from_rest(system: System, signals: Signals, t: float, q: Array) -> bool:
-    """Whether prescribed motions, all at rest, are at a change point from which two branches lead on once they move."""
+    """Return whether prescribed motions, all at rest, are at a change point from which two branches lead on."""
     moves = np.zeros(system.m)
     for motion, row in driven_rows(system):
         moves[row] = not isinstance(motion.law, HeldAngle | ConstantSpeed)
@@ -113,7 +119,7 @@ def branches_from_rest(system: System, signals: Signals, t: float, q: Array) -> 
 
 
 def barred_drives(system: System, q: Array, found: Dependence) -> str:
-    """Prescribed motions, with the values of their joints, that take part in dependences of rows; empty for none."""
+    """List prescribed motions that take part in dependences of rows, with values of their joints; empty for none."""
     units, rows = system.row_units, set()
     for k, row in enumerate(found.dropped):
         part = np.abs(found.coefficients[:, k]) * units[found.kept] / units[row]

@@ -1,4 +1,4 @@
-"""States from the start of a motion as the user gives it, by names."""
+"""States from the start of a motion as given by the user, by names."""
 
 from __future__ import annotations
 
@@ -43,15 +43,14 @@ from paraflex.mechanism import (
     standing,
 )
 
-# Largest gap of joints at a given start [sizes of the mechanism, rad], and largest error of velocities, as a fraction
-# of them.
+# Largest gap of joints at a given start [sizes of the mechanism, rad], and largest relative error of velocities.
 _GAP = 1e-6
 _SLIP = 1e-6
-# Velocities given within this part of the largest are those of a branch: messages show six digits.
+# Given velocities within this fraction of the largest are those of a branch: messages show six digits.
 _PRINTED = 1e-5
-# Terms of a row that are a smaller part of the largest of all rows are rounding of the projection.
+# Terms of a row that are a smaller fraction of the largest of all rows are rounding of the projection.
 _SMALL_TERMS = 1e-4
-# Given deflections of one beam may contradict each other by this fraction of them.
+# Given deflections of one beam may contradict one another by this fraction.
 _CONTRADICTION = 1e-9
 
 
@@ -65,23 +64,26 @@ def start_state(
     q: Array | None = None,
     time: float = 0.0,
 ) -> State:
-    """The state of a start; bodies that it does not place come from an assembly, joints closed.
+    """Return the state of a start; bodies without given coordinates come from an assembly, and joints are closed.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     start : Start
+        Start as given by the user.
     assembly : Assembly or str, optional
-        One, or its name. Not needed where the coordinates of every body are given.
+        Assembly or its name. Not needed if the coordinates of every body are given.
     q : (n,) array, optional
-        Coordinates from elsewhere, of a static equilibrium say: then the start gives velocities only.
+        Coordinates from elsewhere, for example of a static equilibrium; the start then gives velocities only.
     time : float
-        [s], for prescribed laws.
+        Time of prescribed laws [s]; zero by default.
 
     Raises
     ------
     InputError
-        See `check_start`; coordinates at which joints are open, or velocities they do not allow, with the residual.
+        The start fails `check_start`, or joints are open at its coordinates or do not allow its velocities; the error
+        gives the residual.
     """
     check_start(system.described, start)
     for field, given in (("coordinates", start.coordinates), ("rates", start.rates), ("deflection", start.deflection)):
@@ -100,7 +102,7 @@ def start_state(
 
 
 def standing_system(mechanism: Mechanism, start: Start | State | str | None, assembly: str | None = None) -> System:
-    """The system of a mechanism; prescribed motions whose start is not given begin at a start or a named assembly."""
+    """Build a mechanism's system; prescribed motions without a start of their own begin at a start or assembly."""
     if isinstance(start, str):
         start, assembly = None, start
     if not isinstance(start, State):
@@ -111,12 +113,12 @@ def standing_system(mechanism: Mechanism, start: Start | State | str | None, ass
 
 
 def pose_at_rest(system: System, start: Start | State | None, assembly: str | None = None) -> State:
-    """The pose of a start, or of an assembly with undeformed links, the first by default.
+    """Return the pose of a start, or of an assembly with undeformed links, the first by default.
 
     Raises
     ------
     InputError
-        See `start_state`.
+        The start is not valid: see `start_state`.
     AssemblyError
         The loops do not close.
     """
@@ -130,15 +132,15 @@ def pose_at_rest(system: System, start: Start | State | None, assembly: str | No
 
 
 def static_shape(system: System, name: str, points: Mapping[str, Deflection]) -> Array:
-    """Modal coordinates (nf,) of a beam of least elastic energy with given deflections of its points.
+    """Return the modal coordinates (nf,) of a beam of least elastic energy with given deflections of its points.
 
-    Deflections count from the tangent at the first end, whatever the reference condition; of a body of given shapes
-    from its frame.
+    Deflections count from the tangent at the first end, for any reference condition; for a body of given shapes from
+    its frame.
 
     Raises
     ------
     InputError
-        Deflections that contradict each other, or that the body's shapes do not allow.
+        Deflections contradict one another, or the body's shapes do not allow them.
     """
     body = system.body(name)
     root = _root_rows(system, name)
@@ -156,7 +158,7 @@ def static_shape(system: System, name: str, points: Mapping[str, Deflection]) ->
         return np.zeros(body.nf)
     C, d = np.array(rows), np.array(values)
     compliant = C.T / body.modes.omega[:, None] ** 2
-    # Rows of one length: displacements and slopes differ in size.
+    # Rows scaled to one length: displacements and slopes differ in size.
     size = 1.0 / np.sqrt(np.maximum(np.sum(C * compliant.T, axis=1), np.finfo(float).tiny))
     force = size * np.linalg.lstsq((C @ compliant) * size * size[:, None], d * size, rcond=1e-12)[0]
     u = compliant @ force
@@ -173,7 +175,7 @@ def static_shape(system: System, name: str, points: Mapping[str, Deflection]) ->
 
 
 def _root_rows(system: System, name: str) -> Array:
-    """Displacement and slope of a beam's first end in its frame (3, nf); zero for bodies of given shapes."""
+    """Return the displacement and slope of a beam's first end in its frame (3, nf); zero for bodies of given shapes."""
     body = system.body(name)
     if body.mesh is None:
         return np.zeros((3, body.nf))
@@ -182,7 +184,7 @@ def _root_rows(system: System, name: str) -> Array:
 
 
 def point_rows(system: System, q: Array, ref: PointRef) -> Array:
-    """Rows (2, n) from the velocities of the coordinates to the velocity of a point of a body at q."""
+    """Return the rows (2, n) from the velocities of the coordinates to the velocity of a point of a body at q."""
     return marker_place(system, system.marker(ref), q[None])[1][0]
 
 
@@ -208,7 +210,7 @@ def _coordinates(system: System, signals: Signals, start: Start, assembly: Assem
         u = static_shape(system, name, points)
         q[body.flexible] = u
         held[body.flexible] = True
-        # The assembly places the tangent at the first end.
+        # The assembly defines the position of the tangent at the first end.
         x, y, slope = _root_rows(system, name) @ u
         q[body.angle] -= slope
         cos, sin = np.cos(q[body.angle]), np.sin(q[body.angle])
@@ -217,7 +219,7 @@ def _coordinates(system: System, signals: Signals, start: Start, assembly: Assem
 
 
 def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArray[np.bool_]) -> Array:
-    """Joints closed by the least change of the coordinates that are not held."""
+    """Close the joints by the least change of the coordinates that are not held."""
     q = q if np.any(held) else follow_drives(system, signals, time, q)
     change = partial(constraint_change, system, stiffness=POSITION_STIFFNESS, free=~held)
     q, phi = assemble(system, signals, time, q, change, free=~held)
@@ -247,12 +249,12 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
         for stiffness in (VELOCITY_STIFFNESS, 0.0):
             change = least_change(link_metric(system, q, stiffness), C, units)
             v = project(change, np.zeros(system.n), lambda v: C @ v - wanted)
-            # Flexures move by bending alone: while links are held stiff their projection is too ill-conditioned.
+            # Flexures move by bending alone: with stiff links their projection is too ill-conditioned.
             missed, largest = (float(np.max(np.abs(each) / units, initial=0.0)) for each in (C @ v - wanted, wanted))
             if missed <= _SLIP * _SMALL_TERMS * largest:
                 break
     slip = np.abs(C @ v - wanted)
-    # What is left beside the terms that a row adds up, lengths in sizes of the mechanism.
+    # Residual relative to the terms of each row, lengths in sizes of the mechanism.
     size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted)) / units
     bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SMALL_TERMS)
     if np.any(bad):
@@ -264,7 +266,7 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     try:
         check_accelerations(system, signals, time, q, v)
     except InconsistentConstraintsError as error:
-        # Without the velocity that contradicts the branches they are known.
+        # The branches are known without the velocity that contradicts them.
         for k, one in enumerate(fields):
             others = np.arange(len(wanted)) != system.m + k
             found = special_start(system, signals, time, q, C[others], wanted[others])
@@ -279,7 +281,7 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
 
 
 class _Given(NamedTuple):
-    """One given velocity: its row (1, n), its value, its scale, and its field."""
+    """A given velocity: its row (1, n), value, scale, and field."""
 
     row: scipy.sparse.csr_matrix
     value: float
@@ -320,11 +322,11 @@ def _refuse_velocities(system: System, given: list[_Given], slip: Array, bad: ND
 
 
 def _all_values(body: BodyCoordinates, values: BodyValues, field: str) -> Array:
-    """A body's coordinates in q as given, or their rates."""
+    """Return a body's coordinates in q as given, or their rates."""
     frame = [values.x, values.y, values.phi]
     if values.flexible is None:
         return np.concatenate([frame, np.zeros(body.nf)])
-    # A beam's D leads on to its nodes; that of given shapes to the coordinates they are given for.
+    # D of a beam maps to its nodes; that of given shapes to the coordinates for which they are given.
     basis = body.integrals.D if body.mesh is None else body.modes.vectors
     own, count = np.array(values.flexible, dtype=float), basis.shape[0]
     if own.size != count:

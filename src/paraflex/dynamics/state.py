@@ -35,11 +35,11 @@ from paraflex.limits import solvable
 from paraflex.mechanism import GROUND, Assembly, PointRef
 from paraflex.mechanism.poses import approximate_poses
 
-# If Newton's iteration fails, a damped one finds the smallest gap: its first and last damping.
+# If Newton's iteration fails, a damped one finds the smallest gap: its iterations, dampings and least gain.
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9
 # Rotation of links at the start of the damped iteration [rad].
 _ASIDE = 1e-2
-# Links that must be deflected by more than this part of their size for loops to close do not fit together.
+# If loops close only with links deflected by more than this fraction of their size, the links do not fit together.
 _LARGEST_DEFLECTION = 0.1
 # Weight of stiffness in `link_metric` for velocities: rates of deflection are to be small against those of links.
 VELOCITY_STIFFNESS = 1e9
@@ -48,7 +48,7 @@ VELOCITY_STIFFNESS = 1e9
 @given_as("a state", "a state, as dynamics.consistent_state makes it")
 @dataclass(frozen=True)
 class State:
-    """Coordinates q and velocities v of a system at a time."""
+    """State of a system: time [s], coordinates q (n,) and velocities v (n,)."""
 
     time: float
     q: Array
@@ -56,32 +56,32 @@ class State:
 
 
 def mass_matrix(system: System, q: Array) -> Array:
-    """Dense mass matrix (n, n) at q; for many bodies see `dynamics.sparse.sparse_mass`."""
+    """Return the dense mass matrix (n, n) at q; for many bodies see `dynamics.sparse.sparse_mass`."""
     return np.asarray(scipy.linalg.block_diag(*body_masses(system, q)))
 
 
 def momentum(system: System, state: State) -> tuple[Array, float]:
-    """Linear momentum (2,) [kg m/s] and angular momentum about the ground frame's origin [kg m^2/s]."""
+    """Return linear momentum (2,) [kg m/s] and angular momentum about the ground frame's origin [kg m^2/s]."""
     p = sparse_mass(system, state.q) @ state.v
     linear, angular = np.zeros(2), 0.0
     for body in system.bodies:
         linear += p[body.position]
-        # A rigid turn about the origin moves r by E r and phi by one.
+        # A rigid rotation about the origin moves r by E r and phi by one.
         x, y = state.q[body.position]
         angular += float(p[body.angle] + x * p[body.offset + 1] - y * p[body.offset])
     return linear, angular
 
 
 def undeformed(system: System, rigid: System, state: State) -> State:
-    """The state of rest of a flexible system with its undeformed bodies at the places of the rigid ones."""
+    """Return the state of rest of a flexible system with its undeformed bodies at the positions of the rigid ones."""
     still = np.zeros_like(state.q)
     return State(state.time, undeformed_motion(system, rigid, state.q, still, still)[0], np.zeros(system.n))
 
 
 def undeformed_motion(system: System, rigid: System, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-    """Coordinates (n,) and their derivatives of undeformed bodies that move as the rigid ones.
+    """Return coordinates (n,) and their derivatives of undeformed bodies that move as the rigid ones.
 
-    Parts of a beam that was cut are at their places along it.
+    Parts of a divided beam are at their positions along it.
     """
     there = np.zeros((3, system.n))
     for body in system.bodies:
@@ -96,14 +96,14 @@ def undeformed_motion(system: System, rigid: System, q: Array, v: Array, a: Arra
 
 
 def nearest_state(system: System, other: System, state: State) -> State:
-    """The state nearest to one of another system of the same bodies with other flexible coordinates.
+    """Return the state nearest to that of another system of the same bodies with other flexible coordinates.
 
-    Deflections are those of least mass-weighted difference, constraints are met.
+    Deflections have the least mass-weighted difference, and constraints are satisfied.
 
     Raises
     ------
     AssemblyError, InconsistentConstraintsError
-        The constraints cannot be met near it.
+        The constraints cannot be satisfied near the state.
     """
     signals, (q, v) = moment_signals(system.mechanism, state.time), np.zeros((2, system.n))
     for here, there in zip(system.bodies, other.bodies, strict=True):
@@ -116,11 +116,11 @@ def nearest_state(system: System, other: System, state: State) -> State:
 
 
 def reference_pose(system: System, assembly: Assembly) -> Array:
-    """Undeformed coordinates at an assembly's angles, positions found along a tree of joints from the ground.
+    """Return undeformed coordinates at an assembly's angles, with positions along a tree of joints from the ground.
 
-    Bodies whose places follow from the assembly's points are there. Loops are not closed yet, but for a mechanism with
-    beams that were cut: its parts are where the rigid links of the mechanism as described are, loops closed, so that
-    the pose does not depend on how many parts there are.
+    Positions that the assembly's points determine are used directly. Loops are not closed yet, except for a mechanism
+    with divided beams: their parts follow the rigid links of the mechanism as described, loops closed, so that the pose
+    does not depend on the number of parts.
     """
     cut = system.mechanism.cut
     if cut is not None and cut.carriers and assembly.name in [one.name for one in system.described.assemblies]:
@@ -137,8 +137,8 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
         if pose.position is not None:
             q[body.position] = pose.position
             placed.add(name)
-    # Joints that hold points together say where the next body is; others only where nothing better does, a distance
-    # last. Among them the first of the mechanism comes first: a gap is left where the last joints close the loops.
+    # Joints that hold points together position the next body. Other joints are used only without these, a distance
+    # last. Equal joints come in the mechanism's order: a gap is left where the last joints close the loops.
     joints: dict[str, list[tuple[int, int]]] = {body.name: [] for body in system.bodies} | {GROUND: []}
     for number, joint in enumerate(system.mechanism.joints):
         entry = (("points" not in joint.holds) + ("distance" in joint.holds), number)
@@ -153,7 +153,7 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
         known, new = (joint.a, joint.b) if joint.a.on_ground or joint.a.body in placed else (joint.b, joint.a)
         if not new.on_ground and new.body not in placed:
             target = point_position(system, q, known)
-            # Points that keep a distance must not start from one place, where the line between them has no direction.
+            # Points at a distance must not start from the same position, where the line between them has no direction.
             q[system.body(new.body).position] += target + [joint.length or 0.0, 0.0] - point_position(system, q, new)
             placed.add(new.body)
             for entry in joints[new.body]:
@@ -162,28 +162,28 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
 
 
 def point_position(system: System, q: Array, ref: PointRef) -> Array:
-    """Ground-frame position (2,) of a named point at q [m]."""
+    """Return the ground-frame position (2,) of a named point at q [m]."""
     return marker_position(system, system.marker(ref), q[None])[0]
 
 
 def assembled_position(system: System, signals: Signals, t: float, q: Array) -> Array:
-    """Coordinates (n,) of an assembly with closed loops, followed from its approximate pose to where drives start.
+    """Return the coordinates (n,) of a closed assembly, followed from its approximate pose to the start of drives.
 
     Raises
     ------
     AssemblyError
-        See `follow_drives` and `project_position`.
+        The loops do not close, or drives cannot be reached: see `follow_drives` and `project_position`.
     """
     return project_position(system, signals, t, follow_drives(system, signals, t, q))
 
 
 def project_position(system: System, signals: Signals, t: float, q: Array) -> Array:
-    """The nearest coordinates, in the metric of mass and stiffness, that satisfy the constraints.
+    """Return the nearest coordinates, in the metric of mass and stiffness, that satisfy the constraints.
 
     Raises
     ------
     AssemblyError
-        The loops cannot be closed from there; its partial result is where they come closest to it.
+        The loops cannot be closed from there; the partial result of the error is the pose with the smallest gaps.
     """
     change = partial(constraint_change, system, stiffness=POSITION_STIFFNESS)
     closest, phi = assemble(system, signals, t, q, change)
@@ -198,7 +198,7 @@ def project_position(system: System, signals: Signals, t: float, q: Array) -> Ar
 
 
 def _keeps_shape(system: System, start: Array, q: Array) -> bool:
-    """Whether closure leaves the shape of links nearly unchanged: in linear theory stretching closes any loop."""
+    """Return whether closure hardly changes the shape of links: in linear theory stretching closes any loop."""
     for body in system.bodies:
         markers = [system.marker(PointRef(body.name, point)) for point in system.mechanism.points[body.name]]
         if body.nf == 0 or not markers:
@@ -214,11 +214,12 @@ def _keeps_shape(system: System, start: Array, q: Array) -> bool:
 
 
 def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
-    """Coordinates at which loops that do not close have the smallest gaps, a local minimum found from q.
+    """Return coordinates at which loops that do not close have the smallest gaps, a local minimum found from q.
 
-    All joints share the gap there; put together along the tree of joints, undeformed, those that close loops have it.
+    All joints share the gap at the minimum. Undeformed bodies assembled along the tree of joints leave it in the joints
+    that close loops.
     """
-    # Links in line may be at a maximum of the gap, where its gradient is zero.
+    # Collinear links may be at a maximum of the gap, where its gradient is zero.
     aside = q.copy()
     aside[[body.angle for body in system.bodies]] += _ASIDE * np.random.default_rng(0).standard_normal(
         len(system.bodies)
@@ -228,9 +229,10 @@ def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
 
 
 def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Array:
-    """Coordinates near q at which the gaps of all joints are smallest, by the Levenberg-Marquardt method.
+    """Return coordinates near q with the smallest gaps of all joints, by the Levenberg-Marquardt method.
 
-    Slower than `project_position` and not as exact, but at home near singular positions and where loops cannot close.
+    The method is slower and less accurate than `project_position`, but suits singular configurations and loops that
+    cannot be closed.
     """
     phi, _ = system.constraints(signals, t, q)
     damping = _FIRST_DAMPING
@@ -249,9 +251,9 @@ def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Arra
 
 
 def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Array, stiffness: float = 0.0) -> Array:
-    """The nearest velocities, in the metric of mass, at which Phi' is zero.
+    """Return the nearest velocities, in the mass metric, at which Phi' is zero.
 
-    That is what a blow does. A weight of stiffness, see `link_metric`, keeps links from beginning to bend.
+    They are those after a plastic impact. With a weight of stiffness, see `link_metric`, links hardly start to bend.
 
     Raises
     ------
@@ -277,28 +279,29 @@ def consistent_state(
     velocity: Array | None = None,
     time: float = 0.0,
 ) -> State:
-    """A start: an assembly closed, with the initial deflection and velocity if given.
+    """Return a consistent start: a closed assembly, with the initial deflection and velocity if given.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     assembly : Assembly or str
-        One, or its name; the first of the mechanism where None.
+        Assembly or its name; the first of the mechanism if None.
     deflection : mapping of str to (n_nodal,) array, optional
-        Nodal coordinates of a body (4 a node, then separate curvatures if any); what its mesh's reference condition
-        allows of them is kept.
+        Nodal coordinates of bodies by name (4 per node, then separate curvatures if any); their part that the mesh's
+        reference condition allows is kept. Undeformed by default.
     velocity : (n,) array, optional
-        Projected on the constraints as by a blow. By default at rest, or where angles are prescribed moving with them,
-        links unbent.
+        Velocities, projected onto the constraints as by an impact. By default at rest, or moving with prescribed
+        angles, without bending of links.
     time : float
-        [s], for prescribed joint angles.
+        Time of prescribed joint angles [s]; zero by default.
 
     Raises
     ------
     AssemblyError
         The loops cannot be closed.
     InconsistentConstraintsError
-        Nor can velocities or accelerations be found that all constraints allow.
+        No velocities or accelerations satisfy all constraints.
     """
     chosen = assembly if isinstance(assembly, Assembly) else system.mechanism.assembly(assembly)
     q = reference_pose(system, chosen)
@@ -328,7 +331,8 @@ def check_accelerations(system: System, signals: Signals, t: float, q: Array, v:
     Raises
     ------
     InconsistentConstraintsError
-        There are none: two prescribed laws, or a singular position in motion. Or two, from rest at a change point.
+        There are none: two prescribed laws contradict one another, or a singular configuration is in motion. Or there
+        are two, from rest at a change point.
     """
     if not np.any(v) and branches_from_rest(system, signals, t, q):
         cause = "prescribed motions begin at rest at a change point, from which two branches lead on,"

@@ -19,10 +19,10 @@ from paraflex.kernel.stage import equations
 
 
 class RestingForces:
-    """Forces at rest (n,), with the sign of the left-hand side of the equations, and rows of springs (m,).
+    """Forces at rest (n,), signed as on the left-hand side of the equations, and rows of springs (m,).
 
-    All forces but the stiffness of beams, which is a diagonal matrix and would drown them. With velocities `v` and
-    accelerations `a` (n,) in place of zeros they are those of a motion.
+    The stiffness of beams is not included: it is a diagonal matrix and would dominate all other forces. With velocities
+    `v` and accelerations `a` (n,) other than zero the forces are those of a motion.
     """
 
     def __init__(self, system: System, time: float) -> None:
@@ -36,14 +36,15 @@ class RestingForces:
         self.springs: NDArray[np.intp] = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
 
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
-        """Forces and rows at coordinates (n,) with multipliers (m,)."""
+        """Return forces and rows at coordinates (n,) with multipliers (m,)."""
         self._evaluate(q, lam)
         return self.workspace.f.copy(), self.workspace.rows[self.springs]
 
     def compliant(self, q: Array) -> Array:
-        """Multipliers (m,) of springs, dampers and friction at coordinates (n,); zero in rows of constraints."""
+        """Return multipliers (m,) of springs, dampers and friction at coordinates (n,); zero in rows of constraints."""
         rows = self.packed.rows
-        # Rows of springs and dampers are compliance times what is missing; those of friction with the scale set here.
+        # Rows of springs and dampers are compliance times the missing multiplier; those of friction use the scale set
+        # here.
         scale = np.where(rows["kind"] == FRICTION, 1.0, rows["compliance"])
         self.workspace.compliance[:] = scale
         self._evaluate(q, np.zeros(rows.size))
@@ -57,17 +58,19 @@ class RestingForces:
 
 
 def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.sparse.csr_matrix:
-    """Derivative (n, n) of the forces at rest by the coordinates, without that of the beams, which is diagonal.
+    """Return the derivative (n, n) of the forces at rest by the coordinates, without the diagonal one of beams.
 
-    Multipliers of constraints are kept, the torques of springs at joints follow the pose. The part of loads that turn
-    with a body that is not symmetric is left out.
+    Multipliers of constraints are constant; the torques of springs at joints follow the pose. The unsymmetric part, of
+    loads that rotate with a body, is left out.
 
     Parameters
     ----------
     system : System
+        System of the mechanism.
     time : float
-        For prescribed angles [s].
+        Time of prescribed angles [s].
     q : (n,) array
+        Coordinates of the pose.
     lam : (m,) array
         Multipliers of constraints and torques of springs at joints at that pose.
     """

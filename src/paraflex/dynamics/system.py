@@ -1,4 +1,4 @@
-"""Mechanism -> System: everything that does not depend on the coordinates, computed once."""
+"""System of a mechanism: everything that does not depend on the coordinates, computed once."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from paraflex.mechanism import Mechanism, PointRef, in_frames, rotor_mass, with_
 
 # Damping ratio below which a vibration counts as undamped: it loses 1.2 % of its amplitude in a period.
 _HARDLY_DAMPED = 2e-3
-# Angular frequency of vibrations where none is known [rad/s].
+# Angular frequency of vibrations if none is known [rad/s].
 _USUAL = 1e3
 
 T = TypeVar("T")
@@ -33,16 +33,18 @@ T = TypeVar("T")
 @given_as("a system", "the system that dynamics.build_system makes")
 @dataclass(frozen=True)
 class System:
-    """A mechanism as constant arrays. Made by `build_system`.
+    """A mechanism as constant arrays, made by `build_system`.
 
     Attributes
     ----------
     mechanism : Mechanism
+        Mechanism in the frames of its parts, with actuators included.
     bodies : tuple of BodyCoordinates
+        Coordinates of each body.
     packed : PackedSystem
-        What the kernels read.
+        Arrays and records read by the kernels.
     rows : tuple of str
-        The name of each constraint row ("B1 x", "crank angle"), in the order of the multipliers.
+        Name of each constraint row ("B1 x", "crank angle"), in the order of the multipliers.
     """
 
     mechanism: Mechanism
@@ -57,12 +59,12 @@ class System:
 
     @property
     def m(self) -> int:
-        """Number of multipliers: constraint rows, springs and dampers."""
+        """Number of multipliers: constraint rows, springs, dampers and friction."""
         return len(self.rows)
 
     @property
     def n_constraints(self) -> int:
-        """Number of rows that are constraints: those of springs and dampers are not."""
+        """Number of constraint rows, without those of springs, dampers and friction."""
         return int(np.sum(self.packed.rows["kind"] == CONSTRAINT))
 
     @property
@@ -72,17 +74,17 @@ class System:
 
     @property
     def total_mass(self) -> float:
-        """Mass of all bodies [kg]."""
+        """Mass of all bodies [kg], without the reflected inertia of rotors."""
         return float(self.packed.total_mass - rotor_mass(self.described))
 
     @property
     def size(self) -> float:
-        """The reference length of tolerances: see `dynamics.scale` [m]."""
+        """Reference length of tolerances [m]: see `dynamics.scale`."""
         return float(self.packed.size)
 
     @cached_property
     def units(self) -> Array:
-        """Unit of each coordinate (n,): the size of the mechanism for places, 1 for all others."""
+        """Unit of each coordinate (n,): the size of the mechanism for positions, 1 for all others."""
         units = np.ones(self.n)
         for body in self.bodies:
             units[body.position] = self.size
@@ -95,7 +97,7 @@ class System:
 
     @cached_property
     def slope_rows(self) -> scipy.sparse.csr_matrix:
-        """From coordinates to slopes along all bodies (slopes, n)."""
+        """Matrix from coordinates to slopes along all bodies (slopes, n)."""
         rows = scipy.sparse.lil_matrix((sum(len(body.shape.slopes) for body in self.bodies), self.n))
         first = 0
         for body in self.bodies:
@@ -106,7 +108,7 @@ class System:
 
     @cached_property
     def least_row_unit(self) -> float:
-        """The least of `row_units`."""
+        """Least of `row_units`."""
         return float(np.min(self.row_units, initial=1.0))
 
     @cached_property
@@ -116,7 +118,7 @@ class System:
 
     @property
     def slowest(self) -> float:
-        """Angular frequency of the slowest vibration of a flexible body [rad/s]; without one a usual one."""
+        """Angular frequency of the slowest vibration of a flexible body [rad/s]; 1000 if there is none."""
         return min(self.lowest, default=_USUAL)
 
     @cached_property
@@ -127,7 +129,7 @@ class System:
         return all(body.damping[k, k] > 2.0 * _HARDLY_DAMPED * body.modes.omega[k] for body, k in fastest)
 
     def gap(self, phi: Array) -> float:
-        """The largest violation among constraint rows (m,), lengths in sizes of the mechanism, angles in rad."""
+        """Return the largest violation among constraint rows (m,), lengths in sizes of the mechanism, angles in rad."""
         return float(np.max(np.abs(phi) / self.row_units, initial=0.0))
 
     @cached_property
@@ -136,7 +138,7 @@ class System:
         return {body.name: i for i, body in enumerate(self.bodies)}
 
     def once(self, name: str, make: Callable[[], T]) -> T:
-        """What follows from it alone, made where it is asked for first."""
+        """Return a quantity that depends on the system alone, computed by `make` once and cached by name."""
         kept: dict[str, Any] = vars(self).setdefault("_kept", {})
         if name not in kept:
             kept[name] = make()
@@ -144,30 +146,30 @@ class System:
 
     @cached_property
     def row_terms(self) -> dict[str, list[RowTerm]]:
-        """Terms of constraint rows by the joints that they are of."""
+        """Terms of constraint rows, by joint."""
         return terms_by_joint(row_order(self.mechanism, self.index))
 
     def body(self, name: str) -> BodyCoordinates:
-        """Coordinates of a body by name; of one that was cut those of its first part."""
+        """Return the coordinates of a body by name; of a divided body those of its first part."""
         return self.bodies[self.index[name] if name in self.index else self.index[self.parts(name)[0]]]
 
     def marker(self, ref: PointRef) -> Marker:
-        """The material point of a name, of a body as described or of a part of it."""
+        """Return the material point of a name, on a body as described or on a part of it."""
         cut = self.mechanism.cut
         return make_marker(self.mechanism, self.bodies, self.index, ref if cut is None else cut.points.get(ref, ref))
 
     @property
     def described(self) -> Mechanism:
-        """The mechanism as the user described it."""
+        """Mechanism as described by the user."""
         return self.mechanism.described
 
     def parts(self, name: str) -> tuple[str, ...]:
-        """Parts of a body of the mechanism as described, first end first; itself where it was not cut."""
+        """Return the parts of a body as described, from its first end; the body itself if it is not divided."""
         cut = self.mechanism.cut
         return (name,) if cut is None else cut.parts.get(name, (name,))
 
     def carrier(self, part: str) -> tuple[str, float]:
-        """The body as described that a body is a part of, and how far along that it starts [m]."""
+        """Return the described body that a part belongs to, and the distance along it at which the part starts [m]."""
         cut = self.mechanism.cut
         return (part, 0.0) if cut is None else cut.carriers.get(part, (part, 0.0))
 
@@ -180,18 +182,18 @@ class System:
         return tuple(label for one in row_order(self.described, index) for label in one.labels)
 
     def workspace(self) -> Workspace:
-        """A fresh workspace for the kernels."""
+        """Return a new workspace for the kernels."""
         return make_workspace(self.packed)
 
     def constraints(self, signals: Signals, t: float, q: Array, v: Array | None = None) -> tuple[Array, Array]:
-        """Phi and Phi' at (t, q, v), each (m,), at rest without v; zero in the rows of springs."""
+        """Return Phi and Phi' at (t, q, v), each (m,), at rest without v; zero in the rows of springs."""
         phi, rate = np.zeros(self.m), np.zeros(self.m)
         v = np.zeros(self.n) if v is None else v
         constraint_values(self.packed, signals, t, q, v, make_scratch(self.packed), phi, rate)
         return phi, rate
 
     def jacobian(self, q: Array) -> Array:
-        """Phi_q at q, dense (m, n); zero in the rows of springs."""
+        """Return Phi_q at q, dense (m, n); zero in the rows of springs."""
         jacobian = np.zeros((self.m, self.n))
         fill_jacobian(self.packed, q, jacobian)
         return jacobian
@@ -199,25 +201,27 @@ class System:
 
 @checked_arguments()
 def build_system(mechanism: Mechanism, like: System | None = None) -> System:
-    """Turn a mechanism into a system; flexible coordinates are diagonalised per body.
+    """Build the system of a mechanism, with flexible coordinates diagonalised per body.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism as described.
     like : System, optional
-        Of a mechanism that differs a little in its numbers: modes follow those there in order and sign, so that
-        coordinates of the two mean the same.
+        System of a mechanism with slightly different numbers: modes follow its modes in order and sign, so that
+        coordinates of the two systems correspond.
 
     Returns
     -------
     System
+        System of constant arrays.
 
     Raises
     ------
     InputError
-        A body whose mass matrix is not positive definite; what `reduced_body` refuses.
+        The mass matrix of a body is not positive definite, or `reduced_body` fails.
     ProportionError
-        One whose damping cannot be found, for numbers too far apart.
+        The damping of a body cannot be computed, for numbers too far apart.
     """
     mechanism = with_actuators(in_frames(mechanism))
     index = {body.name: i for i, body in enumerate(mechanism.bodies)}
@@ -243,6 +247,6 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
 
 
 def with_constraints_of(system: System, mechanism: Mechanism) -> System:
-    """The bodies of a system, with their damping, under the constraints of another mechanism of the same bodies."""
+    """Return the bodies of a system, with their damping, under the constraints of another mechanism of these bodies."""
     packed, rows = pack_system(mechanism, system.bodies, system.index, row_order(mechanism, system.index))
     return System(mechanism=mechanism, bodies=system.bodies, packed=packed, rows=rows)

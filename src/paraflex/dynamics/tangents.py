@@ -4,9 +4,9 @@ About (q, v, a, lambda) with given torques the equations change by
 
     M da + D dv + K dq + Phi_q^T dlambda = S dtau,    Phi_q da + Phi''_v dv + Phi''_q dq = 0
 
-K has all that depends on the pose: stiffness of links, springs, weight, loads, inertia forces (their accelerations
-kept), constraint forces (multipliers kept) and motors along axes. Springs, dampers and friction at joints, whose
-torques are multipliers in the equations, are part of K and D; no term of Baumgarte's is in them.
+K includes everything that depends on the pose: stiffness of links, springs, weight, loads, inertia forces (at constant
+accelerations), constraint forces (at constant multipliers) and motors along axes. Springs, dampers and friction at
+joints, whose torques are multipliers in the equations, are part of K and D. Baumgarte's terms are not included.
 """
 
 from __future__ import annotations
@@ -29,21 +29,23 @@ from paraflex.kernel.tangent import make_tangent, note_slopes
 from paraflex.kernel.tangent_columns import ACCELERATION, COORDINATE, VELOCITY, tangent_columns
 
 Numbers = NDArray[np.int64]
-# Weights of Phi'', Phi' and Phi of rows that are Phi'.
+# Weights of Phi'', Phi' and Phi for rows equal to Phi'.
 _RATES = (0.0, 1.0, 0.0)
 
 
 class MotionPoint(NamedTuple):
-    """A point of a motion: what the equations are linearised about.
+    """A point of a motion about which the equations are linearised.
 
     Attributes
     ----------
     time : float
-        [s]
+        Time [s].
     q, v, a : (n,) arrays
+        Coordinates, velocities and accelerations.
     multipliers : (m,) array
+        Multipliers.
     torques : (acting,) array
-        Of motors, then loads in time: see `dynamics.inputs`.
+        Torques of motors, then loads in time: see `dynamics.inputs`.
     """
 
     time: float
@@ -55,7 +57,7 @@ class MotionPoint(NamedTuple):
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing moves."""
+        """Whether all velocities and accelerations are zero."""
         return not (np.any(self.v) or np.any(self.a))
 
 
@@ -67,15 +69,15 @@ class Tangents(NamedTuple):
     mass, damping, stiffness : (n, n) sparse arrays
         M, D and K, springs, dampers and friction at joints included.
     rows : (c,) array of int
-        Which rows of the system are constraints.
+        Numbers of the system's rows that are constraints.
     jacobian : (c, n) sparse array
-        Phi_q of these.
+        Phi_q of these rows.
     rate : (c, n) sparse array
-        Derivative of Phi' by the coordinates; by the velocities it is Phi_q.
+        Derivative of Phi' by the coordinates; its derivative by the velocities is Phi_q.
     second_place, second_rate : (c, n) sparse arrays
         Derivatives of Phi'' by the coordinates and by the velocities.
     compliant : (m - c,) array of int
-        The rows of springs, dampers and friction at joints.
+        Numbers of the rows of springs, dampers and friction at joints.
     compliant_place, compliant_rate : (m - c, n) sparse arrays
         Derivatives of their multipliers by the coordinates and the velocities.
     """
@@ -94,7 +96,7 @@ class Tangents(NamedTuple):
 
 
 class _Pattern(NamedTuple):
-    """Where entries of a sparse matrix (rows, columns) are, and which computed value is each."""
+    """Sparsity pattern of a matrix (rows, columns), and the index of the computed value of each entry."""
 
     shape: tuple[int, int]
     pointers: Numbers
@@ -102,12 +104,12 @@ class _Pattern(NamedTuple):
     sources: Numbers
 
     def matrix(self, values: Array) -> csr_matrix:
-        """The matrix of computed columns (sources, rows)."""
+        """Return the matrix of computed columns (sources, rows)."""
         return csr_matrix((values.ravel()[self.sources], self.columns, self.pointers), shape=self.shape)
 
 
 def rows_of(rows: Numbers, *matrices: csr_matrix) -> tuple[csr_matrix, ...]:
-    """Some rows of matrices whose entries are in the same places."""
+    """Return selected rows of matrices with the same sparsity pattern."""
     pointers, columns, shape = matrices[0].indptr, matrices[0].indices, matrices[0].shape
     assert shape is not None
     counts = np.diff(pointers)[rows]
@@ -121,7 +123,7 @@ def rows_of(rows: Numbers, *matrices: csr_matrix) -> tuple[csr_matrix, ...]:
 
 @dataclass(frozen=True)
 class Tangency:
-    """The pattern of a system's tangent matrices, and the matrices at points of its motions.
+    """Sparsity pattern of a system's tangent matrices, and the matrices at points of its motions.
 
     Bodies that share neither row nor spring with a common body are moved at once, so that the cost grows with the
     number of bodies, not with its square.
@@ -162,7 +164,7 @@ class Tangency:
         return self._pattern([np.array(rows, dtype=int) for rows in touched], self.system.m)
 
     def _pattern(self, met: list[Numbers], rows: int) -> _Pattern:
-        """Pattern of a matrix with so many rows, of which the coordinates of each body meet some."""
+        """Return the pattern of a matrix with `rows` rows, given those that the coordinates of each body affect."""
         parts = []
         for body, source, own in zip(self.system.bodies, self._sources[1], met, strict=True):
             columns = np.arange(body.all.start, body.all.stop)
@@ -173,13 +175,13 @@ class Tangency:
         return _Pattern((rows, self.system.n), pointers, column[order], (source * rows + row)[order])
 
     def inertia(self, time: float, q: Array) -> tuple[csr_matrix, csr_matrix]:
-        """Mass matrix (n, n), and Phi_q (m, n), with zeros in rows that are no constraints."""
+        """Return the mass matrix (n, n), and Phi_q (m, n), with zeros in rows that are not constraints."""
         still, acting = np.zeros(self.system.n), np.zeros(inputs_of(self.system.mechanism).acting)
         point = MotionPoint(time, q, still, still, np.zeros(self.system.m), acting)
         return self._columns(point, INDEX_1, ACCELERATION)
 
     def at(self, point: MotionPoint) -> Tangents:
-        """The tangent matrices at a point of a motion."""
+        """Return the tangent matrices at a point of a motion."""
         mass, jacobian = self._columns(point, INDEX_1, ACCELERATION)
         damping, second_rate = self._columns(point, INDEX_1, VELOCITY)
         stiffness, second_place = self._columns(point, INDEX_1, COORDINATE)
@@ -189,7 +191,7 @@ class Tangency:
         held = rows_of(rows, jacobian, rate, second_place, second_rate)
         place, speed = rows_of(compliant, second_place, second_rate)
         if compliant.size:
-            # The directions in which their torques act: as angles and travels change.
+            # Directions in which their torques act: the derivatives of angles and travels.
             springs = scipy.sparse.diags((kinds[compliant] == SPRING).astype(float))
             turns = csr_matrix(springs @ place + (scipy.sparse.identity(compliant.size) - springs) @ speed).T
             strength = scipy.sparse.diags(self._strengths(point)[compliant])
@@ -202,7 +204,7 @@ class Tangency:
     def _columns(
         self, point: MotionPoint, weights: tuple[float, float, float], part: int
     ) -> tuple[csr_matrix, csr_matrix]:
-        """Derivatives of forces (n, n) and rows (m, n) by a part of the motion; friction as rates."""
+        """Return derivatives of forces (n, n) and rows (m, n) by a part of the motion, with friction as rates."""
         system, direction = self.system, make_tangent(self.system.packed)
         direction.friction[:] = 1.0
         columns = self._sources[0]
@@ -215,7 +217,7 @@ class Tangency:
         return self._force_pattern.matrix(forces), self._row_pattern.matrix(rows)
 
     def _strengths(self, point: MotionPoint) -> Array:
-        """Change of each multiplier (m,) of a spring, damper or friction with its angle or rate."""
+        """Return the derivative of each multiplier (m,) of a spring, damper or friction by its angle or rate."""
         rows, direction = self.system.packed.rows, make_tangent(self.system.packed)
         ones, scratch = np.ones(self.system.m), np.zeros(self.system.m)
         note_slopes(self.system.packed, point.q, point.v, scratch, ones, direction)

@@ -1,6 +1,7 @@
-"""Static equilibria under loads and travel: their branches past limit points, stability, buckling, stiffness.
+"""Static equilibria under loads and prescribed displacements: branches with limit points, stability, buckling.
 
-Names are imported when they are first used: model files are read without what finds equilibria.
+The stiffness in named directions is computed as well. Names are imported at first use, so that model files are read
+without the code that finds equilibria.
 """
 
 import lazy_loader

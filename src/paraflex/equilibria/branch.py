@@ -1,8 +1,8 @@
-"""A branch of equilibria, followed by its arc length, so that it goes on past limit points.
+"""Branch of equilibria, followed by its arc length and hence past limit points.
 
-Each point is found by Newton's iteration from a step along the tangent, across which the iteration does not move
-(pseudo-arclength continuation; Keller, Applications of Bifurcation Theory, 1977). Where the fraction s of what is given
-passes a wanted value, and where it turns back, the point there is found exactly.
+Each point is found by Newton's iteration from a step along the tangent, constrained to the hyperplane normal to it
+(pseudo-arclength continuation; Keller, Applications of Bifurcation Theory, 1977). Points at which the load fraction s
+has a wanted value, and limit points at which it turns back, are solved for exactly.
 """
 
 from __future__ import annotations
@@ -23,23 +23,24 @@ from paraflex.errors import EquilibriumError, LimitPointError
 
 _MOST_ITERATIONS = 25
 # Newton's iteration of a step has converged when it moves less than the first [sizes of the mechanism, rad], or less
-# than the second and no nearer by it: what rounding of stiff coordinates allows.
+# than the second without further progress: the limit set by rounding of stiff coordinates.
 _CONVERGED, _ROUNDED = 1e-10, 1e-7
-# An iteration that moves links by more than this is shortened, at the start [sizes of the mechanism, rad].
+# An iteration at the start that moves links by more than this is shortened [sizes of the mechanism, rad].
 _LONGEST_MOVE = 0.3
-# Steps grow with displacements up to these [sizes of the mechanism, rad].
+# The weight of displacements follows the largest of them up to this [sizes of the mechanism, rad].
 _WHOLE = 1.0
-# What moves by less under the whole of what is given does so by rounding, as a column that bends only when it buckles.
+# A smaller displacement under the whole load is rounding, as for a column that bends only when it buckles.
 _NO_MOVE = 1e-12
-# What a step may leave of constraints [sizes of the mechanism, rad].
+# Largest residual of constraints after a step [sizes of the mechanism, rad].
 _GAP = 1e-9
-# Steps grow after so few iterations and shrink by these parts; none is longer than this many of the wanted steps.
+# Steps grow after this many iterations or fewer, by the second factor; they shrink by the third. The longest is the
+# last, times the wanted step.
 _FEW, _GROWTH, _SHRINK, _LONGEST = 4, 1.5, 0.5, 2.0
-# The cosine of the angle between the tangents of two points next to each other is not less.
+# Least cosine of the angle between the tangents of two consecutive points.
 _STRAIGHT = 0.85
-# The shortest step, as a part of the first, and the most that a branch is followed for.
+# The shortest step, as a fraction of the longest, and the largest number of steps of a branch.
 _SHORTEST, _MOST_STEPS = 1e-6, 2000
-# A branch has come back where links are so near to the start [sizes of the mechanism, rad].
+# A branch has returned if links are this close to the start [sizes of the mechanism, rad].
 _BACK = 1e-6
 _LIMIT_ITERATIONS, _AT_LIMIT = 40, 1e-9
 _LOOSE = "hold what turns or slides freely, start nearer to the equilibrium, or make links and springs stiffer"
@@ -51,10 +52,11 @@ class Point(NamedTuple):
     Attributes
     ----------
     at : Unknowns
+        Coordinates, multipliers and load fraction.
     tangent : Unknowns
-        Of length one, in the direction in which the branch is followed.
+        Tangent of length one, in the direction in which the branch is followed.
     limit : bool
-        Whether the fraction turns back here.
+        Whether the point is a limit point, where the fraction turns back.
     """
 
     at: Unknowns
@@ -63,7 +65,7 @@ class Point(NamedTuple):
 
 
 class _Failed(Exception):
-    """Newton's iteration did not converge, or its matrix is singular."""
+    """Failure of Newton's iteration: it did not converge, or its matrix is singular."""
 
 
 @dataclass(frozen=True)
@@ -73,20 +75,21 @@ class Branch:
     Attributes
     ----------
     equations : Equations
+        Equations of equilibrium.
     weight : float
-        Of the square of displacements [sizes of the mechanism, rad] beside that of the fraction, in lengths.
+        Weight of squared displacements [sizes of the mechanism, rad] relative to the squared fraction in arc lengths.
     """
 
     equations: Equations
     weight: float = 1.0
 
     def first(self) -> Point:
-        """The equilibrium with nothing of what is given, nearest the start.
+        """Find the equilibrium at load fraction zero nearest the start.
 
         Raises
         ------
         EquilibriumError
-            None is found.
+            No equilibrium is found, or held coordinates contradict the joints.
         """
         begin = self.equations.guess()
         try:
@@ -98,22 +101,23 @@ class Branch:
             raise EquilibriumError("no static equilibrium is found near the start", remedy=_LOOSE) from None
 
     def follow(self, first: Point, steps: int, goal: float = 1.0) -> Iterator[Point]:
-        """Points at multiples of a fraction of one, and limit points, in the order of the branch, until a goal.
+        """Yield points at multiples of a load fraction, and limit points, in the order of the branch, up to a goal.
 
         Parameters
         ----------
         first : Point
+            Point at which the branch starts.
         steps : int
-            How many multiples there are up to one. Where the branch turns back multiples below zero are met too.
+            Number of multiples up to one. If the branch turns back, multiples below zero are included.
         goal : float
-            Fraction at which the branch ends.
+            Fraction at which the branch ends; one by default.
 
         Raises
         ------
         LimitPointError
-            The branch turns back and does not come to the goal.
+            The branch turns back and does not reach the goal.
         EquilibriumError
-            It ends.
+            The branch ends.
         """
         move = self._size(first.tangent._replace(s=0.0)) / max(abs(first.tangent.s), 1e-300)
         move = move if move > _NO_MOVE else 0.0
@@ -136,7 +140,7 @@ class Branch:
                     yield b
             if turned and branch._back(first, here, there):
                 break
-            # Displacements count by the largest so far: near the limit of a load steps grow with how links bend.
+            # Displacements are weighted by the largest so far: near a limit load steps grow with the bending of links.
             moved = min(_WHOLE, self._size(there.at.plus(first.at, -1.0)._replace(s=0.0)))
             if moved > move > 0.0:
                 move, branch = moved, replace(self, weight=self.weight / moved**2)
@@ -158,7 +162,7 @@ class Branch:
         )  # fmt: skip
 
     def _stopped(self, at: Unknowns) -> EquilibriumError:
-        """Why no equilibrium is found beyond a point: a travel that follows from others, or what is not known."""
+        """Return the error of a branch that ends at a point: a displacement implied by others, or an unknown cause."""
         stuck = self.equations.dependent_travels(at)
         if stuck:
             names = ", ".join(one.name for one in stuck)
@@ -173,7 +177,7 @@ class Branch:
         )
 
     def _next(self, here: Point, step: float, longest: float) -> tuple[Point, float]:
-        """The point a step along, and the length of the next step."""
+        """Return the point a step along, and the length of the next step."""
         shortest = _SHORTEST * longest
         while step > shortest:
             try:
@@ -190,7 +194,7 @@ class Branch:
         raise self._stopped(here.at)
 
     def _between(self, a: Point, b: Point, steps: int, goal: float) -> Iterator[Point]:
-        """Points at multiples between two points, the second included, in the order of the branch."""
+        """Yield points at multiples between two points, the second included, in the order of the branch."""
         if b.at.s > a.at.s:
             inside = range(int(np.floor(a.at.s * steps)) + 1, int(np.floor(min(b.at.s, goal) * steps)) + 1)
         else:
@@ -199,11 +203,11 @@ class Branch:
             try:
                 yield self._at_fraction(a, b, k / steps)
             except _Failed:
-                # So near to a limit point that no Newton iteration with a given fraction converges.
+                # This close to a limit point no Newton iteration at a given fraction converges.
                 continue
 
     def _at_fraction(self, a: Point, b: Point, s: float) -> Point:
-        """The point between two points at a fraction: interpolated, then solved."""
+        """Return the point between two points at a fraction, interpolated and then solved."""
         length = self._size(b.at.plus(a.at, -1.0))
         values = [self._cubic(a, b, length, part).s - s for part in (0.0, 1.0)]
         if values[0] * values[1] > 0.0:
@@ -216,7 +220,7 @@ class Branch:
 
     @staticmethod
     def _cubic(a: Point, b: Point, length: float, part: float) -> Unknowns:
-        """Hermite's interpolation between two points with their tangents."""
+        """Return Hermite's interpolation between two points with their tangents."""
         x = part
         weights = ((1.0 + 2.0 * x) * (1.0 - x) ** 2, x**2 * (3.0 - 2.0 * x))
         slopes = (length * x * (1.0 - x) ** 2, length * x**2 * (x - 1.0))
@@ -226,7 +230,7 @@ class Branch:
         return Unknowns(whole[:n], whole[n:-1], float(whole[-1]))
 
     def _limit(self, a: Point, b: Point) -> Point:
-        """The point between two points at which the fraction turns back, by false position (Illinois)."""
+        """Find the limit point between two points by false position (Illinois)."""
         low, high = 0.0, self._product(b.at.plus(a.at, -1.0), a.tangent)
         value_low, value_high = a.tangent.s, b.tangent.s
         found, side = b, 0
@@ -251,7 +255,7 @@ class Branch:
         return found._replace(limit=True)
 
     def _back(self, first: Point, a: Point, b: Point) -> bool:
-        """Whether the branch goes through its first point between two points."""
+        """Return whether the branch passes through its first point between two points."""
         if not min(a.at.s, b.at.s) <= 0.0 <= max(a.at.s, b.at.s):
             return False
         try:
@@ -264,7 +268,7 @@ class Branch:
         return float(np.max(np.abs(apart / self.equations.scale))) < _BACK
 
     def _product(self, a: Unknowns, b: Unknowns) -> float:
-        """The product of two changes, of coordinates and the fraction."""
+        """Return the inner product of two changes, of coordinates and the fraction."""
         scale = self.equations.scale
         return self.weight * float((a.q / scale) @ (b.q / scale)) + a.s * b.s
 
@@ -272,13 +276,13 @@ class Branch:
         return float(np.sqrt(self._product(change, change)))
 
     def _only_s(self, like: Unknowns) -> Unknowns:
-        """A change of the fraction alone."""
+        """Return a change of the fraction alone."""
         return Unknowns(np.zeros_like(like.q), np.zeros_like(like.mu), 1.0)
 
     def _change(self, at: Unknowns, across: Unknowns, f: Array, phi: Array, product: float) -> Unknowns:
-        """The change that forces (n,), rows and the product with `across` want, by the linear equations at a point.
+        """Solve the linear equations at a point for a change with given forces (n,), rows and product with `across`.
 
-        Multipliers of rows that follow from others stay.
+        Multipliers of redundant rows are unchanged.
         """
         equations, found = self.equations, self.equations.matrices(at)
         (kept,) = equations.independent(found.rows)
@@ -302,7 +306,7 @@ class Branch:
         return Unknowns(change[:n], mu, float(change[-1]))
 
     def _tangent(self, at: Unknowns, along: Unknowns) -> Unknowns:
-        """The tangent of length one at a point, in the direction of another."""
+        """Return the tangent of length one at a point, in the direction of another."""
         return self._of_length_one(self._change(at, along, np.zeros_like(at.q), np.zeros_like(at.mu), 1.0))
 
     def _of_length_one(self, change: Unknowns) -> Unknowns:
@@ -317,7 +321,7 @@ class Branch:
         longest: float = np.inf,
         counted: list[int] | None = None,
     ) -> Unknowns:
-        """Newton's iteration to an equilibrium, across a direction, or at a fraction; else `_Failed`."""
+        """Find an equilibrium by Newton's iteration, normal to a direction or at a fraction; else raise `_Failed`."""
         at, before = begin, np.inf
         for number in range(1, _MOST_ITERATIONS + 1):
             f, phi = self.equations.residual(at)

@@ -1,7 +1,7 @@
 """Equations of equilibrium with given coordinates held, moved or loaded.
 
-A named coordinate is the angle or travel of a joint, or a place or the angle of a point: a row Phi_c of a system
-with more rows than the mechanism's own. With a fraction s of all that is given
+A named coordinate is the angle or travel of a joint, or the position or angle of a point: a row Phi_c of a system that
+has more rows than the mechanism's own. With a fraction s of all given loads and displacements
 
     F(q) + Phi_q^T mu - s Phi_l,q^T p = 0        forces: beams, springs, weight, loads; p is given at loaded rows l
     Phi(q) = Phi_0 + s d                         the mechanism's constraints and rows that are held (d = 0) or moved
@@ -34,24 +34,24 @@ from paraflex.linear.coordinates import Coordinates, unit_in, with_coordinates
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import PointRef
 
-# A matrix of fewer entries has its independent rows found by a QR factorisation, others by elimination.
+# Up to this number of entries a QR factorisation finds the independent rows of a matrix, beyond it elimination.
 _DENSE_ENTRIES = 400_000
 
 
 class Unknowns(NamedTuple):
-    """Coordinates (n,), multipliers (rows,) of constraints and of what is held or moved, and the fraction s."""
+    """Coordinates (n,), multipliers (rows,) of constraints and of held or moved coordinates, and the fraction s."""
 
     q: Array
     mu: Array
     s: float
 
     def plus(self, change: Unknowns, part: float = 1.0) -> Unknowns:
-        """These and a part of a change."""
+        """Add a multiple of a change."""
         return Unknowns(self.q + part * change.q, self.mu + part * change.mu, self.s + part * change.s)
 
     @property
     def packed(self) -> Array:
-        """All as one array."""
+        """All unknowns as one array."""
         return np.concatenate([self.q, self.mu, [self.s]])
 
 
@@ -69,15 +69,16 @@ class Matrices(NamedTuple):
 
 @dataclass(frozen=True)
 class Equations:
-    """The equations of equilibrium of a system from a start on.
+    """Equations of equilibrium of a system, relative to a start.
 
     Attributes
     ----------
     system : System
-        Of the mechanism.
+        System of the mechanism.
     start : State
-        Its pose is where coordinates count from; loads in time are those of its time.
+        State from whose pose changes of coordinates count; loads in time have their values at its time.
     given : Conditions
+        Coordinates held, moved, loaded and measured.
     """
 
     system: System
@@ -86,7 +87,7 @@ class Equations:
 
     @cached_property
     def extended(self) -> System:
-        """The system with a row for every named coordinate."""
+        """System with a row for every named coordinate."""
         cut = self.system.mechanism.cut
         joints, pins = [], {}
         for one in self.given.coordinates:
@@ -104,7 +105,7 @@ class Equations:
 
     @cached_property
     def number(self) -> dict[Coordinate, int]:
-        """The row of every named coordinate in the extended system."""
+        """Row of every named coordinate in the extended system."""
         mechanism, names = self.extended.mechanism, {name: k for k, name in enumerate(self.extended.rows)}
         law = {one.joint: one.name for one in mechanism.prescribed}
         numbers = {}
@@ -118,14 +119,14 @@ class Equations:
 
     @cached_property
     def holding(self) -> NDArray[np.int64]:
-        """Rows that must keep their value or follow a change: constraints, and coordinates held or moved."""
+        """Rows that keep their value or follow a change: constraints, and coordinates held or moved."""
         own = [k for k in self.own.tolist() if self.extended.packed.rows["kind"][k] == CONSTRAINT]
         extra = [self.number[one] for one in (*self.given.held, *self.given.moved)]
         return np.array(list(dict.fromkeys([*own, *extra])), dtype=int)
 
     @cached_property
     def change(self) -> Array:
-        """Change of the rows `holding` with all that is given (rows,)."""
+        """Change (rows,) of the rows `holding` at load fraction one."""
         change, place = np.zeros(self.holding.size), {row: k for k, row in enumerate(self.holding.tolist())}
         for one, value in self.given.moved.items():
             change[place[self.number[one]]] = value
@@ -149,35 +150,35 @@ class Equations:
 
     @cached_property
     def elastic(self) -> Array:
-        """Stiffness (n,) of beams, diagonal."""
+        """Diagonal (n,) of the stiffness of beams."""
         return stiffness_diagonal(self.system)
 
     @cached_property
     def scale(self) -> Array:
-        """What one of each coordinate (n,) is measured in: sizes of the mechanism, rad; less of stiff coordinates."""
+        """Unit of each coordinate (n,): sizes of the mechanism, rad; smaller for stiff coordinates."""
         return Coordinates(self.system, ()).scale
 
     @cached_property
     def units(self) -> Array:
-        """What one of each unknown is measured in (n + rows + 1,)."""
+        """Unit of each unknown (n + rows + 1,)."""
         energy = (
             float(np.max(self.elastic * self.scale**2, initial=0.0)) or self.system.total_mass * self.system.size**2
         )
         return np.concatenate([self.scale, energy / self.extended.row_units[self.holding], [1.0]])
 
     def values(self, q: Array) -> Array:
-        """Values (rows,) of all rows of the extended system at coordinates (n,): of named coordinates their own."""
+        """Return values (rows,) of all rows of the extended system at coordinates (n,), named coordinates included."""
         return self.extended.constraints(self._forces.signals, self.start.time, q)[0]
 
     @cached_property
     def at_start(self) -> Array:
-        """Values of all rows at the start, of the mechanism's constraints zero."""
+        """Values of all rows at the start; zero for the mechanism's constraints."""
         values = self.values(self.start.q)
         values[self.own] = 0.0
         return values
 
     def multipliers(self, at: Unknowns) -> Array:
-        """Multipliers of all rows of the extended system (m,): springs follow the pose."""
+        """Return the multipliers (m,) of all rows of the extended system; those of springs follow the pose."""
         lam = self._forces.compliant(at.q)
         rows, efforts = self._loaded
         lam[rows] = -at.s * efforts
@@ -185,12 +186,12 @@ class Equations:
         return lam
 
     def residual(self, at: Unknowns) -> tuple[Array, Array]:
-        """Residuals of forces (n,) and of rows (rows,)."""
+        """Return the residuals of forces (n,) and of rows (rows,)."""
         f = self._forces(at.q, self.multipliers(at))[0] + self.elastic * at.q
         return f, (self.values(at.q) - self.at_start)[self.holding] - at.s * self.change
 
     def matrices(self, at: Unknowns) -> Matrices:
-        """Derivatives at a point."""
+        """Return the derivatives at a point."""
         still = np.zeros(self.system.n)
         point = MotionPoint(self.start.time, at.q, still, still, self.multipliers(at), self._forces.torques)
         found = self._tangency.at(point)
@@ -201,38 +202,38 @@ class Equations:
         return Matrices(stiffness, held, -(loaded.T @ efforts), found.mass)
 
     def rows_named(self, coordinates: Sequence[Coordinate], q: Array) -> csr_matrix:
-        """Derivatives (coordinates, n) of named coordinates."""
+        """Return the derivatives (coordinates, n) of named coordinates."""
         jacobian = self._tangency.inertia(self.start.time, q)[1]
         return rows_of(np.array([self.number[one] for one in coordinates], dtype=int), jacobian)[0]
 
     def guess(self) -> Unknowns:
-        """The start, with the multipliers that would hold it best."""
+        """Return the start, with the multipliers that hold it best."""
         none = Unknowns(self.start.q, np.zeros(self.holding.size), 0.0)
         found = self.matrices(none)
         mu = Saddle(found.mass, found.rows).solve(-self.residual(none)[0])[1]
         return none._replace(mu=mu)
 
     def independent(self, rows: csr_matrix, more: csr_matrix | None = None) -> tuple[NDArray[np.int64], ...]:
-        """Which rows (rows, n) do not follow from one another, and which of more rows do not from these."""
+        """Return which rows (rows, n) are independent of one another, and which of `more` are independent of these."""
         groups = [unit_in(part, self.scale) for part in (rows, more) if part is not None]
         entries = sum(int(np.prod(group.shape or ())) for group in groups)
         choose = independent_dense if entries <= _DENSE_ENTRIES else independent_sparse
         return choose(groups, np.ones(self.system.n)).groups
 
     def dependent_travels(self, at: Unknowns) -> list[Coordinate]:
-        """Moved coordinates whose travel follows, at a point, from the constraints and from others held and moved."""
+        """Return the moved coordinates that follow, at a point, from constraints and other held or moved ones."""
         rows, moved = self.matrices(at).rows, list(self.given.moved)
         kept = self.holding.size - len(moved)
         free = self.independent(csr_matrix(rows[:kept]), csr_matrix(rows[kept:]))[1] if moved else ()
         return [one for k, one in enumerate(moved) if k not in free]
 
     def gap(self, at: Unknowns) -> float:
-        """The largest residual of rows [sizes of the mechanism, rad]."""
+        """Return the largest residual of rows [sizes of the mechanism, rad]."""
         phi = self.residual(at)[1]
         return float(np.max(np.abs(phi) / self.extended.row_units[self.holding], initial=0.0))
 
     def least_multipliers(self, at: Unknowns) -> Unknowns:
-        """The same equilibrium with those multipliers of dependent rows whose sum of squares is least."""
+        """Return the equilibrium with the multipliers of dependent rows of least sum of squares."""
         rows = self.matrices(at).rows
         if self.independent(rows)[0].size == self.holding.size:
             return at

@@ -1,4 +1,4 @@
-"""What is given of equilibria: coordinates by name, and the loads, torques, travel and others that a model proposes."""
+"""Conditions of equilibria: coordinates by name, and the loads, torques and displacements that a model proposes."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from paraflex.mechanism import Mechanism, PointRef
 from paraflex.mechanism.quantities import known
 
 _AXES = ("x", "y", "angle")
-# Fields that say what is given. Who chooses one of them chooses all.
+# Fields of loads and displacements; choosing one of them replaces all.
 GIVEN = ("loads", "torques", "moved")
 STEPS, FACTORS = 10, 1
-# More steps are a finer figure than anyone looks at.
+# Upper limit of steps; more would show no further detail.
 _MOST_STEPS = 10_000
-# Higher buckling modes than these say nothing.
+# Buckling modes above this number are of no use.
 _MOST_FACTORS = 20
 
 
 class Coordinate(NamedTuple):
-    """The angle or travel of a joint, or a place or the angle of a point, by its name.
+    """Angle or travel of a joint, or position or angle of a point, by its name.
 
     Attributes
     ----------
     name : str
-        Of the joint, or "body.point.x", "body.point.y", "body.point.angle".
+        Name of the joint, or "body.point.x", "body.point.y", "body.point.angle".
     unit, effort_unit : str
-        "m" and "N", or "rad" and "N m".
+        Units: "m" and "N", or "rad" and "N m".
     point : PointRef, optional
-        None of a joint.
+        Point of the coordinate; None for a joint.
     """
 
     name: str
@@ -42,17 +42,17 @@ class Coordinate(NamedTuple):
 
     @property
     def axis(self) -> str:
-        """The axis of a point's coordinate."""
+        """Axis of a point's coordinate."""
         return self.name.rpartition(".")[2]
 
 
 def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
-    """A coordinate by its name.
+    """Return a coordinate by its name.
 
     Raises
     ------
     InputError
-        There is no such joint or point, or the joint has no coordinate that could change.
+        There is no such joint or point, or the joint has no variable coordinate.
     """
     joints = {joint.name: joint for joint in mechanism.joints}
     if name in joints:
@@ -73,14 +73,16 @@ def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
 
 
 class Conditions(NamedTuple):
-    """What is given: changes of coordinates, forces and torques at others, and coordinates that are only looked at.
+    """Conditions of equilibria: changes of coordinates, forces and torques, and coordinates that are held or measured.
 
     Attributes
     ----------
     held : tuple of Coordinate
+        Coordinates that keep their value.
     moved, loads : mapping of Coordinate to float
-        The change from the start [m, rad], and the force or torque [N, N m].
+        Change from the start [m, rad], and force or torque [N, N m].
     measured : tuple of Coordinate
+        Coordinates whose stiffness is computed.
     """
 
     held: tuple[Coordinate, ...]
@@ -90,12 +92,12 @@ class Conditions(NamedTuple):
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """All, each once."""
+        """All coordinates, each once."""
         return tuple(dict.fromkeys((*self.moved, *self.loads, *self.measured, *self.held)))
 
     @property
     def words(self) -> str:
-        """What is given with its numbers: "travel of stage.T.x by 0.01 m and -20 N at stage.T.y"."""
+        """Displacements and loads in words: "travel of stage.T.x by 0.01 m and -20 N at stage.T.y"."""
         travels = [f"travel of {one.name} by {value:g} {one.unit}" for one, value in self.moved.items()]
         loads = [f"{value:g} {one.effort_unit} at {one.name}" for one, value in self.loads.items()]
         return " and ".join([*travels, *loads])
@@ -103,15 +105,20 @@ class Conditions(NamedTuple):
 
 @dataclass(frozen=True)
 class StaticsDefaults:
-    """Arguments of `statics` that are not given, as a model has them; see there.
+    """Default arguments of `statics`, as a model proposes them; see there.
 
     Attributes
     ----------
     loads, torques, moved : mapping of str to float
+        Loads at coordinates, torques of motors, and changes of coordinates.
     held : tuple of str, optional
+        Coordinates that keep their value.
     steps : int
+        Number of equal steps.
     stiffness : tuple of str, optional
+        Coordinates whose stiffness is computed.
     buckling : int
+        Number of buckling factors.
     """
 
     loads: Mapping[str, float] = field(default_factory=dict)
@@ -123,33 +130,33 @@ class StaticsDefaults:
     buckling: int = FACTORS
 
     def filled(self, **chosen: Any) -> StaticsDefaults:
-        """These with what a caller chooses that is not None; see `chosen_over` of loads, torques and travel."""
+        """Replace defaults by chosen values that are not None; see `chosen_over` for loads, torques, displacements."""
         given = {name: value for name, value in chosen.items() if value is not None}
         return StaticsDefaults(**chosen_over(vars(self), given))
 
 
 class ModelWithStatics(ModelWithPaths, Protocol):
-    """A model that proposes its statics: what `paraflex.load` reads."""
+    """A model that proposes its statics, as `paraflex.load` returns it."""
 
     @property
     def statics(self) -> StaticsDefaults:
-        """What is given unless asked otherwise."""
+        """Default arguments of `statics`."""
         ...
 
 
 def chosen_over(own: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields by name with others in their place: a load, torque or travel that is chosen replaces all of these."""
+    """Replace fields by chosen ones; a chosen load, torque or displacement replaces all of these."""
     replaced = GIVEN if any(name in chosen for name in GIVEN) else ()
     return {name: value for name, value in own.items() if name not in replaced} | dict(chosen)
 
 
 def conditions(mechanism: Mechanism, asked: StaticsDefaults) -> Conditions:
-    """What is given, by coordinates of a mechanism.
+    """Return the conditions on coordinates of a mechanism.
 
     Raises
     ------
     InputError
-        Unknown names, a coordinate given twice, numbers that make no sense.
+        Names are unknown, a coordinate is given twice, or numbers are out of range.
     """
     _counted(asked.steps, 1, _MOST_STEPS, "steps", "steps")
     _counted(asked.buckling, 0, _MOST_FACTORS, "buckling", "factors")
@@ -175,7 +182,7 @@ def conditions(mechanism: Mechanism, asked: StaticsDefaults) -> Conditions:
 
 
 def _efforts(mechanism: Mechanism, asked: StaticsDefaults) -> dict[Coordinate, float]:
-    """Forces and torques at coordinates; a motor's is at its joint, and several there add up."""
+    """Return forces and torques at coordinates; those of motors act at their joints, and several at a joint add up."""
     joints = {motor.name: motor.joint for motor in mechanism.motors}
     efforts: dict[Coordinate, float] = {}
     for table, values in (("loads", asked.loads), ("torques", asked.torques)):

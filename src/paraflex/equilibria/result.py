@@ -1,4 +1,4 @@
-"""Equilibria of a mechanism as a result: coordinates, forces, stability, stiffness in steps."""
+"""Equilibria of a mechanism as a result: coordinates, forces, stability and stiffness in steps."""
 
 from __future__ import annotations
 
@@ -28,16 +28,19 @@ from paraflex.validity import Validity, assess, doubtful_stresses, shared_loads
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """One equilibrium.
+    """An equilibrium.
 
     Attributes
     ----------
     point : Point
+        Point of the branch.
     vibrations, free : Vibrations
-        What is held and moved kept; what is moved let go under the force that moves it.
+        Vibrations with held and moved coordinates kept, and with moved coordinates released under the force that moves
+        them.
     buckling : Buckling
+        Buckling factors and shapes.
     stiffness : (directions,) array
-        [N/m, N m/rad]
+        Stiffness of the measured coordinates [N/m, N m/rad].
     """
 
     point: Point
@@ -55,12 +58,13 @@ class Statics(Shown):
     Attributes
     ----------
     equations : Equations
-        What was held, moved and loaded.
+        Equations of equilibrium, with the coordinates held, moved and loaded.
     equilibria : tuple of Equilibrium
+        Equilibria of the branch.
     status : str
-        "complete", or "failed" where the branch ends before the last step.
+        Status: "complete", or "failed" if the branch ends before the last step.
     message : str
-        Why it ends.
+        Reason why the branch ends; empty by default.
     """
 
     equations: Equations
@@ -70,12 +74,12 @@ class Statics(Shown):
 
     @property
     def system(self) -> System:
-        """The system of the mechanism."""
+        """System of the mechanism."""
         return self.equations.system
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """All named coordinates: moved, loaded, looked at, held."""
+        """All named coordinates: moved, loaded, measured, held."""
         return self.equations.given.coordinates
 
     @property
@@ -85,17 +89,17 @@ class Statics(Shown):
 
     @property
     def fraction(self) -> Array:
-        """Fraction (k,) of all that is given."""
+        """Load fraction (k,): part of all given loads and displacements."""
         return np.array([one.point.at.s for one in self.equilibria])
 
     @property
     def limit(self) -> NDArray[np.bool_]:
-        """Which are limit points (k,)."""
+        """Mask (k,) of limit points."""
         return np.array([one.point.limit for one in self.equilibria], dtype=bool)
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """Which are stable (k,), what is held and moved kept; limit points are not."""
+        """Mask (k,) of stable equilibria, with held and moved coordinates kept; limit points are not stable."""
         return np.array([one.vibrations.stable and not one.point.limit for one in self.equilibria], dtype=bool)
 
     @property
@@ -111,25 +115,25 @@ class Statics(Shown):
 
     @cached_property
     def _dependence(self) -> list[Dependence]:
-        """Redundant rows of each equilibrium, of those that hold the mechanism."""
+        """Redundant rows of each equilibrium, among those that hold the mechanism."""
         return [dependence(self.equations.extended, q, acting=self.equations.holding) for q in self.q]
 
     @property
     def frequencies(self) -> Array:
-        """Natural frequencies (k, f), zero of motions that grow, NaN where there are fewer [rad/s].
+        """Natural frequencies (k, f), zero for unstable motions, NaN where there are fewer [rad/s].
 
-        What is held and moved stays; see `free_frequencies`.
+        Held and moved coordinates are kept; see `free_frequencies`.
         """
         return self.within_rows([np.sqrt(np.maximum(one.vibrations.squares, 0.0)) for one in self.equilibria])
 
     @property
     def free_frequencies(self) -> Array:
-        """The same (k, f) with what is moved let go, under the force that moved it there [rad/s]."""
+        """Natural frequencies (k, f) with moved coordinates released under the force that moves them [rad/s]."""
         return self.within_rows([np.sqrt(np.maximum(one.free.squares, 0.0)) for one in self.equilibria])
 
     @staticmethod
     def within_rows(rows: Sequence[Array]) -> Array:
-        """Arrays of several lengths as rows, NaN beyond their ends."""
+        """Stack arrays of different lengths as rows, NaN beyond their ends."""
         out = np.full((len(rows), max((row.size for row in rows), default=0)), np.nan)
         for filled, row in zip(out, rows, strict=True):
             filled[: row.size] = row
@@ -137,7 +141,7 @@ class Statics(Shown):
 
     @property
     def buckling(self) -> Array:
-        """Factors (k, b) of all that is given at which the mechanism buckles, as seen from each equilibrium."""
+        """Load factors (k, b) at which the mechanism buckles, estimated from each equilibrium."""
         return np.array([one.buckling.factors for one in self.equilibria])
 
     @cached_property
@@ -146,39 +150,39 @@ class Statics(Shown):
 
     @checked_arguments()
     def place(self, name: str) -> Array:
-        """Value (k,) of a named coordinate [m, rad]."""
+        """Return the value (k,) of a named coordinate [m, rad]."""
         return self._values[:, self._row(name)]
 
     @checked_arguments()
     def travel(self, name: str) -> Array:
-        """Change (k,) of a named coordinate since the start [m, rad]."""
+        """Return the change (k,) of a named coordinate since the start [m, rad]."""
         number = self._row(name)
         return self._values[:, number] - self.equations.values(self.equations.start.q)[number]
 
     @checked_arguments()
     def effort(self, name: str) -> Array:
-        """Force or torque (k,) at a named coordinate: given, or what holds or moves it [N, N m].
+        """Return the force or torque (k,) at a named coordinate: given, or exerted to hold or move it [N, N m].
 
-        Of least norm where it is not determined; see `known_effort`.
+        If it is not determined, the solution of least norm is returned; see `known_effort`.
         """
         return -self.multipliers[:, self._row(name)]
 
     @checked_arguments()
     def known_effort(self, name: str) -> Array:
-        """The same (k,), NaN where redundant rows share it in any way: two drives that hold one motion."""
+        """Return the effort (k,), NaN if redundant rows share it arbitrarily, as two drives of one motion do."""
         number, units = self._row(name), self.equations.extended.row_units
         free = [one.self_stresses(units)[:, number] * units[number] for one in self._dependence]
         return np.where([np.any(np.abs(one) > NO_PART) for one in free], np.nan, self.effort(name))
 
     @checked_arguments()
     def stiffness(self, name: str) -> Array:
-        """Force for a unit displacement (k,) of a coordinate, others as they are held and moved [N/m, N m/rad]."""
+        """Return force per unit displacement (k,) of a coordinate, others held and moved as given [N/m, N m/rad]."""
         names = [one.name for one in self.directions]
         known(name, names, "stiffness", "direction with a stiffness")
         return np.array([one.stiffness[names.index(name)] for one in self.equilibria])
 
     def _row(self, name: str) -> int:
-        """Row of a named coordinate in the extended system."""
+        """Return the row of a named coordinate in the extended system."""
         rows = {one.name: number for one, number in self.equations.number.items()}
         if name not in rows:
             raise InputError("is no coordinate of these equilibria", field="name", value=name,
@@ -187,7 +191,7 @@ class Statics(Shown):
 
     @cached_property
     def solution(self) -> Solution:
-        """The equilibria as samples at rest of `equations.extended`, numbered in place of times."""
+        """Equilibria as samples at rest of `equations.extended`, numbered in place of times."""
         equations = self.equations
         return resting_solution(
             equations.extended, self.q, self.multipliers, equations.holding, self.status, self.message
@@ -200,7 +204,7 @@ class Statics(Shown):
 
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
-        """Findings: unstable equilibria with the motion that grows, stresses beyond the strength."""
+        """Findings: unstable equilibria with their growing motion, stresses beyond the strength, undetermined loads."""
         of_loads = (doubtful_stresses, shared_loads)
         stresses = tuple(one for of in of_loads for one in of(self.equations.extended, self.solution))
         unstable = np.flatnonzero(~self.stable & ~self.limit)
@@ -220,7 +224,7 @@ class Statics(Shown):
 
     @checked_arguments()
     def moving_away(self, step: int) -> str:
-        """In words, the motion that grows at an unstable equilibrium: the coordinate and the body that move most."""
+        """Describe the unstable motion at an equilibrium: the coordinate and the body that move most."""
         shape = self.equilibria[step].vibrations.shapes[:, 0] / self.equations.scale
         rigid = {body.name: shape[body.offset : body.offset + 3] for body in self.system.bodies}
         name = max(rigid, key=lambda body: float(np.max(np.abs(rigid[body]))))

@@ -1,4 +1,4 @@
-"""Equilibria as samples of a run at rest, for what is computed of runs."""
+"""Equilibria as samples of a run at rest, for functions that evaluate runs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from paraflex.kernel.packed import SPRING
 def resting_solution(
     system: System, q: Array, multipliers: Array, acting: NDArray[np.int64], status: str, message: str
 ) -> Solution:
-    """Samples at rest with coordinates (k, n) and multipliers (k, m) of rows that act, numbered in place of times."""
+    """Return samples at rest with coordinates (k, n) and multipliers (k, m), numbered in place of times.
+
+    `acting` holds the numbers of the rows that act.
+    """
     zeros = np.zeros(len(q))
     return Solution(
         t=np.arange(len(q), dtype=float), q=q, v=np.zeros_like(q), a=np.zeros_like(q), multipliers=multipliers,
@@ -28,7 +31,7 @@ def resting_solution(
 
 
 def strain_energy(system: System, q: Array, multipliers: Array) -> Array:
-    """Energy (k,) of beams, springs at joints, and springs between points [J]."""
+    """Return the energy (k,) of beams, springs at joints, and springs between points [J]."""
     rows = system.packed.rows
     energy = 0.5 * q**2 @ stiffness_diagonal(system)
     energy += 0.5 * multipliers**2 @ np.where(rows["kind"] == SPRING, rows["compliance"], 0.0)

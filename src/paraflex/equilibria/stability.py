@@ -1,4 +1,4 @@
-"""An equilibrium looked at closely: whether it is stable, its frequencies, buckling, stiffness in named directions."""
+"""Properties of an equilibrium: stability, natural frequencies, buckling, stiffness in named directions."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from paraflex.equilibria.branch import Point
 from paraflex.equilibria.equations import Equations, Matrices, Unknowns
 from paraflex.equilibria.given import Coordinate
 
-# Differences along the branch move links by this [sizes of the mechanism, rad], and change the fraction by no more.
+# Step of finite differences along the branch: motion of links [sizes of the mechanism, rad] and change of fraction.
 _MOVE, _FRACTION = 1e-4, 1e-2
-# Of an eigenvalue that belongs to no buckling: load stiffness as a part of the stiffness.
+# Load stiffness below this fraction of the stiffness belongs to no buckling.
 _NOTHING = 1e-9
-# Places and turns of links give way before links bend or stretch: what they cost, as a part of typical energies.
+# Weight of positions and angles, as a fraction of typical energies: they yield before links bend or stretch.
 _RIGID_FIRST = 1e-6
-# Typical energies are those of so many slowest vibrations.
+# Number of the slowest vibrations that define typical energies.
 _SLOWEST = 5
-# Links turn by no more until the fraction at which something buckles by a linear estimate [rad].
+# Largest rotation of links until the fraction of buckling by the linear estimate [rad].
 _MOST_TURN = 2.0 * np.pi
-# Of more coordinates dense matrices take minutes.
+# Beyond this number of coordinates dense matrices take minutes.
 _MOST_COORDINATES = 2000
 
 
 class Vibrations(NamedTuple):
-    """Small vibrations about an equilibrium, what is held and moved kept.
+    """Small vibrations about an equilibrium, with held and moved coordinates kept.
 
     Attributes
     ----------
     squares : (k,) array
-        Of natural frequencies, ascending [rad^2/s^2]; negative of a motion that grows.
+        Squares of the natural frequencies, ascending [rad^2/s^2]; negative for an unstable motion.
     shapes : (n, k) array
-        Of unit modal mass.
+        Mode shapes of unit modal mass.
     complete : bool
-        Whether these are all.
+        Whether these are all vibrations, not only the lowest.
     """
 
     squares: Array
@@ -49,21 +49,22 @@ class Vibrations(NamedTuple):
 
     @property
     def stable(self) -> bool:
-        """Whether no motion grows."""
+        """Whether no motion is unstable."""
         return not np.any(self.squares < 0.0)
 
 
 class Buckling(NamedTuple):
-    """Fractions of what is given at which another equilibrium branches off or the stiffness ends, and shapes.
+    """Load fractions at which another equilibrium branches off or the stiffness becomes singular, and their shapes.
 
     Attributes
     ----------
     factors : (b,) array
-        Ascending, of all that is given; those above the fraction of the equilibrium, NaN where there are fewer.
+        Factors of all given loads and displacements, ascending, above the fraction of the equilibrium; NaN where there
+        are fewer.
     shapes : (n, b) array
-        The largest displacement or turn is one [sizes of the mechanism, rad].
+        Buckling shapes; the largest displacement or rotation is one [sizes of the mechanism, rad].
     reason : str
-        Why there is no factor; empty where nothing buckles.
+        Reason why there is no factor; empty if nothing buckles.
     """
 
     factors: Array
@@ -72,9 +73,9 @@ class Buckling(NamedTuple):
 
 
 def vibrations(equations: Equations, found: Matrices) -> Vibrations:
-    """Small vibrations about an equilibrium.
+    """Compute the small vibrations about an equilibrium.
 
-    All loads are gradients of coordinates, so that the stiffness is symmetric but for rounding.
+    All loads are gradients of coordinates, so that the stiffness is symmetric up to rounding.
     """
     K, M, C, elastic = found.stiffness, found.mass, found.rows, equations.elastic
     typical = typical_square(elastic, csr_matrix(K - scipy.sparse.diags(elastic)), M)
@@ -87,11 +88,24 @@ def vibrations(equations: Equations, found: Matrices) -> Vibrations:
 
 
 def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vibrations, count: int) -> Buckling:
-    """Factors of buckling about an equilibrium: fractions s' with a singular K + (s' - s) dK/ds.
+    """Compute buckling factors about an equilibrium: fractions s' at which K + (s' - s) dK/ds is singular.
 
-    The derivative is along the branch, in displacements that follow the deflection with the least change of elastic
-    energy. Where links turn, displacements that do not follow stretch them: to first order that couples what stretches
-    links to what bends them, a loss of stiffness that terms of second order cancel.
+    The derivative is taken along the branch, in displacements that follow the deflection with the least change of
+    elastic energy. If links rotate, displacements that do not follow stretch them: to first order this couples
+    stretching to bending, a loss of stiffness that second-order terms cancel.
+
+    Parameters
+    ----------
+    equations : Equations
+        Equations of equilibrium.
+    point : Point
+        Equilibrium and its tangent.
+    found : Matrices
+        Derivatives at the equilibrium.
+    vibration : Vibrations
+        Vibrations about the equilibrium.
+    count : int
+        Number of factors.
     """
     factors, shapes = np.full(count, np.nan), np.full((equations.system.n, count), np.nan)
     along, squares = point.tangent, vibration.squares
@@ -129,9 +143,9 @@ def buckling(equations: Equations, point: Point, found: Matrices, vibration: Vib
 
 
 def _reduced(equations: Equations, at: Unknowns, shapes: Array, typical: float) -> Array:
-    """Stiffness (f, f) at a point near by, in displacements that the rows allow there.
+    """Return the stiffness (f, f) at a point nearby, in displacements that the rows allow there.
 
-    They differ from shapes by as little elastic energy as can be, and within that by least places and turns. Typical
+    They differ from `shapes` by the least elastic energy, and among these by the least positions and angles. `typical`
     is the energy of displacements by sizes of the mechanism.
     """
     found, elastic = equations.matrices(at), equations.elastic
@@ -142,16 +156,16 @@ def _reduced(equations: Equations, at: Unknowns, shapes: Array, typical: float) 
 
 
 def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> Buckling:
-    """Factors of the first of some equilibria along their branch, none where the others contradict the first.
+    """Return the first equilibrium's buckling factors, none if later ones along the branch contradict them.
 
-    Where stable equilibria lead to a limit point it is that of the limit point.
+    If stable equilibria lead to a limit point, the factors are those of the limit point.
     """
     point, vibration, own = ahead[0]
     reached, lost = point.at.s, np.inf
     for there, moving, that in ahead[1:] if vibration.stable and not point.limit else ():
         if there.at.s <= reached:
             break
-        # One square is zero at a limit point; where another is negative the branch has lost its stability before.
+        # One square is zero at a limit point; if another is negative, the branch lost its stability before.
         if there.limit and np.all(moving.squares[1:2] > np.abs(moving.squares[:1])):
             return Buckling(that.factors[:count], that.shapes[:, :count], "")
         if there.limit or not moving.stable:
@@ -169,16 +183,16 @@ def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> 
 
 
 def _largest_one(equations: Equations, shapes: Array) -> Array:
-    """Shapes (n, k) with a largest coordinate of one [sizes of the mechanism, rad]; its sign is positive."""
+    """Scale shapes (n, k) to a largest coordinate of plus one [sizes of the mechanism, rad]."""
     relative = shapes / equations.scale[:, None]
     largest = np.take_along_axis(relative, np.argmax(np.abs(relative), axis=0)[None], axis=0)
     return shapes / np.where(largest == 0.0, 1.0, largest)
 
 
 def stiffness(equations: Equations, at: Unknowns, found: Matrices, directions: Sequence[Coordinate]) -> Array:
-    """Force for a unit displacement (directions,) of each coordinate [N/m, N m/rad]; infinite where it cannot move.
+    """Return force per unit displacement (directions,) of each coordinate [N/m, N m/rad]; infinite if it cannot move.
 
-    What is held and moved stays, the coordinate itself set free.
+    Held and moved coordinates are kept, except the coordinate itself.
     """
     n = equations.system.n
     wanted = equations.rows_named(directions, at.q)

@@ -1,4 +1,4 @@
-"""Static equilibria of a mechanism under loads and given travel, in steps along their branch."""
+"""Static equilibria of a mechanism under loads and prescribed displacements, in steps along their branch."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, Start
 from paraflex.validity import warn
 
-# A limit point is looked for where the linear estimate is further away, as it is off by no more than its distance; and
-# no further along than so much of what is given: further where estimates change along the branch by more than a part.
+# A limit point is searched for if the linear estimate is further away than the first, as the estimate errs by no more
+# than its distance. The search ends at the second load factor, or at the third if estimates change along the branch by
+# more than the last fraction.
 _NEAR, _FURTHEST, _CHANGING_FURTHEST, _CHANGING = 0.01, 2.0, 5.0, 0.05
 
 
@@ -41,41 +42,45 @@ def statics(
     start: Start | State | None = None,
     warning: bool = True,
 ) -> Statics:
-    """Equilibria as loads, torques and travel grow from nothing to what is given, in equal steps.
+    """Find equilibria as loads, torques and displacements grow from zero to their given values, in equal steps.
 
     The mechanism's own weight, loads and springs act in full from the start. The branch is followed by its arc length,
-    past limit points: a step is then met several times, and limit points stand between steps.
+    past limit points: a load fraction may then occur several times, and limit points appear between steps.
 
-    A coordinate is a joint by its name, its angle or travel; or "body.point.x", "body.point.y", "body.point.angle".
+    A coordinate is the angle or travel of a joint, by the joint's name; or "body.point.x", "body.point.y",
+    "body.point.angle".
 
     Parameters
     ----------
     source : Mechanism or Model
-        Of a model its [statics] says what is not given here; one of `loads`, `torques` and `moved` replaces all three.
+        Mechanism, or model whose [statics] gives the defaults; one of `loads`, `torques` and `moved` replaces all
+        three.
     loads : mapping of str to float, optional
         Forces and torques at coordinates [N, N m]. They keep their direction.
     torques : mapping of str to float, optional
-        Of motors by name [N m, N].
+        Torques or forces of motors by name [N m, N].
     moved : mapping of str to float, optional
-        Changes of coordinates from the start [m, rad]; results tell the force this takes.
+        Changes of coordinates from the start [m, rad]; the result has the forces they require.
     held : sequence of str, optional
-        Coordinates that stay; by default the joints of all motors without a torque. An empty one holds none.
+        Coordinates that keep their value; by default the joints of all motors without a torque. An empty sequence holds
+        none.
     steps : int, optional
-        How many equal steps, 10 by default.
+        Number of equal steps, 10 by default.
     stiffness : sequence of str, optional
         Coordinates whose stiffness is computed; by default those that are loaded or moved.
     buckling : int, optional
-        How many factors of buckling are computed about every equilibrium, 1 by default.
+        Number of buckling factors computed about every equilibrium, 1 by default.
     assembly : str, optional
-        The first by default.
+        Name of the assembly; the first by default.
     start : Start or State, optional
-        The pose that travel counts from, if nothing else deflects it; by default the model's, or the assembly's.
+        Pose from which changes count, if nothing else deflects it; by default the model's start, or the assembly.
     warning : bool
-        Whether a result that is doubtful issues warnings; its `validity` and `doubts` hold them either way.
+        Whether a doubtful result issues warnings; its `validity` and `doubts` hold them in either case.
 
     Returns
     -------
     Statics
+        Equilibria along the branch.
 
     Warns
     -----
@@ -85,13 +90,13 @@ def statics(
     Raises
     ------
     InputError
-        Unknown names, a coordinate given twice, or a number of steps that makes no sense.
+        Names are unknown, a coordinate is given twice, or the number of steps is out of range.
     AssemblyError
         The loops do not close.
     EquilibriumError
-        No equilibrium is found, near the start or beyond some step; it carries the `Statics` until then.
+        No equilibrium is found, near the start or beyond some step; the error carries the `Statics` up to there.
     LimitPointError
-        More is given than any equilibrium of the branch carries; the same.
+        No equilibrium of the branch carries the given loads; the error carries the `Statics` up to there.
     """
     mechanism = Mechanism.made_of(source)
     own, begin = (StaticsDefaults(), None) if isinstance(source, Mechanism) else (source.statics, source.start)
@@ -109,7 +114,7 @@ def statics(
 def _followed(
     mechanism: Mechanism, asked: StaticsDefaults, start: Start | State | None, assembly: str | None
 ) -> Statics:
-    """The equilibria; an error carries those until then."""
+    """Return the equilibria; an error carries those found before it."""
     given = conditions(mechanism, asked)
     system = standing_system(mechanism, start, assembly)
     equations = Equations(system, pose_at_rest(system, start, assembly), given)
@@ -141,13 +146,13 @@ def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibri
 
 
 def _checked(found: list[Equilibrium], beyond: list[Equilibrium], asked: StaticsDefaults) -> tuple[Equilibrium, ...]:
-    """The equilibria with factors of buckling that the branch does not contradict, there and beyond."""
+    """Return the equilibria with buckling factors that the branch, there and beyond, does not contradict."""
     seen = [(one.point, one.vibrations, one.buckling) for one in (*found, *beyond)]
     return tuple(replace(one, buckling=checked(seen[k:], asked.buckling)) for k, one in enumerate(found))
 
 
 def _limit_beyond(branch: Branch, found: list[Equilibrium], asked: StaticsDefaults) -> list[Equilibrium]:
-    """The limit point beyond what is given, if the last equilibrium buckles by its estimate and there is one near."""
+    """Return the limit point beyond the given loads, if the last equilibrium is estimated to buckle and it is near."""
     last = found[-1]
     begun, ended = (float(np.min(one.buckling.factors[:1], initial=np.inf)) for one in (found[0], last))
     furthest = _CHANGING_FURTHEST if abs(begun - ended) > _CHANGING * ended else _FURTHEST

@@ -1,4 +1,4 @@
-"""The joint motion that makes the end-effector follow a path: Newton on the constraints, from a named assembly."""
+"""Inverse kinematics along a path: Newton's iteration on the constraints, starting from a named assembly."""
 
 from __future__ import annotations
 
@@ -32,42 +32,44 @@ from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
 from paraflex.mechanism.members import TASK_COORDINATES
 from paraflex.mechanism.poses import local_points
 
-# Closure walks along the path in steps no longer than this [s], whatever times are asked for.
+# Closure proceeds along the path in steps no longer than this [s], for any requested times.
 _LONGEST_STEP = 1e-3
-# A step that is too long is divided into so many pieces, repeatedly, down to the shortest step [s].
+# Number of pieces of a step that is too long, divided repeatedly down to the shortest step [s].
 _STEP_PIECES, _SHORTEST_STEP = 16, 1e-8
-# Steps from the assembly's pose to the start of the path; more if these fail.
+# Numbers of steps from the assembly's pose to the start of the path, tried in turn.
 _APPROACHES = (25, 250, 2500)
-# Instants at which the distance of an unreachable path from what can be reached is looked at, evenly spaced besides the
-# knots of the path, and so many more about the furthest.
+# Evenly spaced instants at which the distance of an unreachable path from the workspace is computed, besides the knots
+# of the path, and further instants about the largest distance.
 _INSTANTS_LOOKED_AT, _MORE_LOOKS = 41, 9
-# A path that leaves what can be reached within this part of what is left of it does so where closure stopped.
+# A path that leaves the workspace within this fraction of its remaining time does so where closure stopped.
 _SOON = 0.05
-# A path within a thousandth of a link of such a position cannot be distinguished from one through it.
+# A path within a thousandth of a link of a singular configuration cannot be distinguished from one through it.
 _NEARLY_SINGULAR = "or comes so near to one that the assembly beyond it is not certain"
 _MOVE_PATH = "move the path or the bases, or choose another assembly"
-# So many times the size of a mechanism a path is beyond its reach where it is given in another unit.
+# A path further than this many sizes of the mechanism beyond its reach is likely given in another unit.
 _OTHER_UNIT = 30.0
 _OTHER = "it can be reached, but only past a Type I singularity or in another assembly"
 
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """The motion of the rigid mechanism along a path.
+    """Motion of the rigid mechanism along a path.
 
     Attributes
     ----------
     mechanism : Mechanism
-        Rigid.
+        Rigid mechanism.
     system : System
-        Of it, without springs, dampers and friction at its joints: three coordinates a body (RDM).
+        System of the rigid mechanism, without springs, dampers and friction at its joints: three coordinates per body
+        (RDM).
     path : Path
+        Path of the end-effector.
     t : (k,) array
-        [s]
+        Sample times [s].
     q, v, a : (k, n) arrays
         Coordinates, velocities and accelerations.
     basis : (k, n, tasks) array
-        Velocities of all coordinates per unit of each task velocity: spans the null space of Phi_q.
+        Velocities of all coordinates per unit of each task velocity: a basis of the null space of Phi_q.
     """
 
     mechanism: Mechanism
@@ -81,7 +83,7 @@ class RigidMotion:
 
     @property
     def desired(self) -> PathMotion:
-        """Desired motion of the end-effector at the times t: the path's, or its own if x or y is no task coordinate."""
+        """Desired motion of the end-effector at the times t; that of the rigid mechanism for x or y not in the task."""
         planned, effector = self.path.evaluate(self.t), self.mechanism.end_effector
         assert effector is not None
         given = [name in effector.coordinates for name in ("x", "y")]
@@ -101,34 +103,37 @@ def follow_path(
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
 ) -> RigidMotion:
-    """Positions, velocities and accelerations of all bodies along a path of the end-effector.
+    """Compute positions, velocities and accelerations of all bodies along a path of the end-effector.
 
-    Works for any mechanism with as many task coordinates as degrees of freedom. Bodies are taken as rigid.
+    The mechanism must have as many task coordinates as degrees of freedom. Bodies are taken as rigid.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism with an end-effector.
     path : Path
+        Path of the end-effector.
     times : (k,) array
-        Ascending [s].
+        Sample times, ascending [s].
     assembly : str or Assembly, optional
-        Which way the mechanism is put together; the first of the mechanism by default.
+        Assembly in which the mechanism starts; the first of the mechanism by default.
     orientation : float
-        Angle of the end-effector where it is a task coordinate and the path does not say it [rad].
+        Angle of the end-effector if it is a task coordinate and the path does not prescribe it [rad].
 
     Returns
     -------
     RigidMotion
+        Motion at the sample times.
 
     Raises
     ------
     InputError
-        No end-effector, a number of task coordinates other than the degrees of freedom, or a path with angles for a
-        task without.
+        There is no end-effector, the number of task coordinates differs from the degrees of freedom, or the path has
+        angles and the task has none.
     AssemblyError
         The assembly does not close.
     UnreachablePathError
-        The path leaves the workspace or passes a Type I singularity: it names time and position.
+        The path leaves the workspace or passes a Type I singularity; the error gives time and position.
     """
     end = float(np.max(times, initial=0.0))
     return path_follower(mechanism, path, end, assembly=assembly, orientation=orientation)(times)
@@ -143,33 +148,35 @@ def path_follower(
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
 ) -> PathFollower:
-    """`follow_path` for several sets of times, with a common preparation.
+    """Prepare `follow_path` for several sets of times.
 
     Parameters
     ----------
     mechanism, path, assembly, orientation
-        See `follow_path`, also for what is raised; of the path itself, when the times are known.
+        Arguments of `follow_path`. Its errors are raised here, but those of the path when the times are given.
     end : float
-        The last time of all [s].
+        Last time of all sets [s].
 
     Returns
     -------
     PathFollower
-        Gives the motion at times (k,), ascending [s].
+        Callable that returns the motion at times (k,), ascending [s].
     """
     return PathFollower(*_assembled(mechanism, path, end, assembly, orientation), path)
 
 
 @dataclass(frozen=True)
 class PathFollower:
-    """The motion of the rigid mechanism along a path, at any times.
+    """Motion of the rigid mechanism along a path, at any times.
 
     Attributes
     ----------
     closure : PathClosure
+        Rigid system whose loops are closed.
     assembled : (n,) array
         Pose of the assembly from which the path is approached.
     path : Path
+        Path of the end-effector.
     """
 
     closure: PathClosure
@@ -177,21 +184,21 @@ class PathFollower:
     path: Path
 
     def __call__(self, times: Sequence[float] | Array) -> RigidMotion:
-        """The motion at times (k,), ascending [s]; see `follow_path` for its errors."""
+        """Return the motion at times (k,), ascending [s]; see `follow_path` for its errors."""
         times = np.ascontiguousarray(times, dtype=float)
         grid, keep = _no_long_steps(times)
         pose = self.closure.approach(self.path, self.assembled, times[0], times[-1])
         return self.closure.walk(self.path, pose, grid, keep)
 
     def along(self, path: Path) -> PathFollower:
-        """That along another path, in the same assembly and orientation."""
+        """Return the follower of another path, in the same assembly and orientation."""
         return replace(self, path=path)
 
 
 def _assembled(
     mechanism: Mechanism, path: Path, end: float, assembly: str | Assembly | None, orientation: float
 ) -> tuple[PathClosure, Array]:
-    """The closure along a path, and the pose of the assembly; errors as of `follow_path`."""
+    """Return the closure along a path, and the pose of the assembly; errors as in `follow_path`."""
     if mechanism.end_effector is None:
         raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
     closure = PathClosure(mechanism.rigid(), orientation, end)
@@ -213,23 +220,24 @@ def reach_shortfall(
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
 ) -> Shortfall:
-    """Distance of a path from the workspace: zero at every instant of a path within it.
+    """Compute the distance of a path from the workspace, zero at every instant of a path inside it.
 
-    The distance from a place wanted to the nearest pose that joints and prescribed motions allow, found from the pose
-    of the assembly onwards along the path, and from others where these come nearer. A path within reach may still not
-    be followed: past a Type I singularity poses go on in another assembly, which `follow_path` refuses.
+    It is the distance from the desired position to the nearest pose that joints and prescribed motions allow. The
+    search starts at the pose of the assembly and follows the path; other poses are used where they come nearer. A path
+    within reach may still be impossible to follow: past a Type I singularity poses continue in another assembly, which
+    `follow_path` rejects.
 
     Parameters
     ----------
     mechanism, path, assembly, orientation
-        See `follow_path`.
+        Arguments of `follow_path`.
     times : (k,) array, optional
-        Ascending [s]; by default 41 over the path, its knots, and some more about the furthest.
+        Instants, ascending [s]; by default 41 over the path, its knots, and some more about the largest distance.
 
     Raises
     ------
     InputError, AssemblyError
-        See `follow_path`.
+        Same causes as in `follow_path`.
     """
     closure, pose = _assembled(mechanism, path, path.duration, assembly, orientation)
     if times is None:
@@ -239,7 +247,7 @@ def reach_shortfall(
 
 
 def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Times, with more between those further apart than closure steps; which of them were given."""
+    """Return times refined to the longest closure step, and which of them were given."""
     pieces = np.maximum(1.0, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9)))
     if np.sum(pieces) > INSTANTS:
         raise InputError(
@@ -257,7 +265,7 @@ def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 class PathClosure:
-    """The rigid system with its task marker, whose loops are closed along a path."""
+    """Rigid system with its task marker, whose loops are closed along a path."""
 
     packed: PackedSystem
     marker: int
@@ -266,7 +274,7 @@ class PathClosure:
         effector = mechanism.end_effector
         assert effector is not None
         self.mechanism = mechanism
-        # Springs, dampers and friction do not constrain.
+        # Springs, dampers and friction are not constraints.
         moved = with_actuators(mechanism)
         acts = moved.springs or moved.dampers or moved.frictions
         self.system: System = build_system(replace(moved, springs=(), dampers=(), frictions=()) if acts else moved)
@@ -278,7 +286,7 @@ class PathClosure:
         self.reach: PoseSearch = PoseSearch(self.system, effector.point, self.coordinates, self.signals)
 
     def check_degrees_of_freedom(self, assembly: Assembly) -> None:
-        """Raise unless there are as many task coordinates as degrees of freedom, and no redundant rows."""
+        """Check that there are as many task coordinates as degrees of freedom, and no redundant rows."""
         free, tasks, repeated = self.system.n - self.system.n_constraints, self.coordinates.size, []
         if free == tasks:
             return
@@ -298,17 +306,17 @@ class PathClosure:
         )
 
     def assemble(self, assembly: Assembly) -> Array:
-        """The pose of an assembly, loops closed."""
+        """Return the pose of an assembly, loops closed."""
         return assembled_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
     def task(self, q: Array) -> Array:
-        """Task coordinates at a pose."""
+        """Return the task coordinates at a pose."""
         zero, out = np.zeros_like(q), apart((3, self.coordinates.size))
         task_values(self.packed, self.packed.markers[self.marker], self.coordinates, q, zero, zero, out)
         return out[0]
 
     def target(self, path: Path, t: Array) -> Array:
-        """(times, 3, tasks): the task coordinates chosen from x, y, angle."""
+        """Return the task coordinates, selected from x, y and angle, and two derivatives (times, 3, tasks)."""
         motion, turning = path.evaluate(t), turning_of(path, t)
         if turning is None:
             turning = np.zeros((3, t.size))
@@ -319,7 +327,7 @@ class PathClosure:
     def run(
         self, times: Array, target: Array, pose: Array
     ) -> tuple[int, int, float, tuple[Array, Array, Array, Array]]:
-        """Closure along targets; status, index, residual, and what was computed."""
+        """Close the loops along targets; return status, index, residual, and the computed arrays."""
         k, n = times.size, self.system.n
         q, v, a = apart((3, k, n))
         basis = apart((k, n, self.coordinates.size))
@@ -349,7 +357,7 @@ class PathClosure:
         raise self._unreachable(cause, detail, found, start, 0, None)
 
     def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]) -> RigidMotion:
-        """The motion at the instants of a grid, with more instants between them where steps are too long."""
+        """Return the motion at the instants of a grid, with further instants where steps are too long."""
         intervals = []
         while True:
             target = self.target(path, grid)
@@ -357,7 +365,7 @@ class PathClosure:
             last = index - 1
             if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
                 break
-            # From the last instant reached, in shorter steps.
+            # Continue from the last instant reached, in shorter steps.
             intervals.append([x[:last][keep[:last]] for x in (grid, *found)])
             pose = found[0][last]
             between = np.linspace(grid[last], grid[index], _STEP_PIECES + 1)[1:-1]
@@ -370,7 +378,7 @@ class PathClosure:
         if status == LOOPS_CLOSED:
             return motion
         at = float(grid[index])
-        # Where the path leaves the workspace the Jacobian is singular as well, but beyond nothing closes.
+        # The Jacobian is singular as well where the path leaves the workspace, but beyond it no loop closes.
         found = self.shortfall(path, at, float(grid[-1]), pose if last < 0 else found[0][last])
         cause, detail = "the path passes a Type I singularity", _NEARLY_SINGULAR
         if np.any(found.out[found.t <= at + _SOON * (found.t[-1] - at)]):
@@ -380,7 +388,7 @@ class PathClosure:
         raise self._unreachable(cause, detail, found, at, motion.t.size, motion)
 
     def shortfall(self, path: Path, start: float, end: float, pose: Array) -> Shortfall:
-        """Distance of a path from the workspace, from a pose near its start onwards."""
+        """Return the distance of a path from the workspace, from a pose near its start onwards."""
         end = max(start, min(end, path.duration))
         knots = [knot for knot in path.knots if start < knot < end]
         times = np.unique([*np.linspace(start, end, _INSTANTS_LOOKED_AT), *knots])
@@ -394,7 +402,7 @@ class PathClosure:
         return found.joined(self.reach.shortfall(closer, self.target(path, closer)[:, 0], pose, others))
 
     def other_poses(self) -> list[Array]:
-        """Poses of the assemblies that close."""
+        """Return the poses of the assemblies that close."""
         poses = []
         for assembly in self.mechanism.assemblies:
             with suppress(AssemblyError):
@@ -404,7 +412,7 @@ class PathClosure:
     def _unreachable(
         self, cause: str, detail: str, found: Shortfall, at: float, step: int, partial: RigidMotion | None
     ) -> UnreachablePathError:
-        """The error of a path that cannot be followed: time, place, and distance of its furthest point."""
+        """Return the error of a path that cannot be followed: time, position, and distance of its furthest point."""
         lengths, k = self.coordinates != 2, found.furthest
         # A closed path has the same distance at its start and end, which is reported once.
         if found.out[k] and found.beyond(k) != found.beyond(0):
@@ -425,7 +433,7 @@ class PathClosure:
 
 
 def with_marker(system: System, ref: PointRef) -> tuple[PackedSystem, int]:
-    """The packed system with one more marker, for a point that is not at a joint; rigid, so no shape rows."""
+    """Return the packed system with one more marker, for a point not at a joint; rigid, hence without shape rows."""
     marker = system.marker(ref)
     x, y = marker.x0
     record = records(MARKER, [{"body": marker.body, "bending": -1, "x": x, "y": y}])

@@ -1,4 +1,4 @@
-"""Laws of motion along a length: the modified trapezoidal one (Eqs. 62-63, as corrected), and one of limited speed."""
+"""Motion profiles along a length: modified trapezoidal (Eqs. 62-63, as corrected), and with limited speed."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from paraflex.arrays import Array
 
 @dataclass(frozen=True)
 class TrapezoidalLaw:
-    """Sine-shaped acceleration, cruise, sine-shaped deceleration, each lasting half a period T.
+    """Sine-shaped acceleration, cruise and sine-shaped deceleration, each of half a period T.
 
-    The acceleration is a_max sin(2 pi t/T) on [0, T/2), zero on [T/2, T), -a_max sin(2 pi t/T) on [T, 3T/2] with
-    T = sqrt(pi s/a_max). The cruise speed is a_max T/pi: Eq. 63 as printed has half of it, which its own
-    acceleration does not give and which would not cover the length.
+    The acceleration is a_max sin(2 pi t/T) on [0, T/2), zero on [T/2, T), -a_max sin(2 pi t/T) on [T, 3T/2] with T =
+    sqrt(pi s/a_max). The cruise speed is a_max T/pi. Eq. 63 as printed has half of it, which is inconsistent with its
+    own acceleration and would not cover the length.
 
     Attributes
     ----------
     length : float
-        Covered [m].
+        Length of the path [m].
     max_acceleration : float
-        [m/s^2]
+        Largest acceleration a_max [m/s^2].
     """
 
     length: float
@@ -47,7 +47,7 @@ class TrapezoidalLaw:
         return (0.0, 0.5 * T, T, 1.5 * T)
 
     def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Length covered [m], speed and acceleration at times t [s]; at rest outside the motion."""
+        """Return the length covered [m], speed and acceleration at times t [s]; at rest outside the motion."""
         T, a = self.period, self.max_acceleration
         t = np.clip(t, 0.0, self.duration)
         w = 2.0 * pi / T
@@ -58,17 +58,17 @@ class TrapezoidalLaw:
 
 @dataclass(frozen=True)
 class CruiseLaw:
-    """Sine-shaped acceleration to a speed, cruise, sine-shaped deceleration: a trapezoidal law without jumps.
+    """Sine-shaped acceleration to a speed, cruise, sine-shaped deceleration: a trapezoidal speed profile without jumps.
 
-    With the acceleration a sin(pi t/R) on [0, R] the speed 2 a R/pi is reached after its half times R. R is such that
-    this is the largest speed, or, where the length is too short for it, that nothing is left to cruise.
+    With the acceleration a sin(pi t/R) on [0, R] the speed 2 a R/pi is reached. R is such that this is the largest
+    speed or, if the length is too short for it, that there is no cruise.
 
     Attributes
     ----------
     length : float
-        Covered [m].
+        Length of the path [m].
     max_acceleration, max_speed : float
-        [m/s^2, m/s]
+        Largest acceleration [m/s^2] and speed [m/s].
     """
 
     length: float
@@ -99,7 +99,7 @@ class CruiseLaw:
         return (0.0, self.ramp, self.duration - self.ramp, self.duration)
 
     def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Length covered [m], speed and acceleration at times t [s]; at rest outside the motion."""
+        """Return the length covered [m], speed and acceleration at times t [s]; at rest outside the motion."""
         R, v, end = self.ramp, self.speed, self.duration
         w = pi / R
         covered, speed, rising, falling = _ramped(np.clip(t, 0.0, end), R, end - R, w, 0.5 * v, v)
@@ -109,9 +109,9 @@ class CruiseLaw:
 def _ramped(
     t: Array, ramp: float, slows: float, w: float, half: float, cruise: float
 ) -> tuple[Array, Array, Array, Array]:
-    """Length covered and speed at times t by ramps up from 0 and down from `slows` on, and times in either ramp.
+    """Return length covered and speed at times t for ramps up from 0 and down from `slows`, and times in either.
 
-    A ramp's acceleration is half w sin(w x), up to twice `half`, the speed of the cruise.
+    A ramp has the acceleration half * w * sin(w x); its speed rises to 2 * half, the cruise speed.
     """
     rising, falling = np.minimum(t, ramp), np.maximum(t - slows, 0.0)
 

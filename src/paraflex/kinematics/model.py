@@ -1,4 +1,4 @@
-"""Base class of models, which functions take in place of a mechanism: a mechanism, and paths by name."""
+"""Base class of models, which functions accept in place of a mechanism: a mechanism, and paths by name."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from paraflex.mechanism import Mechanism, Start
 
 
 class ModelWithPaths(Protocol):
-    """A mechanism with paths by name and a start of its own: what `paraflex.load` reads."""
+    """A mechanism with named paths and a start of its own, as `paraflex.load` returns it."""
 
     @property
     def mechanism(self) -> Mechanism:
-        """The mechanism."""
+        """Mechanism of the model."""
         ...
 
     @property
     def start(self) -> Start | None:
-        """The start of a run without a path; None for a start undeformed and at rest."""
+        """Start of a run without a path; None for a start undeformed and at rest."""
         ...
 
     def path(self, name: str | None = None) -> Path:
-        """A path by its name."""
+        """Return a path by its name."""
         ...

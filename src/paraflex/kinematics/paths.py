@@ -1,4 +1,4 @@
-"""Paths of the end-effector in the plane, with their time laws."""
+"""Paths of the end-effector in the plane, with their motion profiles."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from paraflex.kinematics.laws import CruiseLaw, TrapezoidalLaw
 from paraflex.limits import PATH_POINTS, at_most
 from paraflex.mechanism.quantities import finite, not_negative, positive
 
-# Points of Gauss's rule for the length between two knots of a path, or two points of a curve.
+# Number of Gauss points for the length between two knots of a path, or two points of a curve.
 _LENGTH_POINTS = 40
-# Newton's iterations for the place at a length, and what is left of the whole length.
+# Largest number of Newton iterations for the position at a length, and tolerance relative to the whole length.
 _NEWTON, _ON_CURVE = 30, 1e-14
-# Halvings of a time that leave its last digits, and what part of the motion two times are apart at least.
+# Number of bisections that find a time to its last digits, and least separation of two knots relative to the motion.
 _BISECTIONS, _SAME_KNOT = 60, 1e-6
 _LEAST_POINTS = 4
-# Paths of a sequence meet to this part of their place [m]: rounding of coordinates in files.
+# Largest gap between paths of a sequence, relative to coordinates above 1 m: rounding of coordinates in files.
 _GAP = 1e-9
 
 
@@ -46,7 +46,7 @@ class PathMotion(NamedTuple):
 )
 @runtime_checkable
 class Path(Protocol):
-    """A motion of a point in the plane: from rest to rest, then dwell."""
+    """Motion of a point in the plane, from rest to rest, followed by a dwell."""
 
     @property
     def duration(self) -> float:
@@ -59,7 +59,7 @@ class Path(Protocol):
         ...
 
     def evaluate(self, t: Array) -> PathMotion:
-        """The motion at times t [s]; values, velocities and accelerations are exact derivatives of one another."""
+        """Return the motion at times t [s]; velocity and acceleration are exact derivatives of the position."""
         ...
 
 
@@ -75,9 +75,9 @@ class Polygon(CheckedFields):
     Attributes
     ----------
     corners : sequence of (x, y)
-        [m]
+        Corners [m].
     max_acceleration : float
-        [m/s^2]
+        Largest acceleration [m/s^2].
     closed : bool
         Whether the last corner leads back to the first.
     """
@@ -128,7 +128,7 @@ class Polygon(CheckedFields):
         return (*times, self.duration)
 
     def evaluate(self, t: Array) -> PathMotion:
-        """The motion at times t."""
+        """Return the motion at times t [s]."""
         t = np.atleast_1d(t) * 1.0
         kind = np.result_type(t, self._starts, self._vertices)
         position = np.tile(self._vertices[0].astype(kind), (t.size, 1))
@@ -144,14 +144,14 @@ class Polygon(CheckedFields):
 
 @checked_arguments()
 def Line(start: Sequence[float], end: Sequence[float], max_acceleration: float) -> Polygon:
-    """A straight line from rest to rest: a polygon of one segment.
+    """Return a straight line from rest to rest: a polygon of one segment.
 
     Parameters
     ----------
     start, end : (x, y)
-        [m]
+        Ends of the line [m].
     max_acceleration : float
-        [m/s^2]
+        Largest acceleration [m/s^2].
     """
     return Polygon((_pair(start, "start"), _pair(end, "end")), max_acceleration, closed=False)
 
@@ -163,13 +163,13 @@ class Circle(CheckedFields):
     Attributes
     ----------
     centre : (x, y)
-        [m]
+        Centre [m].
     radius : float
-        [m]
+        Radius [m].
     max_acceleration : float
-        Along the path [m/s^2]; the centripetal one comes on top.
+        Largest acceleration along the path [m/s^2], without the centripetal one.
     start_angle : float
-        Of the first point, seen from the centre [rad].
+        Angle of the first point, seen from the centre [rad].
     sweep : float
         Angle swept, positive counter-clockwise; a full turn by default [rad].
     """
@@ -206,7 +206,7 @@ class Circle(CheckedFields):
         return self._law.knots
 
     def evaluate(self, t: Array) -> PathMotion:
-        """The motion at times t."""
+        """Return the motion at times t [s]."""
         s, speed, rate = self._law.evaluate(np.atleast_1d(t) * 1.0)
         sense = np.sign(np.real(self.sweep)) / self.radius
         angle, turn, dturn = self.start_angle + sense * s, sense * speed, sense * rate
@@ -221,14 +221,14 @@ class Circle(CheckedFields):
 
 @dataclass(frozen=True)
 class PointPath(CheckedFields):
-    """A smooth motion through points: a quintic spline in time, from rest to rest without acceleration.
+    """A smooth motion through points: a quintic spline in time, from rest to rest without acceleration at its ends.
 
     Attributes
     ----------
     points : sequence of (x, y) or (x, y, angle)
-        At least two [m]; the angles of the end-effector there, where they are given [rad].
+        Two points or more [m]; optionally with the angles of the end-effector there [rad].
     motion_time : float
-        From the first point to the last [s]; points are passed at times in proportion to the chords between them.
+        Time from the first point to the last [s]; points are passed at times in proportion to the chords between them.
     """
 
     _own = ("points",)
@@ -260,36 +260,36 @@ class PointPath(CheckedFields):
         return (0.0, self.motion_time)
 
     def evaluate(self, t: Array) -> PathMotion:
-        """The motion at times t."""
+        """Return the motion at times t [s]."""
         return PathMotion(*_rest_to_rest(self._spline, t, self.motion_time)[:, :, :2])
 
     def turning(self, t: Array) -> Array | None:
-        """Angle [rad] of the end-effector, its rate and acceleration at times t (3, k); None without angles."""
+        """Return the end-effector's angle [rad], its rate and acceleration at times t (3, k); None without angles."""
         return _rest_to_rest(self._spline, t, self.motion_time)[:, :, 2] if len(self.points[0]) > 2 else None
 
 
 @dataclass(frozen=True)
 class TabulatedPath(CheckedFields):
-    """A smooth curve through many points, such as those of a file, from rest to rest.
+    """A smooth curve through many points, for example those of a file, from rest to rest.
 
-    With times it is the motion that passes the points then, a quintic spline in time at rest at both ends. Without them
-    it is the natural quintic spline over the lengths of the chords, which the end-effector follows by a law along its
-    length: of a given time or acceleration the modified trapezoidal one, with a largest speed a `CruiseLaw`.
-    Accelerations are along the path; the centripetal one comes on top.
+    With times, the path is a quintic spline in time that passes the points at these times, at rest at both ends.
+    Without times, it is the natural quintic spline over the lengths of the chords, followed under a motion profile
+    along its length: the modified trapezoidal one for a given time or acceleration, a `CruiseLaw` with a largest speed.
+    Accelerations are along the path, without the centripetal one.
 
     Attributes
     ----------
     points : sequence of (x, y)
-        At least four [m].
+        Four points or more [m].
     times : sequence of float, optional
-        When they are passed, ascending; the motion starts with the first [s].
+        Times at which the points are passed, ascending; the motion starts with the first [s].
     motion_time, max_acceleration, max_speed : float, optional
-        The law without times: either its duration [s], or the largest acceleration [m/s^2] and perhaps speed [m/s].
+        Motion profile without times: its duration [s], or its largest acceleration [m/s^2] and optionally speed [m/s].
 
     Raises
     ------
     InputError
-        Fewer points, two neighbours that coincide, times that do not ascend, or more or less than one law.
+        There are fewer points, two neighbours coincide, times do not ascend, or no or several profiles are given.
     """
 
     _own = ("points",)
@@ -372,7 +372,7 @@ class TabulatedPath(CheckedFields):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """When the points are passed, at which the acceleration is smooth only to a degree; ends of the phases [s]."""
+        """Times of the points, where higher derivatives may jump, and ends of the phases of the profile [s]."""
         if self.times is not None:
             return tuple(time - self.times[0] for time in self.times)
         phases, passed = np.array(self._law.knots), self._passed
@@ -381,7 +381,7 @@ class TabulatedPath(CheckedFields):
 
     @cached_property
     def _passed(self) -> Array:
-        """When the law passes the inner points [s]."""
+        """Times at which the profile passes the inner points [s]."""
         law, at = self._law, self._curve.lengths[1:-1]
         real = type(law)(*(float(np.real(getattr(law, each.name))) for each in fields(law)))
         low, high = np.zeros(at.size), np.full(at.size, real.duration)
@@ -391,25 +391,25 @@ class TabulatedPath(CheckedFields):
             low, high = np.where(short, middle, low), np.where(short, high, middle)
         if law == real:
             return low
-        # One of Newton's steps gives the derivative of a law with a complex step.
+        # One Newton step carries the complex step of a profile to the times.
         covered, speed, _ = law.evaluate(low)
         return low - (covered - at) / speed
 
     def evaluate(self, t: Array) -> PathMotion:
-        """The motion at times t."""
+        """Return the motion at times t [s]."""
         if self.times is None:
             return self._curve.motion(*self._law.evaluate(np.atleast_1d(np.asarray(t, dtype=float))))
         return PathMotion(*_rest_to_rest(self._timed, t, self.duration))
 
 
 def _resting(times: Array, points: Array) -> scipy.interpolate.BSpline:
-    """The quintic spline through points (k, columns) at times (k,), at rest without acceleration at both ends."""
+    """Return the quintic spline through points (k, columns) at times (k,), at rest and unaccelerated at both ends."""
     rest = [(order, np.zeros(points.shape[1])) for order in (1, 2)]
     return scipy.interpolate.make_interp_spline(times, points, k=5, bc_type=(rest, rest))
 
 
 def _rest_to_rest(spline: scipy.interpolate.BSpline, t: Array, end: float) -> Array:
-    """Values of a spline on [0, end] and two derivatives (3, k, columns) at times t; at rest before and after."""
+    """Return values and two derivatives (3, k, columns) of a spline on [0, end] at times t; at rest outside."""
     t = np.atleast_1d(np.asarray(t, dtype=float))
     inside, x = ((t >= 0.0) & (t <= end))[:, None], np.clip(t, 0.0, end)
     return np.stack([spline(x), *(np.where(inside, spline(x, order), 0.0) for order in (1, 2))])
@@ -421,7 +421,7 @@ class _Curve:
     def __init__(self, points: Array) -> None:
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
         self._u = np.concatenate([[0.0], np.cumsum(chords)])
-        # Of all curves through the points that of least third derivative, which swings little at its ends.
+        # These end conditions give the curve of least third derivative through the points, which oscillates little.
         free = [(3, np.zeros(2)), (4, np.zeros(2))]
         self._spline = scipy.interpolate.make_interp_spline(self._u, points, k=5, bc_type=(free, free))
         self._z, self._w = np.polynomial.legendre.leggauss(_LENGTH_POINTS)
@@ -429,13 +429,13 @@ class _Curve:
         self.length = float(self.lengths[-1])
 
     def _arc(self, a: Array, b: Array) -> Array:
-        """Lengths between parameters a and b of one piece each."""
+        """Return the lengths between parameters a and b, each pair in one piece."""
         half = 0.5 * (b - a)
         speed = np.linalg.norm(self._spline(0.5 * (a + b)[:, None] + half[:, None] * self._z, 1), axis=-1)
         return half * (speed @ self._w)
 
     def _parameter(self, s: Array) -> Array:
-        """The parameters u (k,) at lengths s, by Newton's iteration in the piece that has them."""
+        """Return the parameters u (k,) at lengths s, by Newton's iteration in the piece of each."""
         piece = np.clip(np.searchsorted(self.lengths, s, side="right") - 1, 0, self._u.size - 2)
         left, right = self._u[piece], self._u[piece + 1]
         u = left + (right - left) * (s - self.lengths[piece]) / (self.lengths[piece + 1] - self.lengths[piece])
@@ -447,7 +447,7 @@ class _Curve:
         return u
 
     def motion(self, s: Array, rate: Array, second: Array) -> PathMotion:
-        """The motion of a point at lengths (k,), with their derivatives by time."""
+        """Return the motion of a point at lengths (k,), given with their time derivatives."""
         u = self._parameter(s)
         p, dp, ddp = (self._spline(u, k) for k in range(3))
         slope = np.linalg.norm(dp, axis=1)
@@ -458,19 +458,20 @@ class _Curve:
 
 @dataclass(frozen=True)
 class SequencePath(CheckedFields):
-    """Paths one after another in one motion, each from where the one before ends.
+    """Paths in sequence in one motion, each from the end of the one before.
 
     Attributes
     ----------
     paths : sequence of Path
-        At least two.
+        Two paths or more.
     dwell : float
-        Rest between two of them [s].
+        Rest between consecutive paths [s]; none by default.
 
     Raises
     ------
     InputError
-        Fewer paths, one that does not begin where that before it ends, or angles of the end-effector in some only.
+        There are fewer paths, a path does not begin at the end of the one before, or only some have angles of the
+        end-effector.
     """
 
     paths: tuple[Path, ...]
@@ -500,7 +501,7 @@ class SequencePath(CheckedFields):
 
     @property
     def _starts(self) -> list[float]:
-        """When each path begins, and when the last ends [s]."""
+        """Start times of the paths, and end of the last [s]."""
         starts: list[float] = [0.0]
         for path in self.paths:
             starts.append(starts[-1] + path.duration + self.dwell)
@@ -514,11 +515,11 @@ class SequencePath(CheckedFields):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Those of all paths [s]."""
+        """Knots of all paths [s]."""
         return tuple(start + knot for start, path in zip(self._starts, self.paths, strict=False) for knot in path.knots)
 
     def evaluate(self, t: Array) -> PathMotion:
-        """The motion at times t."""
+        """Return the motion at times t [s]."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
         out = np.zeros((3, t.size, 2))
         for here, path, time in self._each(t):
@@ -526,7 +527,7 @@ class SequencePath(CheckedFields):
         return PathMotion(*out)
 
     def turning(self, t: Array) -> Array | None:
-        """Angle [rad] of the end-effector, its rate and acceleration at times t (3, k); None without angles."""
+        """Return the end-effector's angle [rad], its rate and acceleration at times t (3, k); None without angles."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
         if turning_of(self.paths[0], t[:1]) is None:
             return None
@@ -536,7 +537,7 @@ class SequencePath(CheckedFields):
         return out
 
     def _each(self, t: Array) -> Iterator[tuple[NDArray[np.bool_], Path, Array]]:
-        """For each path which of the times are its own, and these counted from its start."""
+        """Yield for each path the mask of its times, the path, and these times counted from its start."""
         which = np.searchsorted(self._starts[1:-1], t, side="right")
         for k, path in enumerate(self.paths):
             if np.any(which == k):
@@ -544,21 +545,21 @@ class SequencePath(CheckedFields):
 
 
 def turning_of(path: Path, t: Array) -> Array | None:
-    """Angle of the end-effector and its two derivatives at times t (3, k); None if the path does not prescribe it."""
+    """Return the end-effector's angle and two derivatives at times t (3, k); None if the path does not prescribe it."""
     turning = getattr(path, "turning", None)
     return None if turning is None else turning(t)
 
 
 @checked_arguments()
 def length_fraction(path: Path, end: float) -> float:
-    """Fraction of a path's length passed by a time [s]: from 0 to 1."""
+    """Return the fraction of a path's length passed by a time [s], from 0 to 1."""
     if end >= path.duration:
         return 1.0
     return _length(path, end) / _length(path, path.duration)
 
 
 def _length(path: Path, end: float) -> float:
-    """Length passed by a time, by Gauss's rule between the knots [m]."""
+    """Return the length passed by a time, by Gauss quadrature between the knots [m]."""
     knots = np.unique([0.0, end, *(knot for knot in path.knots if 0.0 < knot < end)])
     z, w = np.polynomial.legendre.leggauss(_LENGTH_POINTS)
     half, middle = 0.5 * np.diff(knots)[:, None], 0.5 * (knots[1:] + knots[:-1])[:, None]

@@ -1,4 +1,4 @@
-"""Distances of places of the end-effector from the workspace: the nearest pose to each."""
+"""Distances of end-effector positions from the workspace: the nearest pose to each."""
 
 from __future__ import annotations
 
@@ -16,31 +16,32 @@ from paraflex.dynamics.projection import LeastChange, assemble, closed, shortene
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PointRef
 
-# A place nearer than this part of the mechanism's size to a pose is reached.
+# A position nearer than this fraction of the mechanism's size to a pose is reached.
 REACHED = 1e-8
-# Newton's iteration on the distance: how many, the longest step [sizes of the mechanism, rad], also where loops are
-# closed, the shortest, and the difference that second derivatives are taken by.
+# Newton's iteration on the distance: largest number, longest step [sizes of the mechanism, rad], also for closing
+# loops, shortest step, and step of the finite differences for second derivatives.
 _MAX_ITERATIONS, _LONGEST_MOVE, _SHORTEST_MOVE, _DIFFERENCE = 60, 0.5, 1e-12, 1e-6
 # A gradient or a curvature of the distance below this counts as zero.
 _FLAT = 1e-10
-# Number of further starts with bodies turned at random.
+# Number of additional starts with bodies at random angles.
 _SCATTERED = 4
-# Singular values below this part of the largest are of redundant constraints.
+# Singular values below this fraction of the largest belong to redundant constraints.
 _DEPENDENT = 1e-9
 
 
 class Nearest(NamedTuple):
-    """The pose nearest to a desired place.
+    """The pose nearest to a desired position.
 
     Attributes
     ----------
     q : (n,) array
+        Coordinates of the pose.
     distance : float
-        From the place wanted [m].
+        Distance from the desired position [m].
     turn : float
-        From the angle wanted, where the task has one [rad].
+        Rotation from the desired angle, if the task has one [rad].
     part : float
-        Of both, without dimension: zero where the place is reached.
+        Norm of both, dimensionless; zero if the position is reached.
     """
 
     q: Array
@@ -56,16 +57,16 @@ class Shortfall:
     Attributes
     ----------
     t : (k,) array
-        [s]
+        Instants [s].
     desired : (k, tasks) array
-        Task coordinates wanted [m, rad].
+        Desired task coordinates [m, rad].
     distance : (k,) array
-        From the nearest pose [m]; zero where the place is reached.
+        Distance from the nearest pose [m]; zero if the position is reached.
     turn : (k,) array
-        The same of the angle, where the task has one [rad].
+        Rotation from the nearest pose, if the task has an angle [rad].
     own : (k,) array
-        Both, without dimension, to the nearest pose found without going to another assembly: where this is not zero
-        and the others are, the place is reached, but only past a Type I singularity or in another assembly.
+        Norm of both, dimensionless, to the nearest pose found in the same assembly. If it is not zero and the others
+        are, the position is reached only past a Type I singularity or in another assembly.
     """
 
     t: Array
@@ -76,21 +77,21 @@ class Shortfall:
 
     @property
     def out(self) -> NDArray[np.bool_]:
-        """Instants at which no pose reaches the place (k,)."""
+        """Mask (k,) of instants at which no pose reaches the position."""
         return (self.distance > 0.0) | (self.turn > 0.0)
 
     @property
     def elsewhere(self) -> NDArray[np.bool_]:
-        """Instants at which poses reach the place, but none near the pose before (k,)."""
+        """Mask (k,) of instants at which poses reach the position, but none near the pose before."""
         return ~self.out & (self.own > 0.0)
 
     @property
     def furthest(self) -> int:
-        """The instant of the largest distance or, if all are zero, of the largest turn."""
+        """Index of the largest distance or, if all are zero, of the largest rotation."""
         return int(np.argmax(self.distance if np.any(self.distance) else self.turn))
 
     def beyond(self, k: int) -> str:
-        """Distance of the k-th place from the nearest pose, with units; empty if it is reached."""
+        """Format the distance of the k-th position from the nearest pose, with units; empty if it is reached."""
         parts = [
             f"{self.distance[k]:.3g} m" if self.distance[k] else "",
             f"{self.turn[k]:.3g} rad" if self.turn[k] else "",
@@ -98,7 +99,7 @@ class Shortfall:
         return " and ".join(filter(None, parts))
 
     def joined(self, more: Shortfall) -> Shortfall:
-        """These instants and others, in order of time."""
+        """Merge two sets of instants in order of time."""
         order = np.argsort(np.concatenate([self.t, more.t]), kind="stable")
         names = ("t", "desired", "distance", "turn", "own")
         return Shortfall(*(np.concatenate([getattr(self, name), getattr(more, name)])[order] for name in names))
@@ -106,17 +107,18 @@ class Shortfall:
 
 @dataclass(frozen=True)
 class PoseSearch:
-    """Search for the poses of a rigid mechanism that bring its end-effector nearest to places.
+    """Search for the poses of a rigid mechanism that bring its end-effector nearest to positions.
 
     Attributes
     ----------
     system : System
+        System of the rigid mechanism.
     point : PointRef
-        The end-effector.
+        Point of the end-effector.
     coordinates : (tasks,) array of int
-        0 x, 1 y, 2 angle.
+        Task coordinates: 0 for x, 1 for y, 2 for the angle.
     signals : Signals
-        Of prescribed motions.
+        Signals of prescribed motions.
     """
 
     system: System
@@ -125,10 +127,10 @@ class PoseSearch:
     signals: Signals
 
     def nearest(self, t: float, goal: Array, q: Array) -> Nearest:
-        """The pose nearest to a goal (tasks,) among those near a closed pose q.
+        """Find the pose nearest to a goal (tasks,) among those near a closed pose q.
 
-        Newton's method on half the square of the distance within the poses that the constraints allow, along the null
-        space of Phi_q; second derivatives are those of the Lagrangian, by differences.
+        Newton's method minimises half the squared distance within the admissible poses, along the null space of Phi_q;
+        second derivatives are those of the Lagrangian, by finite differences.
         """
         square, longest = self._square(q, goal), _LONGEST_MOVE
         for _ in range(_MAX_ITERATIONS):
@@ -154,13 +156,13 @@ class PoseSearch:
         return Nearest(q, float(np.linalg.norm(off[~angle])), float(np.linalg.norm(off[angle])), part)
 
     def closed(self, t: float, q: Array) -> Array | None:
-        """The pose with loops closed by least changes; None if they do not close."""
+        """Close the loops by least changes and return the pose; None if they do not close."""
         system = self.system
         pose, phi = assemble(system, self.signals, t, q, self._change_at, longest=_LONGEST_MOVE)
         return pose if closed(system, pose, phi) else None
 
     def tracked(self, times: Sequence[float] | Array, goals: Array, q: Array) -> list[Nearest]:
-        """The nearest poses to goals (k, tasks) at times (k,), each from the one before."""
+        """Find the nearest poses to goals (k, tasks) at times (k,), each from the one before."""
         found = []
         for t, goal in zip(times, goals, strict=True):
             start = self.closed(float(t), q)
@@ -169,9 +171,9 @@ class PoseSearch:
         return found
 
     def shortfall(self, times: Array, goals: Array, q: Array, others: Sequence[Array] = ()) -> Shortfall:
-        """Distances of goals (k, tasks) at times (k,) from the nearest poses, from a pose q onwards along them.
+        """Compute the distances of goals (k, tasks) at times (k,) from the nearest poses, from a pose q onwards.
 
-        Where other poses, or such from bodies turned at random, come nearer to the furthest goal these count too.
+        Other poses, given or with bodies at random angles, are used as well if they come nearer to the furthest goal.
         """
         found = self.tracked(times, goals, q)
         own = np.array([one.part for one in found])
@@ -187,7 +189,7 @@ class PoseSearch:
         return Shortfall(np.asarray(times, dtype=float), goals, distance, turn, own)
 
     def scattered(self, t: float, q: Array, count: int) -> Iterator[Array]:
-        """Closed poses found from bodies turned at random, as far as they close: other assemblies."""
+        """Yield closed poses found from bodies at random angles, if they close: other assemblies."""
         random, angles = np.random.default_rng(0), [body.angle for body in self.system.bodies]
         for _ in range(count):
             turned = q.copy()
@@ -202,7 +204,7 @@ class PoseSearch:
         return np.where(self.coordinates == 2, 1.0, self.system.size)
 
     def _task(self, q: Array) -> tuple[Array, Array]:
-        """Task coordinates (tasks,) and their derivatives (tasks, n)."""
+        """Return task coordinates (tasks,) and their derivatives (tasks, n)."""
         system = self.system
         place, rows = marker_place(system, system.marker(self.point), q[None])
         turn = np.zeros((1, system.n))
@@ -216,23 +218,23 @@ class PoseSearch:
         return float(off @ off)
 
     def _change_at(self, q: Array) -> LeastChange:
-        """The least change without dimension; dense, as a search closes thousands of poses."""
+        """Return the dimensionless least change; dense, as a search closes thousands of poses."""
         jacobian, units, row_units = self._jacobian(q), self.system.units, self.system.row_units
         return lambda phi: units * np.linalg.lstsq(jacobian, phi / row_units, rcond=_DEPENDENT)[0]
 
     def _jacobian(self, q: Array) -> Array:
-        """Phi_q without dimension."""
+        """Return the dimensionless Phi_q."""
         return self.system.jacobian(q) * self.system.units / self.system.row_units[:, None]
 
     def _slope(self, q: Array, goal: Array, multipliers: Array | None = None) -> tuple[Array, Array]:
-        """Gradient of half the squared distance, with multipliers that of the Lagrangian; and Phi_q."""
+        """Return the gradient of half the squared distance, or of the Lagrangian with multipliers; and Phi_q."""
         values, rows = self._task(q)
         jacobian = self._jacobian(q)
         slope = (rows * self.system.units / self._units[:, None]).T @ ((values - goal) / self._units)
         return (slope if multipliers is None else slope + jacobian.T @ multipliers), jacobian
 
     def _step(self, goal: Array, q: Array, longest: float) -> Array:
-        """A step towards the nearest pose within the null space of the constraints, without dimension."""
+        """Return a dimensionless step towards the nearest pose within the null space of the constraints."""
         slope, jacobian = self._slope(q, goal)
         left, sizes, right = np.linalg.svd(jacobian)
         rank = int(np.sum(sizes > _DEPENDENT * np.max(sizes, initial=0.0)))
@@ -245,7 +247,7 @@ class PoseSearch:
         curvature = free.T @ np.column_stack(columns) / _DIFFERENCE if columns else np.zeros((0, 0))
         values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
         along = vectors.T @ (free.T @ slope)
-        # Downhill whatever the sign of the curvature; from a place without a slope, where the distance curves down.
+        # The step goes downhill for any sign of the curvature; at a zero gradient, along negative curvature.
         scale = np.maximum(np.abs(values), _FLAT)
         move = -along / scale
         if values.size and np.max(np.abs(along)) <= _FLAT and values[0] < -np.sqrt(_FLAT):

@@ -1,4 +1,4 @@
-"""Derivatives of the motion along a path by parameters: the equations of closed loops, differentiated."""
+"""Derivatives of the motion along a path by parameters, from the differentiated equations of closed loops."""
 
 from __future__ import annotations
 
@@ -16,20 +16,22 @@ from paraflex.kinematics.closure import PathClosure, RigidMotion
 
 
 class Nearby(NamedTuple):
-    """The closure at one point of a difference.
+    """The closure at one point of a finite difference.
 
     Attributes
     ----------
     place : float
-        In units of the parameter.
+        Offset of the parameter, in its units.
     weight : float
-        Of what is found there, for the derivative.
+        Weight of the residuals there in the derivative.
     packed : PackedSystem
-        With the marker of the task.
+        Packed system with the marker of the task.
     signals : Signals
+        Signals of prescribed motions.
     times : (k,) array
-        [s]
+        Sample times [s].
     target : (k, 3, tasks) array
+        Task coordinates and two derivatives.
     """
 
     place: float
@@ -41,7 +43,7 @@ class Nearby(NamedTuple):
 
 
 class MotionChange(NamedTuple):
-    """Derivatives of a motion along a path: those of coordinates, velocities, accelerations (k, n) and basis."""
+    """Derivatives of a motion along a path: coordinates, velocities, accelerations (k, n) and basis."""
 
     q: Array
     v: Array
@@ -50,17 +52,19 @@ class MotionChange(NamedTuple):
 
 
 def motion_sensitivity(closure: PathClosure, motion: RigidMotion, nearby: Sequence[Nearby]) -> MotionChange:
-    """Derivatives of the motion of closed loops by a parameter, exact to rounding.
+    """Compute the derivatives of the motion of closed loops by a parameter, exact to rounding.
 
-    F(x, s) = 0 gives dx = -F_x^-1 F_s for positions, then for velocities, the basis and the accelerations, in each of
-    which those before stand along their derivatives. F_s is a difference: F is smooth, and nothing is iterated.
+    F(x, s) = 0 gives dx = -F_x^-1 F_s for positions, then for velocities, the basis and the accelerations; each stage
+    uses the derivatives of the stages before. F_s is a finite difference: F is smooth, and no iteration is involved.
 
     Parameters
     ----------
     closure : PathClosure
-        Of the motion.
+        Closure of the motion.
     motion : RigidMotion
+        Motion at the nominal parameter.
     nearby : sequence of Nearby
+        Points of the finite difference.
     """
     zero = MotionChange(*(np.zeros_like(x) for x in (motion.q, motion.v, motion.a, motion.basis)))
     found, jacobians = _residual_change(closure, motion, zero, nearby)
@@ -75,7 +79,7 @@ def motion_sensitivity(closure: PathClosure, motion: RigidMotion, nearby: Sequen
 
 
 def _solved(jacobians: Array, right: Array) -> Array:
-    """Solution with one correction by iterative refinement, as rows of metres and of angles differ in scale."""
+    """Solve with one step of iterative refinement, as rows of metres and of angles differ in scale."""
     x = np.linalg.solve(jacobians, right)
     return x + np.linalg.solve(jacobians, right - jacobians @ x)
 
@@ -83,7 +87,7 @@ def _solved(jacobians: Array, right: Array) -> Array:
 def _residual_change(
     closure: PathClosure, motion: RigidMotion, change: MotionChange, nearby: Sequence[Nearby]
 ) -> tuple[Array, Array]:
-    """Derivative of the residuals along a change of the motion, and the Jacobians of the motion itself."""
+    """Return the derivative of the residuals along a change of the motion, and the Jacobians of the motion itself."""
     total = np.zeros((*motion.q.shape, 3 + closure.coordinates.size))
     target = closure.target(motion.path, motion.t)
     here, jacobians = _residuals(closure, closure.packed, closure.signals, motion.t, target, motion)
@@ -92,7 +96,7 @@ def _residual_change(
             *(x + near.place * dx for x, dx in zip((motion.q, motion.v, motion.a, motion.basis), change, strict=True))
         )
         found, _ = _residuals(closure, near.packed, near.signals, near.times, near.target, moved)
-        # Less what there is here: what does not change leaves no rounding.
+        # Subtracting the nominal residuals cancels the rounding of entries that do not change.
         total += near.weight * (found - here)
     return total, jacobians
 

@@ -1,8 +1,8 @@
-"""Bases of bodies from deflections: the directions of most strain energy (proper orthogonal decomposition).
+"""Bases of bodies from deflections: the directions of largest strain energy (proper orthogonal decomposition).
 
 Deflections u of a body, in modes of unit mass and frequencies omega, have the strain energy |omega u|^2 / 2. The
-singular value decomposition of omega u over all deflections gives directions and what each holds of the energy; of all
-bodies together those are kept that hold most.
+singular value decomposition of omega u over all deflections gives directions and their shares of the energy. The
+directions with the largest shares are kept, over all bodies together.
 """
 
 from __future__ import annotations
@@ -16,24 +16,26 @@ from paraflex.dynamics import System
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import InputError
 
-# Directions that hold less than this part of the energy's root are rounding.
+# Directions with less than this fraction of the largest root of energy are rounding.
 _ROUNDING = 1e-10
 
 
 def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[str, tuple[tuple[float, ...], ...]]:
-    """Flexible coordinates (own, kept) of every flexible body, so many in all, in those of its reference condition.
+    """Return reduced flexible coordinates (own, kept) of every flexible body, in those of its reference condition.
 
     Parameters
     ----------
     system : System
+        System with all flexible coordinates.
     deflections : sequence of (k, n) arrays
-        Coordinates of the system; each array counts as much as the others, by its strain energy.
+        Coordinates of the system; all arrays have equal weight by their strain energy.
     count : int
+        Number of coordinates kept, over all bodies together.
 
     Raises
     ------
     InputError
-        More than there are, or than the deflections tell apart.
+        The count exceeds the number of flexible coordinates, or of independent directions in the deflections.
     """
     _check(system, count)
     together = of_one_energy(system, deflections)
@@ -43,7 +45,7 @@ def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[s
         directions, sizes, _ = np.linalg.svd(energies.T, full_matrices=False)
         shapes = body.modes.vectors @ (directions / body.modes.omega[:, None])
         found += [(size, body.name, shapes[:, k]) for k, size in enumerate(sizes.tolist())]
-    # Of two that are the same the first body's comes first.
+    # Equal directions keep the order of their bodies.
     kept = sorted(found, key=lambda one: -one[0])[:count]
     if not kept or kept[-1][0] <= _ROUNDING * kept[0][0]:
         told = sum(size > _ROUNDING * kept[0][0] for size, _, _ in found) if kept else 0
@@ -70,7 +72,7 @@ def _check(system: System, count: int) -> None:
 
 
 def of_one_energy(system: System, parts: Sequence[Array]) -> Array:
-    """Deflections (k, n) that have one unit of strain energy together, as much from each part (any, n)."""
+    """Scale deflections (k, n) to one unit of strain energy in total, with equal shares of each part (any, n)."""
     stiffness = stiffness_diagonal(system)
     energies = [np.sum(part**2 @ stiffness) for part in parts]
     bent = [part / np.sqrt(energy) for part, energy in zip(parts, energies, strict=True) if energy > 0.0]

@@ -1,16 +1,17 @@
-"""Deflections along a planned motion without a run: bodies bent statically by its inertia, loads and torques.
+"""Deflections along a planned motion without a run: static deflections under its inertia, loads and torques.
 
-At an instant of the rigid motion the forces -(M a + h) of inertia, loads and motors are in balance. They bend the
+At an instant of the rigid motion the forces -(M a + h) of inertia, loads and motors are in balance. They deflect the
 mechanism, undeformed in its nominal pose, by
 
     (K + e M) x + Phi_q^T mu = f,    Phi_q x = 0
 
-with a multiple e of the mass that is small beside the stiffness: of motions that are free, x is the one that carries no
-momentum. A force at the end-effector is balanced by the inertia of the free motion that it causes (inertia relief).
+with a multiple e of the mass that is small against the stiffness: among solutions that differ by free motions, x is the
+one without momentum. A force at the end-effector is balanced by the inertia of the free motion that it causes (inertia
+relief).
 
-Bodies also vibrate. To each x comes what its own inertia bends, y with M x in place of f, times x^T K x / x^T M x:
-load-dependent Ritz vectors (Wilson, Yuan and Dickens 1982, Earthquake Eng. Struct. Dyn. 10, 813-821), which tend to the
-lowest modes that the forces excite.
+Bodies also vibrate. Each x is complemented by the deflection y under its own inertia, with M x in place of f, times x^T
+K x / x^T M x: load-dependent Ritz vectors (Wilson, Yuan and Dickens 1982, Earthquake Eng. Struct. Dyn. 10, 813-821),
+which tend to the lowest modes that the forces excite.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode
 from paraflex.tracking import TrackingTask, undeformed_at
 
-# Instants of the motion along the path.
+# Number of instants of the motion along the path.
 _INSTANTS = 12
-# The multiple of the mass, in squares of the lowest frequency of any body: what it adds to a deflection.
+# Multiple of the mass, relative to the squared lowest frequency of any body: its relative effect on a deflection.
 _FREE = 1e-6
 
 
@@ -54,7 +55,7 @@ class PlannedDeflections:
         self._structures = [_Structure(task.system, pose) for pose in self._q]
 
     def of_mode(self, mode: ActuationMode) -> Array:
-        """Under the torques of a mode, inertia and loads, then what the inertia of these bends (2 instants, n).
+        """Return deflections (2 instants, n) by a mode's torques, inertia and loads, then by their own inertia.
 
         Raises
         ------
@@ -70,9 +71,9 @@ class PlannedDeflections:
         return _ritz_vectors(zip(self._structures, -forces, strict=True))
 
     def of_end_effector(self) -> Array:
-        """Under unit forces at the end-effector along x and y, then what the inertia of these bends (4 instants, n).
+        """Return deflections (4 instants, n) by unit end-effector forces along x and y, then by their own inertia.
 
-        They bend bodies in proportion to how far deflections of these move it.
+        They deflect bodies in proportion to the effect of these deflections on the end-effector's position.
         """
         system = self.task.system
         effector = system.mechanism.end_effector
@@ -83,13 +84,13 @@ class PlannedDeflections:
 
 
 def _instants(t: Array, end: float) -> list[int]:
-    """Samples evenly spaced within the motion along the path, its ends left out."""
+    """Return samples evenly spaced within the motion along the path, without its ends."""
     last = int(np.searchsorted(t, end, side="right")) - 1
     return np.unique(np.linspace(0, last, _INSTANTS + 2).astype(int)[1:-1]).tolist()
 
 
 class _Structure:
-    """The equations of a pose, factored."""
+    """Factorised equations of a pose."""
 
     def __init__(self, system: System, q: Array) -> None:
         self.mass = sparse_mass(system, q)
@@ -99,14 +100,14 @@ class _Structure:
         self._saddle = Saddle(scipy.sparse.csr_matrix(stiffness + self._little), sparse_jacobian(system, q))
 
     def bent(self, force: Array) -> Array:
-        """Static displacements (n,) under forces (n,) that the inertia of free motions balances."""
-        # Of forces that are not in balance nearly all of this is free motion; what holds it in place is that inertia.
+        """Return static displacements (n,) under forces (n,) that the inertia of free motions balances."""
+        # Under unbalanced forces nearly all of this is free motion, whose inertia holds the mechanism in place.
         moved = self._saddle.solve(force)[0]
         return self._saddle.solve(force - self._little @ moved)[0]
 
 
 def _ritz_vectors(loaded: Iterable[tuple[_Structure, Array]]) -> Array:
-    """Static displacements under forces, then under the inertia of these, of their size (2 k, n)."""
+    """Return static displacements under forces, then under their own inertia, scaled to the same size (2 k, n)."""
     first, second = [], []
     for structure, force in loaded:
         x = structure.bent(force)

@@ -1,4 +1,4 @@
-"""A mechanism whose bodies keep few flexible coordinates, chosen for a planned motion or from runs."""
+"""Mechanism with reduced flexible coordinates, chosen for a planned motion or from runs."""
 
 from __future__ import annotations
 
@@ -21,30 +21,36 @@ def reduced_mechanism(
     *,
     modes: Sequence[str | ActuationMode] | None = None,
 ) -> Mechanism:
-    """The mechanism with few flexible coordinates, all bodies together; equations, joints and geometry stay.
+    """Return the mechanism with few flexible coordinates in total; equations, joints and geometry are unchanged.
 
-    Kept are the shapes that hold most of the strain energy: of static deflections under inertia, loads and torques of a
-    planned motion, so that no run is needed; or of runs (proper orthogonal decomposition). Those of forces at the
-    end-effector count as much, as they tell what moves it. A body that hardly bends keeps none. The mechanism is for
-    motions like that one: `TrackingTask.remodelled` applies the plan to it, `simulate_motion` takes it.
+    The kept shapes are those with the most strain energy: in static deflections under inertia, loads and torques of a
+    planned motion, so that no run is needed; or in runs (proper orthogonal decomposition). Deflections under forces at
+    the end-effector have the same weight, as they show what moves it. A body that hardly deflects keeps no shapes. The
+    mechanism suits motions like the given one: `TrackingTask.remodelled` applies the plan to it, `simulate_motion`
+    accepts it.
 
     Parameters
     ----------
     along : TrackingTask, or one or several runs
-        What it is to be good for; runs of one mechanism.
+        Planned motion, or runs of one mechanism, for which the reduction is chosen.
     coordinates : int
-        How many are kept.
+        Number of flexible coordinates kept, over all bodies together.
     modes : sequence of str or ActuationMode, optional
-        Of a plan: by default those of the mechanism, or all motors. One that cannot drive the mechanism along the path
-        does not count, unless none can.
+        Actuation modes of a plan; by default those of the mechanism, or all motors. A mode that cannot drive the
+        mechanism along the path is left out, unless no mode can.
+
+    Returns
+    -------
+    Mechanism
+        Reduced mechanism.
 
     Raises
     ------
     InputError
-        Rigid bodies only; no such number of coordinates; more than the motion tells apart; runs of several mechanisms;
-        modes beside runs.
+        All bodies are rigid; the number of coordinates is out of range or above the number of directions in the motion;
+        runs are of several mechanisms; or modes are given with runs.
     ActuationError, SingularActuationError
-        None of the modes can drive the mechanism along the path.
+        No mode can drive the mechanism along the path.
     """
     if isinstance(along, TrackingTask):
         return _along_plan(along, coordinates, modes)
@@ -69,7 +75,7 @@ def _along_plan(task: TrackingTask, count: int, modes: Sequence[str | ActuationM
 
 
 def _from_runs(runs: Sequence[TrackingRun | MotionRun], count: int) -> Mechanism:
-    """By proper orthogonal decomposition of their coordinates; along a path with forces at the end-effector."""
+    """Reduce by proper orthogonal decomposition of the runs, and of forces at the end-effector along a path."""
     systems = [run.task.system if isinstance(run, TrackingRun) else run.system for run in runs]
     if not systems or any(system.mechanism != systems[0].mechanism for system in systems):
         raise InputError("are not of one mechanism", field="along", remedy="give one or several runs of one")

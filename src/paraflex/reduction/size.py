@@ -1,4 +1,4 @@
-"""Size of a system: its flexible coordinates, and the states of its motion."""
+"""Size of a system: number of its flexible coordinates, and of the states of its motion."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from paraflex.dynamics.rank import dependence
 
 
 class Size(NamedTuple):
-    """How many flexible coordinates a system has, and how many states its motion at a pose."""
+    """Number of flexible coordinates of a system, and of states of its motion at a pose."""
 
     flexible_coordinates: int
     states: int
 
 
 def size_of(system: System, state: State) -> Size:
-    """Size of a system at a state: twice the coordinates that its constraints leave free, and its flexible ones."""
+    """Return the size of a system at a state; the states are twice the degrees of freedom."""
     return Size(system.n_flexible, 2 * (system.n - dependence(system, state.q).rank))

@@ -1,7 +1,7 @@
-"""Does the model hold for a run? What its geometry leaves out, found from the samples that the run kept.
+"""Validity of a model for a run: size of the effects that its geometry neglects, from the stored samples.
 
-Linear geometry leaves out that beams shorten as they bend, and what axial forces do to their bending. Second order has
-both, and leaves out terms of fourth order in the slopes.
+Linear geometry neglects the shortening of beams by bending, and the effect of axial forces on bending. Second-order
+geometry includes both, and neglects terms of fourth order in the slopes.
 """
 
 from __future__ import annotations
@@ -40,54 +40,56 @@ from paraflex.validity.plausibility import (
 
 @dataclass(frozen=True)
 class Validity:
-    """How far a run is within what its model can describe.
+    """Validity of a model for a run.
 
     Attributes
     ----------
     indicators : tuple of Indicator
-        One or more.
+        Indicators, one or more.
     """
 
     indicators: tuple[Indicator, ...]
 
     @property
     def worst(self) -> Indicator:
-        """The indicator nearest to its limit, or furthest beyond."""
+        """Indicator nearest to its limit, or furthest beyond it."""
         return max(self.indicators, key=lambda one: one.ratio)
 
     @property
     def ratio(self) -> float:
-        """Its value over its limit: the model holds up to 1."""
+        """Value over limit of the worst indicator: the model holds up to 1."""
         return self.worst.ratio
 
     @property
     def holds(self) -> bool:
-        """Whether all are within their limits."""
+        """Whether all indicators are within their limits."""
         return self.ratio <= 1.0
 
     @property
     def verdict(self) -> str:
-        """One sentence: whether the model holds, by what, and what to do if it does not."""
+        """One sentence: whether the model holds, by which indicator, and the remedy if it does not."""
         if self.holds:
             return f"{self.worst.geometry} geometry holds: {self.worst.text}"
         found = self.finding()
         return f"{found.text}; {found.remedy}"
 
     def finding(self, whose: str = "") -> Finding:
-        """The verdict on a run that is beyond what its model can describe."""
+        """Return the finding for a run beyond the range of its model."""
         worst = self.worst
         return Finding("validity", whose, f"{worst.geometry} geometry does not hold: {worst.text}", worst.remedy)
 
 
 def assess(system: System, solution: Solution, following: Following | None = None) -> Validity | None:
-    """How far a run is within what its model can describe; None where no body is flexible.
+    """Assess the validity of a model for a run; None if no body is flexible, or if a failed run is within its range.
 
     Parameters
     ----------
     system : System
+        System of the run.
     solution : Solution
+        Samples of the run.
     following : Following, optional
-        Of a run along a path that torques drive.
+        Deviation from the path, for a run along a path driven by torques.
     """
     if not solution.t.size:
         return None
@@ -95,14 +97,14 @@ def assess(system: System, solution: Solution, following: Following | None = Non
     linear, second = [one for one in bodies if one.linear], [one for one in bodies if not one.linear]
     indicators = [*of_linear(linear, solution, following), *of_second_order(second, solution)]
     if not (solution.method or solution.resting):
-        # Kineto-elastodynamics is linear in the displacements whatever the geometry.
+        # Kineto-elastodynamics is linear in the displacements for any geometry.
         indicators = [replace(one, remedy="run it without --ked, in second-order geometry") for one in indicators]
     found = Validity(tuple(indicators)) if indicators else None
-    # That the part before a failure is within the model would be no verdict on the run.
+    # Validity up to a failure is no verdict on the whole run.
     return None if found is not None and found.holds and solution.status == "failed" else found
 
 
 def warn(validity: Validity | None, whose: str = "") -> None:
-    """Issue a `ValidityWarning` where a model does not hold; `whose` run it is, say "mode ++", stands before it."""
+    """Issue a `ValidityWarning` if a model does not hold; `whose` names the run, for example "mode ++"."""
     if validity is not None and not validity.holds:
         warn_of([validity.finding(whose)], ValidityWarning)

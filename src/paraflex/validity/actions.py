@@ -1,6 +1,6 @@
-"""Is what joins and moves a mechanism plausible? Joints given twice, springs, friction, damping and loads.
+"""Plausibility of joints and actions: joints given twice, springs, friction, damping and loads.
 
-As in `numbers`, each bound is wide, and what lies beyond it is hardly ever meant.
+As in `numbers`, each bound is wide: values beyond it are hardly ever intended.
 """
 
 from __future__ import annotations
@@ -15,31 +15,32 @@ from paraflex.mechanism.bodies import Body
 from paraflex.mechanism.damping import LossFactor, ModalDamping
 from paraflex.mechanism.joints import PointRef
 
-# All forces applied over the weight of all bodies: of a machine that carries its weight, and of one in no gravity.
+# Sum of applied forces relative to the weight of all bodies, for a mechanism under gravity and without gravity.
 LOADED, LOADED_AT_REST = 100.0, 1000.0
-# Dry friction over what the weight of all bodies would do at the joint: where it turns, at the mechanism's size.
+# Dry friction relative to the torque (at the mechanism's size) or force that the weight of all bodies exerts.
 RUBBING_TURN, RUBBING_SLIDE = 30.0, 100.0
-# Speed of a friction law [rad/s or m/s] below which steps have nothing to hold on to.
+# Speed of a friction law [rad/s or m/s] below which time steps become very small.
 SHARP = 1e-5
-# A ratio of structural damping beyond this is no structure's, not even of rubber.
+# Ratio of structural damping above that of any structure, even of rubber.
 DAMPED = 0.5
-# Free length of a spring over the mechanism's size.
+# Free length of a spring relative to the mechanism's size.
 LONG = 5.0
 _G = 9.81
 
 
 def doubtful_actions(mechanism: Mechanism, size: float, mass: float, times: Array) -> Iterator[Finding]:
-    """Findings about joints, springs, friction, damping and loads, from the description alone.
+    """Yield findings about joints, springs, friction, damping and loads, from the description alone.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism as described.
     size : float
-        The largest of its lengths [m].
+        Largest length of the mechanism [m].
     mass : float
-        Of all its bodies [kg].
+        Mass of all its bodies [kg].
     times : (k,) array
-        At which loads in time are looked at [s].
+        Times at which loads in time are evaluated [s].
     """
     yield from _twice(mechanism)
     yield from _beside(mechanism)
@@ -65,7 +66,7 @@ def _twice(mechanism: Mechanism) -> Iterator[Finding]:
 
 
 def _beside(mechanism: Mechanism) -> Iterator[Finding]:
-    """Two joints at one numbered point of a body, and none at another: B2 and B3 both at B3."""
+    """Yield findings of two joints at one numbered point of a body, and none at another: B2 and B3 both at B3."""
     held: dict[PointRef, list[str]] = {}
     for joint in mechanism.joints:
         for point in (joint.a, joint.b):
@@ -84,7 +85,7 @@ def _beside(mechanism: Mechanism) -> Iterator[Finding]:
 
 
 def numbered_alike(one: PointRef, other: PointRef) -> bool:
-    """Whether two points have one name but for the number at its end."""
+    """Return whether two points have the same name except for the number at its end."""
     return one.point.rstrip("0123456789") == other.point.rstrip("0123456789")
 
 
@@ -106,7 +107,7 @@ def _springs(mechanism: Mechanism, size: float) -> Iterator[Finding]:
 
 
 def _places(mechanism: Mechanism) -> dict[PointRef, PointRef]:
-    """For each point of a pin or weld, one that stands for all points there."""
+    """Return for each point of a pin or weld a representative of all points at its position."""
     place: dict[PointRef, PointRef] = {}
     for joint in mechanism.joints:
         if "points" in joint.holds:
@@ -127,7 +128,7 @@ def _damped(mechanism: Mechanism) -> Iterator[Finding]:
 
 
 def _damping_ratio(body: Body) -> tuple[float, str]:
-    """The largest damping ratio of a body's structure, and which field gives it."""
+    """Return the largest damping ratio of a body's structure, and the field that gives it."""
     damping = body.damping if isinstance(body, FlexibleBeam | AssumedModesBeam | ModalBody) else None
     if isinstance(damping, ModalDamping):
         return max(damping.ratios, default=0.0), "ratios are each"
@@ -167,7 +168,7 @@ def _loaded(mechanism: Mechanism, size: float, weight: float, times: Array) -> I
         try:
             largest = load.largest(times)
         except InputError:
-            # As of a prescribed law: a run that does not end earlier says what is wrong.
+            # A prescribed law may be undefined beyond an earlier end of the run; otherwise the run reports the error.
             continue
         if largest > (most if force else most * size):
             yield Finding(

@@ -1,4 +1,4 @@
-"""How far each flexible body of a run bent, and what axial force it carried."""
+"""Bending of each flexible body over a run, and its axial force."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from paraflex.kernel.packed import POINT
 from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam
 from paraflex.mechanism.bodies import span_properties
 
-# Coordinates that hold less than this of the stiffness of a uniform stretch do not tell the axial force.
+# Coordinates with less than this fraction of the stiffness of uniform stretch do not give the axial force.
 _STRETCHES = 0.5
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
 class Bending(NamedTuple):
-    """A flexible body over the k samples.
+    """Bending of a flexible body over the k samples.
 
     Attributes
     ----------
     name : str
-        Of the beam that it is a part of, where that has several frames.
+        Name of the body; that of the whole beam if it has several frames.
     frames : int
-        How many that has.
+        Number of frames of the whole beam.
     linear : bool
         Whether its geometry is linear.
     given : bool
-        Whether its shapes are the user's own: its geometry is linear in any mechanism.
+        Whether its shapes are given by the user: its geometry is then linear in any mechanism.
     tangent : bool
         Whether its frame is on the tangent at its first end.
     slope : (k,) array
-        Largest along it, in its frame [rad].
+        Largest slope along it, in its frame [rad].
     shortening : (k,) array
-        1/2 int slope^2 dx [m]; NaN of a modal body.
+        Shortening by bending, 1/2 int slope^2 dx [m]; NaN for a modal body.
     axial : (k,) array
-        Axial force where it is largest, over the buckling load of the body as its frame holds it; positive in
-        tension; NaN of a modal body.
+        Largest axial force relative to the buckling load of the body as held by its frame; positive in tension; NaN for
+        a modal body.
     """
 
     name: str
@@ -56,13 +56,13 @@ class Bending(NamedTuple):
 
 
 def bending_of(system: System, name: str, solution: Solution) -> Bending:
-    """How a flexible body bent over a run of one or more samples."""
+    """Return the bending of a flexible body over a run of one or more samples."""
     body, described = system.body(name), system.mechanism.body(name)
     u, line = solution.q[:, body.flexible], _line(body, described)
     given = not isinstance(described, FlexibleBeam)
     tangent = not given and described.reference is ReferenceCondition.CANTILEVER
     slopes = u @ line.slopes.T
-    # Slopes are largest at ends more often than not, and Gauss points stop short of them.
+    # Slopes are usually largest at the ends, which Gauss points do not include.
     ends = u @ (body.shape.slopes @ body.integrals.D).T
     slope = np.maximum(np.max(np.abs(slopes), axis=1, initial=0.0), np.max(np.abs(ends), axis=1, initial=0.0))
     shortening = axial = np.full(solution.t.size, np.nan)
@@ -76,7 +76,7 @@ def bending_of(system: System, name: str, solution: Solution) -> Bending:
 class _Line(NamedTuple):
     """Stations along a body: weights of an integral over its length [m], slopes and strains per coordinate, E A [N].
 
-    Of a modal body there are none.
+    A modal body has no stations.
     """
 
     weights: Array
@@ -86,7 +86,7 @@ class _Line(NamedTuple):
 
 
 def _line(body: BodyCoordinates, described: Body) -> _Line:
-    """Gauss points of a beam, or of a bar of assumed modes."""
+    """Return the Gauss points of a beam, or of a bar of assumed modes."""
     D = body.integrals.D
     if isinstance(described, FlexibleBeam):
         mesh, spans = described.mesh, described.spans
@@ -111,22 +111,22 @@ def _line(body: BodyCoordinates, described: Body) -> _Line:
 
 
 def _buckling_load(body: BodyCoordinates, line: _Line) -> float:
-    """Least uniform axial force under which the body buckles, held as its frame holds it [N].
+    """Return the least uniform axial force under which the body buckles, held as by its frame [N].
 
-    Coordinates are modes of stiffness omega^2: 1 / N is the largest eigenvalue of W^-1 G W^-1, W = diag(omega),
-    G = int slope^T slope dx.
+    Coordinates are modes of stiffness omega^2: 1 / N is the largest eigenvalue of W^-1 G W^-1, W = diag(omega), G = int
+    slope^T slope dx.
     """
     largest = np.linalg.norm(np.sqrt(line.weights)[:, None] * line.slopes / body.modes.omega, ord=2) ** 2
     return float(1.0 / largest) if largest > 0.0 else np.inf
 
 
 def _axial_force(system: System, body: BodyCoordinates, line: _Line, solution: Solution) -> Array:
-    """Axial force where it is largest, positive in tension (k,) [N].
+    """Return the largest axial force, positive in tension (k,) [N].
 
-    That of the stretch; where the coordinates do not stretch, as of a beam reduced to its lowest modes, the largest
-    part along the body of its joints' forces, taken as compression.
+    It is that of the stretch. If the coordinates do not stretch, as for a beam reduced to its lowest modes, it is the
+    largest component along the body of its joints' forces, taken as compression.
     """
-    # How much of what a uniform tension stretches is left in the coordinates.
+    # Compliance of the coordinates under uniform tension.
     tension = line.weights @ line.strains / body.modes.omega
     if tension @ tension >= _STRETCHES * np.sum(line.weights / line.stiffness):
         found = solution.q[:, body.flexible] @ (line.stiffness[:, None] * line.strains).T
@@ -138,6 +138,6 @@ def _axial_force(system: System, body: BodyCoordinates, line: _Line, solution: S
     for port in system.packed.ports[record["port"] : record["port_end"]]:
         if port["kind"] == POINT:
             x, y = solution.multipliers[:, port["row"] : port["row"] + 2].T
-            # Multipliers have a pole at singular positions: NaN there.
+            # Multipliers have a pole at singular configurations, and are NaN there.
             largest = np.fmax(largest, np.abs(port["weight"] * (c * x + s * y)))
     return -largest

@@ -1,4 +1,4 @@
-"""Numbers that tell whether a model holds, each with its limit.
+"""Indicators of a model's validity, each with its limit.
 
 Limits were measured by `benchmarks/validity.py`; its tables are in `docs/validity.md`.
 """
@@ -18,49 +18,49 @@ from paraflex.validity.bending import Bending
 
 Number = TypeVar("Number", float, Array)
 
-# Linear geometry, limits for 5 % of the deviation or deflection. Of 174 tracking runs of the library 133 are further
-# off than that, and all of these have a shortening share above this limit; so have 15 of the other 41.
+# Linear geometry, limits for 5 % of the deviation or deflection. Of 174 tracking runs of the library 133 have a larger
+# error, and all of these have a shortening share above this limit; so have 15 of the other 41.
 SHORTENING_LIMIT = 0.1
-# A lasting force P times 1 / (1 - P / P_cr) what a beam deflects by: 5 % at 0.05. The library's runs without a path are
-# off by up to 1.05 of their largest axial force over P_cr.
+# A steady force P multiplies the deflection of a beam by 1 / (1 - P / P_cr): 5 % at 0.05. The errors of the library's
+# runs without a path are up to 1.05 of their largest axial force over P_cr.
 AXIAL_LIMIT = 0.05
-# Where torques drive a mechanism along a path its deviation has other causes, which shortening tells of. Of the runs
+# If torques drive a mechanism along a path, its deviation has other causes, which shortening indicates. Of the runs
 # within 5 % none has an axial force above 0.195.
 DRIVEN_AXIAL_LIMIT = 0.2
 # A cantilever under a load at its tip, against the elastica: 4 % of the deflection at 0.10 rad, 6 % at 0.15 rad.
 SLOPE_LIMIT = 0.12
-# Second order, for 1 % of the deflection: `fourth_order` against the elastica, beams clamped at one end under a load or
-# moment at the tip, and hinged at both under a load in the middle, with up to 0.95 of the buckling load.
+# Second order, for 1 % of the deflection: `fourth_order` against the elastica, for beams clamped at one end under a
+# load or moment at the tip, and hinged at both ends under a load in the middle, with up to 0.95 of the buckling load.
 FOURTH_ORDER_LIMIT = 0.01
-# Its two coefficients, of slopes squared: that of the curvature, and that of what stiffens a beam on the point of
-# buckling, for the frame on the chord (1/8: the elastica's own) and for that on the tangent at the first end.
+# Coefficients of squared slopes: of the curvature, and of the stiffening of a beam close to buckling, for the frame on
+# the chord (1/8, as of the elastica) and on the tangent at the first end.
 _CURVATURE, _CHORD, _TANGENT = 1.0 / 3.0, 1.0 / 8.0, 0.3
-# A beam clamped at one end buckles at a quarter of the load that one hinged at both ends does.
+# Buckling load of a beam clamped at one end, relative to that of one hinged at both ends.
 _CLAMPED = 0.25
-# Name of the one indicator of second order.
+# Name of the only indicator of second order.
 _SECOND_ORDER = "fourth order"
-# A mean axial force so near the buckling load, or beyond, is counted as this fraction of it.
+# Largest mean axial force relative to the buckling load that is taken into account; larger ones count as this.
 _ALMOST = 0.99
 
 
 @dataclass(frozen=True)
 class Indicator:
-    """One number that tells whether a model holds.
+    """An indicator of a model's validity.
 
     Attributes
     ----------
     name : str
-        "shortening", "axial force", "slope" or "fourth order".
+        Name: "shortening", "axial force", "slope" or "fourth order".
     value, limit : float
-        The model is not to be trusted where the value is above the limit.
+        Value, and limit above which the model is not reliable.
     body : str
-        The body that it is largest of.
+        Body with the largest value.
     time : float
-        When it is largest [s].
+        Time of the largest value [s].
     text : str
-        In words, with the limit.
+        Description with the limit.
     remedy : str
-        What to do where it is above the limit.
+        Remedy for a value above the limit.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Indicator:
 
     @property
     def geometry(self) -> str:
-        """What it is of: bars of assumed modes and modal bodies are linear in mechanisms of second order, too."""
+        """Geometry of the body; bars of assumed modes and modal bodies are linear in second-order mechanisms, too."""
         return Geometry.SECOND_ORDER.value if self.name == _SECOND_ORDER else Geometry.LINEAR.value
 
     @property
@@ -83,12 +83,12 @@ class Indicator:
 
 
 class Following(NamedTuple):
-    """What a run along a path adds: the end-effector's deviation from it.
+    """Additional data of a run along a path.
 
     Attributes
     ----------
     deviation : float
-        Root mean square distance from the path over the run [m].
+        Root mean square distance of the end-effector from the path over the run [m].
     condition : float
         Largest condition number of the actuation matrix.
     """
@@ -98,11 +98,11 @@ class Following(NamedTuple):
 
 
 def of_linear(bodies: Sequence[Bending], run: Solution, following: Following | None) -> list[Indicator]:
-    """Of the bodies of linear geometry."""
+    """Return the indicators of bodies with linear geometry."""
     if not bodies:
         return []
     out = [_slope(bodies, run)]
-    # Of modal bodies there is no more to say.
+    # Modal bodies have no axial force or shortening.
     beams = [body for body in bodies if not np.isnan(body.axial).any()]
     if beams:
         out.append(_axial_force(beams, run, AXIAL_LIMIT if following is None else DRIVEN_AXIAL_LIMIT))
@@ -137,7 +137,7 @@ def _shortening(bodies: Sequence[Bending], run: Solution, following: Following) 
 
 
 def of_second_order(bodies: Sequence[Bending], run: Solution) -> list[Indicator]:
-    """Of the beams of second-order geometry."""
+    """Return the indicators of beams with second-order geometry."""
     if not bodies:
         return []
     terms = [fourth_order(body.slope, _steady(body), tangent=body.tangent) for body in bodies]
@@ -151,28 +151,28 @@ def of_second_order(bodies: Sequence[Bending], run: Solution) -> list[Indicator]
 
 
 def fourth_order(slope: Number, compression: float, *, tangent: bool) -> Number:
-    """What second order leaves out, as a fraction of the deflection: slope^2 (1/3 + c / (1 - P/P_cr)).
+    """Return the neglected terms of second order as a fraction of the deflection: slope^2 (1/3 + c / (1 - P/P_cr)).
 
     Parameters
     ----------
     slope : float or (k,) array
-        Largest along the beam, in its frame [rad].
+        Largest slope along the beam, in its frame [rad].
     compression : float
-        Lasting axial force over the load under which the beam, hinged at both ends, buckles.
+        Steady compression relative to the buckling load of the beam hinged at both ends.
     tangent : bool
-        Whether the frame is on the tangent at the first end (the cantilever's): c is 0.3, else 1/8.
+        Whether the frame is on the tangent at the first end (cantilever): c is then 0.3, otherwise 1/8.
     """
     towards = 1.0 - min(max(compression, 0.0), _ALMOST)
     return slope**2 * (_CURVATURE + (_TANGENT if tangent else _CHORD) / towards)
 
 
 def _steady(body: Bending) -> float:
-    """Mean compression over the load under which the body, hinged at both ends, buckles."""
+    """Return the mean compression relative to the buckling load of the body hinged at both ends."""
     return -float(np.mean(body.axial)) * (_CLAMPED if body.tangent else 1.0)
 
 
 def _largest(bodies: Sequence[Bending], values: Sequence[Array]) -> tuple[Bending, int]:
-    """The body whose values (k,) are largest, and the sample at which they are."""
+    """Return the body whose values (k,) are largest, and the sample at which they are."""
     one = int(np.argmax([np.max(each) for each in values]))
     return bodies[one], int(np.argmax(values[one]))
 

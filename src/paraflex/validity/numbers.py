@@ -1,6 +1,6 @@
-"""Are the numbers of a mechanism plausible? Slips of units, signs and places that no check of form can see.
+"""Plausibility of the numbers of a mechanism: wrong units, signs and positions that no check of form can detect.
 
-Each bound is wide: what lies beyond it is hardly ever meant, and where it is the finding does no harm.
+Each bound is wide: values beyond it are hardly ever intended, and if they are, the finding does no harm.
 """
 
 from __future__ import annotations
@@ -23,57 +23,59 @@ from paraflex.validity.actions import doubtful_actions
 Place = tuple[float, float]
 Beam = FlexibleBeam | AssumedModesBeam
 
-# Thickness over length of beams: beam theory ends at the first; tapes and foils are as thin as the second.
+# Thickness over length of beams: limits of beam theory, and of tapes and foils.
 THICK, THIN = 0.25, 5e-4
-# Thickness in the plane over width out of it, of a rectangle that would first bend out of the plane.
+# Thickness in the plane over width out of it above which a rectangle bends out of the plane first.
 TURNED = 3.0
-# Young's modulus [Pa]: of the softest rubber and of diamond, with room to spare.
+# Young's modulus [Pa]: below the softest rubber and above diamond.
 MODULUS = (1e5, 2e12)
 # Density [kg/m^3]: of light foam and of osmium.
 DENSITY = (10.0, 2.3e4)
-# Of solids as heavy as the first [kg/m^3] none has a modulus below the second [Pa].
+# No solid denser than the first [kg/m^3] has a modulus below the second [Pa].
 HEAVY, SOFT = 2000.0, 1e9
 # Lengths of a mechanism [m]: of micromechanics and of the largest machines.
 SIZE = (1e-5, 100.0)
-# The longest over the shortest link that a mechanism has.
+# Largest ratio of the longest to the shortest link of a mechanism.
 SPREAD = 500.0
-# Radius of gyration of a rigid body over the mechanism's size.
+# Radius of gyration of a rigid body relative to the mechanism's size.
 GYRATION = 5.0
-# All masses over the cube of the mechanism's size, were it a massive block of light metal or more [kg/m^3].
+# Total mass over the cube of the mechanism's size, above that of a solid block of light metal [kg/m^3].
 MASSIVE = 5000.0
-# How much shorter than all its bodies in a row a mechanism is at least.
+# Largest ratio of the total length of all bodies to the size of a mechanism.
 _FOLDED = 4.0
-# A body's mass over that of all others together, without which the others would hardly matter.
+# Mass of a body relative to the mass of all others together, above which the others hardly matter.
 HEAVIEST = 200.0
-# Masses of one kind that sit on several bodies over the rest of all bodies: hinges weigh less than what they join.
+# Equal lumped masses on several bodies relative to the rest of all bodies: hinges weigh less than what they join.
 HINGES = 20.0
-# Distance of a centre of mass from its body's points over the mechanism's size.
+# Distance of a centre of mass from its body's points relative to the mechanism's size.
 OFF_CENTRE = 5.0
-# Standard gravity and how far places on Earth differ from it [m/s^2].
+# Standard gravity, and its variation on Earth [m/s^2].
 STANDARD_GRAVITY, ON_EARTH = 9.81, 0.05
-# Points nearer one another than this part of the mechanism are at one place.
+# Points nearer to one another than this fraction of the mechanism's size coincide.
 APART = 1e-9
-# Speed of a body that no mechanism has [m/s].
+# Speed of a body above that of any mechanism [m/s].
 FAST = 300.0
-# Length of a beam beyond its last point, over all of it.
+# Length of a beam beyond its last point relative to the whole.
 OVERHANG = 0.5
 _TURN = 2.0 * math.pi
-# Instants at which a law is looked at.
+# Number of instants at which a law is evaluated.
 _LOOKS = 201
 
 
 def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> list[Finding]:
-    """Findings about a mechanism's own numbers, from its description alone.
+    """Return findings about a mechanism's own numbers, from its description alone.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism as described.
     duration : float, optional
-        Until when laws in time are looked at [s]; at the start alone by default.
+        Time up to which laws in time are evaluated [s]; at the start alone by default.
 
     Returns
     -------
     list of Finding
+        Doubtful numbers, each with its place, text and remedy.
     """
     size = mechanism_size(mechanism)
     found = [*_lengths(mechanism, size), *_gravity(mechanism.gravity), *_angles(mechanism), *_drives(mechanism)]
@@ -89,7 +91,7 @@ def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> lis
 
 
 def _meshes(mechanism: Mechanism) -> Iterator[Finding]:
-    """Beams whose elements are too long for what slides along them."""
+    """Yield beams whose elements are too long for joints that slide along them."""
     for beam in tracks(mechanism):
         if too_long(beam):
             part = longest_element(beam)
@@ -102,7 +104,7 @@ def _meshes(mechanism: Mechanism) -> Iterator[Finding]:
 
 
 def _shared(found: Iterable[Finding]) -> list[Finding]:
-    """One finding in place of several that say the same of several places, as of bodies that share a section."""
+    """Merge findings that are the same for several places, for example for bodies that share a section."""
     places: dict[tuple[str, str, str], list[str]] = {}
     for one in found:
         places.setdefault((one.code, one.text, one.remedy), []).append(one.place)
@@ -113,19 +115,19 @@ def _shared(found: Iterable[Finding]) -> list[Finding]:
 
 
 def mechanism_size(mechanism: Mechanism) -> float:
-    """The largest length in a mechanism's description: of a body, or between ground points [m]; zero of none."""
+    """Return the largest length in a mechanism's description, of a body or between ground points [m]; zero if none."""
     return max([*map(body_length, mechanism.bodies), _extent(mechanism.ground.values())], default=0.0)
 
 
 def mechanism_mass(mechanism: Mechanism) -> float:
-    """Of all bodies [kg]."""
+    """Return the mass of all bodies [kg]."""
     return sum(body.mass if isinstance(body, ModalBody) else _mass(body) for body in mechanism.bodies)
 
 
 def body_length(body: Body) -> float:
-    """Length of a beam, or the largest distance between a body's named points [m].
+    """Return the length of a beam, or the largest distance between a body's named points [m].
 
-    With one point, its distance from the centre of mass.
+    For a body with one point it is the distance from the centre of mass.
     """
     if isinstance(body, Beam):
         return body.length
@@ -183,7 +185,7 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
     given |= {f"spring.{one.name}.rest": one.rest for one in turning}
     given |= {
         f"assembly.{assembly.name}.{body}": angle
-        # Gears and the like count turns.
+        # Angles of gears and similar relations count turns.
         for assembly in (() if mechanism.relations else mechanism.assemblies)
         for body, angle in assembly.angles.items()
     }
@@ -197,14 +199,14 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
 
 
 def _laws(mechanism: Mechanism, size: float, times: Array) -> Iterator[Finding]:
-    """Angles in time: degrees show in where they start, and how far they swing to and fro."""
+    """Yield laws likely in degrees, which start beyond one turn or swing over two, and large speeds."""
     for one in mechanism.prescribed:
         if mechanism.slides(one.joint):
             continue
         try:
             angle, rate, _ = one.law.evaluate(times)
         except InputError:
-            # A run that ends earlier may be asked for; one that does not says what is wrong with the law.
+            # A law may be undefined beyond an earlier end of the run; otherwise the run reports the error.
             continue
         place = f"prescribed.{one.name}"
         swing = float(np.ptp(angle)) if np.any(rate > 0.0) and np.any(rate < 0.0) else 0.0
@@ -258,7 +260,7 @@ def _beam(body: Beam, size: float) -> Iterator[Finding]:
 
 
 def _section(place: str, length: float, section: Section) -> Iterator[Finding]:
-    # Of a rectangle of the same area and second moment.
+    # Thickness of a rectangle of the same area and second moment.
     thickness = math.sqrt(12.0 * section.second_moment / section.area) if section.second_moment > 0.0 else 0.0
     if thickness > THICK * length:
         yield Finding(
@@ -343,7 +345,7 @@ def _masses(mechanism: Mechanism, size: float) -> Iterator[Finding]:
 
 
 def _hinges(mechanism: Mechanism) -> Iterator[Finding]:
-    """One lumped mass on several bodies, that of joints or motors, against all the rest."""
+    """Yield lumped masses on several bodies, as of joints or motors, that outweigh all the rest."""
     beams = [body for body in mechanism.bodies if isinstance(body, Beam)]
     total = sum(_mass(body) for body in mechanism.bodies if not isinstance(body, ModalBody))
     carriers: dict[float, list[str]] = {}

@@ -1,4 +1,4 @@
-"""Are the results of a run plausible? What mass, size and speed of the mechanism let expect, against what came out."""
+"""Plausibility of the results of a run, against expectations from mass, size and speed of the mechanism."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ from paraflex.validity.bending import bending_of
 from paraflex.validity.blame import most_likely
 from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, doubtful_numbers, mechanism_size
 
-# Energy that is missing or too much, over the largest: the library's runs have up to 3e-4 with the default tolerance.
-# An energy below the second part of weight times size is none.
+# Energy error relative to the largest energy: the library's runs have up to 3e-4 with the default tolerance. Energies
+# below the second fraction of weight times size count as zero.
 UNBALANCED, NO_ENERGY = 1e-3, 1e-9
-# Loads below this part of all weight, or of that times the size, or of the largest load, do not matter.
+# Loads below this fraction of the weight, of the weight times the size, or of the largest load are ignored.
 _NO_FORCE = 1e-3
 _NAMED = 3
-# Slope of a link in its frame beyond which it is a spring rather than a link [rad].
+# Slope of a link in its frame above which it is more a spring than a link [rad].
 STEEP = 0.7
 # Tracking error over the diagonal of the path: the library's worst mode, RAParM-I's +-+-, has 0.34, dwell included.
 LOST = 0.5
-# A motor's torque or force over that of the whole mass at the acceleration of the path and under gravity, with all
-# loads: the library's modes take at most 1.04 times as much.
+# Torque or force of a motor relative to that of the total mass at the acceleration of the path and under gravity, with
+# all loads: the library's modes require at most 1.04 of it.
 TORQUE = 30.0
-# Force of a joint or drive over the same, and what it is multiplied by: also of the slowest of mechanisms.
+# Force of a joint or drive, torques divided by the size, relative to the same; wide enough for the slowest mechanisms.
 FORCE = 1000.0
-# Part of the samples that a force is as large in, so that a pole at a singular position is none.
+# Fraction of the samples in which a force is at least as large, to exclude poles at singular configurations.
 _LASTING = 0.1
-# A body that closing the loops turned further than this had another angle in mind, or another elbow [rad].
+# Rotation of a body while loops are closed above which another angle or elbow was likely intended [rad].
 _FAR = 0.5
 # Condition number of the actuation matrix that explains large torques.
 _NEAR_SINGULAR = 50.0
@@ -50,20 +50,20 @@ _NEAR_SINGULAR = 50.0
 
 @dataclass(frozen=True)
 class Driven:
-    """What a run along a path adds.
+    """Additional data of a run along a path.
 
     Attributes
     ----------
     mode : str
-        Its actuation mode.
+        Actuation mode of the run.
     desired, actual : (k, 2) arrays
-        Of the end-effector, at the samples reached [m].
+        Desired and actual positions of the end-effector, at the samples reached [m].
     acceleration : float
-        Largest of the desired motion [m/s^2].
+        Largest acceleration of the desired motion [m/s^2].
     peaks : mapping of str to float
         Largest torque or force of each motor [N m or N].
     units : mapping of str to str
-        "N m" or "N", of each motor.
+        Unit of each motor: "N m" or "N".
     condition : float
         Largest condition number of the actuation matrix.
     """
@@ -83,18 +83,18 @@ class Driven:
 
 
 class _Where(NamedTuple):
-    """What findings of a run begin with, and whose numbers may be to blame."""
+    """Place of the findings of a run, and the mechanism whose numbers may have caused them."""
 
     place: str
     mechanism: Mechanism
 
     def blame(self, *bodies: str) -> str:
-        """The number of the model that is most likely to blame, of the named bodies first; empty for none."""
+        """Return the number of the model that is the most likely cause, named bodies first; empty for none."""
         return most_likely(doubtful_numbers(self.mechanism), bodies)
 
 
 def stiff_modes(system: System) -> Iterator[Finding]:
-    """Bodies whose modes kept cannot carry the moments that come in."""
+    """Yield bodies whose kept modes cannot represent the moments at their joints and loads."""
     for one in missed_turns(system):
         yield Finding(
             "modes-too-stiff", f"body.{one.point.body}.modes",
@@ -107,22 +107,23 @@ def stiff_modes(system: System) -> Iterator[Finding]:
 def doubtful_results(
     system: System, solution: Solution, driven: Driven | None = None, mechanism: Mechanism | None = None
 ) -> list[Finding]:
-    """Findings about the results of a run that are far from plausible.
+    """Return findings about implausible results of a run.
 
     Parameters
     ----------
     system : System
+        System of the run.
     solution : Solution
-        Whole or in part.
+        Samples of the whole run or of a part.
     driven : Driven, optional
-        Of a run along a path that torques drive.
+        Data of a run along a path driven by torques.
     mechanism : Mechanism, optional
-        As the user described it, where the system is of its finite segments.
+        Mechanism as described by the user, if the system is that of its finite segments.
 
     Returns
     -------
     list of Finding
-        Each remedy names the quantity of the model that is most likely to blame.
+        Findings whose remedies name the quantity of the model that is the most likely cause.
     """
     if not solution.t.size:
         return []
@@ -134,7 +135,7 @@ def doubtful_results(
         *_large_slopes(where, system, solution),
         *_overstressed(where, system, solution),
         *_unbalanced(where, system, solution),
-        # No default resolves vibrations of undamped beams along their axes: tables have the errors beside the numbers.
+        # No default method resolves axial vibrations of undamped beams: tables give the errors with the values.
         *(_begun_singular(solution, where.place) if undamped else unresolved_loads(system, solution, where.place)),
         *_fast(where, system, solution),
         *_large_forces(where, system, solution),
@@ -146,15 +147,15 @@ def doubtful_results(
 
 
 def doubtful_stresses(system: System, solution: Solution) -> list[Finding]:
-    """Findings about the stresses of equilibria or a run."""
+    """Return findings about the stresses of equilibria or a run."""
     return list(_overstressed(_Where("", system.described), system, solution))
 
 
 def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
-    """Findings about loads of joints and drives that redundant constraints share in any way."""
+    """Yield findings about loads of joints and drives that redundant constraints share arbitrarily."""
     names = [joint.name for joint in system.described.joints]
     found = undetermined_loads(system, names, solution.q, solution.acting)
-    # At singular positions loads have poles.
+    # Loads have poles at singular configurations.
     lasting = np.isfinite(solution.multipliers).any(axis=1)
     drives = [f"prescribed.{one.name}" for one in system.described.prescribed]
     forces, moments, drives_too = (
@@ -175,7 +176,7 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
 
 
 def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
-    """Findings about the torques and forces of a plan at times t (k,), before anything runs."""
+    """Return findings about the torques and forces of a plan at times t (k,), before a run."""
     return list(_large_torques(_Where(f"mode {driven.mode}", system.mechanism), system, driven, t))
 
 
@@ -202,7 +203,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
 
 
 def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
-    """Beams that their loads stress beyond the strength of their material."""
+    """Yield beams stressed beyond the strength of their material."""
     sections = sections_of(system)
     if sections is None or not np.isfinite(sections.strength).any():
         return
@@ -225,16 +226,16 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
 
 
 def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
-    """Runs whose energy is not what work has made it."""
+    """Yield runs whose energy does not balance the work."""
     energy = np.abs(solution.kinetic_energy) + np.abs(solution.strain_energy)
-    # Models without energies have NaN there.
+    # Models without energies have NaN.
     largest = max(float(np.nanmax(each, initial=0.0)) for each in (energy, np.abs(solution.work)))
     largest = max(largest, _turned_over(system, solution))
     least = NO_ENERGY * system.total_mass * STANDARD_GRAVITY * system.size
     off = solution.energy_balance_max
     if not (largest > least and off > UNBALANCED * largest):
         return
-    # Work of the largest force on positions that are as far off as the default tolerance lets them be.
+    # Work of the largest force on a position error of the default tolerance.
     force = max((load for (_, unit), load in _peaks(system, solution).items() if unit == "N"), default=0.0)
     explained = IntegrationOptions().tolerance_for(system) * force
     if off > explained:
@@ -247,7 +248,7 @@ def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[F
 
 
 def _turned_over(system: System, solution: Solution) -> float:
-    """Work that prescribed motions do and take, which loads may take and do at once [J]."""
+    """Return the work that prescribed motions do and absorb, both counted positive [J]."""
     torques = np.nan_to_num(drive_torques(system, solution.multipliers))
     rates = [joint_coordinate(system, one.joint, solution.q, solution.v).rate for one in system.mechanism.prescribed]
     power = sum(np.abs(torque * rate) for torque, rate in zip(torques.T, rates, strict=True))
@@ -255,7 +256,7 @@ def _turned_over(system: System, solution: Solution) -> float:
 
 
 def _begun_singular(solution: Solution, place: str) -> Iterator[Finding]:
-    """Findings about runs of other programs' solvers that begin at a singular position."""
+    """Yield findings about runs by solvers of other packages that begin at a singular configuration."""
     begun = solution.t.size and solution.t[0] in solution.singular_positions
     if begun and not isinstance(METHODS[solution.method], NativeMethod):
         text = f"{solution.method} begins at a singular position: forces near it may be off by several times their size"
@@ -265,7 +266,7 @@ def _begun_singular(solution: Solution, place: str) -> Iterator[Finding]:
 
 
 def unresolved_loads(system: System, solution: Solution, place: str = "") -> Iterator[Finding]:
-    """Findings about forces that errors of integration leave uncertain, as of vibrations faster than the steps."""
+    """Yield findings about forces uncertain by integration errors, for example by vibrations faster than the steps."""
     yield from _begun_singular(solution, place)
     if solution.multiplier_errors is None:
         return
@@ -289,12 +290,12 @@ def unresolved_loads(system: System, solution: Solution, place: str = "") -> Ite
 
 
 def _peaks(system: System, solution: Solution) -> dict[tuple[str, str], float]:
-    """Bounds of the largest loads of a run, as `_loads` names them."""
+    """Return bounds of the largest loads of a run, by the names of `_loads`."""
     return _loads(system, np.nanmax(np.abs(solution.multipliers), axis=0, initial=0.0))
 
 
 def _loads(system: System, multipliers: Array) -> dict[tuple[str, str], float]:
-    """Bounds of the loads of joints and prescribed motions, by name and unit, from those of the multipliers (m,)."""
+    """Return bounds of the loads of joints and prescribed motions, by name and unit, from those of multipliers (m,)."""
     names, prescribed = [joint.name for joint in system.mechanism.joints], system.mechanism.prescribed
     found, drives = load_errors(system, names, multipliers), {}
     for one, load in zip(prescribed, found.drive.tolist(), strict=True):
@@ -350,7 +351,7 @@ def _large_torques(where: _Where, system: System, driven: Driven, t: Array) -> I
 
 
 def _expected(system: System, mechanism: Mechanism, acceleration: float, t: Array) -> tuple[float, float]:
-    """The force that accelerates and holds the whole mass, with all loads [N]; and all torques applied [N m]."""
+    """Return the force that accelerates and holds the total mass, with all loads [N]; and the applied torques [N m]."""
     loads = sum(one.largest(t) for one in mechanism.loads if isinstance(one, PointForce))
     turning = sum(one.largest(t) for one in mechanism.loads if not isinstance(one, PointForce))
     felt = max(acceleration + math.hypot(*mechanism.gravity), STANDARD_GRAVITY)
@@ -358,14 +359,14 @@ def _expected(system: System, mechanism: Mechanism, acceleration: float, t: Arra
 
 
 def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
-    """Forces of joints and of prescribed motions; drives of a path have motors."""
+    """Yield large forces of joints and of prescribed motions; drives of a path have motors."""
     if not solution.multipliers.size:
         return
     # A mechanism of one point has no size of its own.
     size = mechanism_size(where.mechanism) or system.size
     accelerations = np.stack([np.linalg.norm(solution.a[:, body.position], axis=1) for body in system.bodies])
     expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))), solution.t)
-    # NaN at singular positions, and of rows that a method has no multipliers of.
+    # Entries are NaN at singular configurations, and for rows without multipliers in a method.
     lasting = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _LASTING, axis=0)
     lasting[system.packed.rows["kind"] != CONSTRAINT] = 0.0
     arms = np.array([size if row.endswith(" angle") else 1.0 for row in system.rows])
@@ -382,14 +383,14 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
 
 
 def _resisting(mechanism: Mechanism) -> str:
-    """Springs, dampers and friction, of which one may be in another unit."""
+    """List springs, dampers and friction, one of which may be in another unit."""
     resisting = ((group.table, members) for group, members in grouped(mechanism) if group.resists)
     named = [f"{table}.{one.name}" for table, members in resisting for one in members]
     return f"look at {', '.join(named)}, and their units" if named else ""
 
 
 def _moving(mechanism: Mechanism, solution: Solution) -> str:
-    """Prescribed motions with their largest rates, and loads with their sizes."""
+    """List prescribed motions with their largest rates, and loads with their sizes."""
     named: list[str] = []
     for one in mechanism.prescribed:
         rate = float(np.max(np.abs(one.law.evaluate(solution.t)[1])))
@@ -406,7 +407,7 @@ def _singular(driven: Driven) -> str:
 
 
 def moved_far(system: System, assembly: Assembly, q: Array) -> Iterator[Finding]:
-    """Bodies that closing the loops of an assembly, or moving to the start of drives, turned far; q (n,)."""
+    """Yield bodies that rotated far while an assembly was closed or drives moved to their start; q (n,)."""
     given = {name: pose.angle for name, pose in approximate_poses(system.mechanism, assembly).items()}
     found = {body.name: float(q[body.angle]) for body in system.bodies}
     turned = {name: abs(math.remainder(found[name] - given[name], 2.0 * math.pi)) for name in found}
@@ -428,6 +429,6 @@ def moved_far(system: System, assembly: Assembly, q: Array) -> Iterator[Finding]
 
 
 def _both(angle: float) -> str:
-    """An angle within half a turn, in radians and degrees."""
+    """Format an angle within half a turn, in radians and degrees."""
     turned = math.remainder(angle, 2.0 * math.pi)
     return f"{turned:.3g} rad ({math.degrees(turned):.3g} degrees)"
