@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-# Windows has no SIGHUP, and SIGBREAK for Ctrl-Break.
+# Windows has no SIGHUP, but SIGBREAK for Ctrl-Break.
 ENDING = tuple(
     signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if name in signal.Signals.__members__
 )
