@@ -73,7 +73,7 @@ class Calls:
         return future
 
     def done(self) -> set[Future[Any]]:
-        """Wait for futures that ended since the last call; the set is empty after 1 s, so that Ctrl-C gets through."""
+        """Return the futures that ended since the last call; wait at most 1 s for one, so that Ctrl-C gets through."""
         ended = set()
         with suppress(Empty):
             ended.add(self._done.get(timeout=1.0))

@@ -51,7 +51,7 @@ class Record(Links):
         Name of the actuation mode.
     torque : (samples, motors) array
         Torques applied by the motors [N m], or forces [N], at every sample time of the task, or only at the k reached
-        if the torques result from the run.
+        if brakes or controllers determined them.
     condition : (samples,) array
         Condition number of the actuation matrix.
     end_effector : PointMotion
