@@ -1,6 +1,6 @@
 """paraflex: rigid-flexible dynamics of planar mechanisms with closed loops and several actuation modes.
 
-Each public name is imported when it is first used; `__init__.pyi` lists them, grouped.
+Each public name is imported at its first use; `__init__.pyi` lists all public names in groups.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ ensure_cache_folder(Path(__file__).parent / "kernel")
 
 _loaded, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
-# Names of the last version, which work in this one: where they are, and what they are called now.
+# Deprecated names of the previous version: the module and the new name of each.
 _RENAMED = {
     "chain_of_segments": ("mechanism", "library.chain_of_segments"),
     "four_bars_in_a_row": ("mechanism", "library.four_bars_in_a_row"),

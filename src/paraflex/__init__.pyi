@@ -1,4 +1,4 @@
-# Every public name, once; grouped as the page "The interface" of the documentation shows them.
+# Every public name once, in the groups of the documentation page "The interface".
 from . import library as library, plots as plots
 
 # Mechanisms: bodies, joints, forces
@@ -63,7 +63,7 @@ from .kinematics import (
     TabulatedPath as TabulatedPath,
 )
 
-# Models: read, checked, planned, run
+# Models: reading, checking, planning, running
 from .files import (
     Model as Model,
     allowing_outside as allowing_outside,

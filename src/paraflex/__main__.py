@@ -1,4 +1,4 @@
-"""`python -m paraflex` and `paraflex` are the command line."""
+"""Entry point of the command line, as `python -m paraflex` and as `paraflex`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import suppress
 
 
 def main() -> None:
-    """Run the command line; a signal ends it with a line and its exit code at any time."""
+    """Run the command line; a signal ends it at any time with a one-line message and the exit code of the signal."""
     from paraflex.cli.signals import exit_code, is_taken, leave_when_signalled
 
     leave_when_signalled()
@@ -20,7 +20,7 @@ def main() -> None:
         if is_taken():
             import multiprocessing
 
-            # Whatever threads still compute, nobody asks for.
+            # Results of threads that still compute are not needed any more.
             with suppress(OSError, ValueError):
                 sys.stdout.flush()
                 sys.stderr.flush()
@@ -29,6 +29,6 @@ def main() -> None:
             os._exit(exit_code())
 
 
-# Worker processes import this file too.
+# Worker processes import this file as well and must not start the command line.
 if __name__ == "__main__":
     main()

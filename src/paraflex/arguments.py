@@ -1,7 +1,8 @@
-"""Checks and conversions of arguments and fields by their annotations, with errors that name them.
+"""Checks and conversions of arguments and dataclass fields by their annotations.
 
-Annotations say what is wanted: those of a function under `checked_arguments`, those of the fields of a dataclass that
-derives from `CheckedFields`. Whether numbers make sense, and names exist, is checked by whoever uses them.
+Errors name the argument or field. The expected types come from the annotations of a function decorated with
+`checked_arguments`, or of the fields of a dataclass derived from `CheckedFields`. Ranges of numbers and existence of
+names are checked where the values are used.
 """
 
 from __future__ import annotations
@@ -31,25 +32,26 @@ C = TypeVar("C")
 _UNIONS = (typing.Union, UnionType)
 _LISTS = (tuple, list, abc.Sequence, abc.Iterable)
 _TABLES = (dict, abc.Mapping)
-# Arrays of real numbers, and the largest whole number of compiled code.
+# NumPy kinds of real numbers, and the largest integer of compiled code (int64).
 _REAL, _MOST = tuple("biuf"), 2**63 - 1
 
-# Takes what is given and the name of its field; returns what is wanted.
+# Converter: takes a value and the name of its field, returns the converted value or raises an InputError.
 Take = Callable[[Any, str], Any]
 
 
 def checked_arguments(**remedies: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Convert and check the arguments of a function by their annotations.
+    """Return a decorator that converts and checks the arguments of a function by their annotations.
 
     Parameters
     ----------
     **remedies : str
-        Of arguments whose types alone do not say how one comes by them: "give a dataset, as ... makes it".
+        Remedies in errors, by argument name, for arguments whose type does not show how to obtain one: "give a
+        dataset, as ... makes it".
 
     Raises
     ------
     InputError
-        From the function: an argument that is something else.
+        Raised by the decorated function if an argument has another type than its annotation.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -77,14 +79,14 @@ def checked_arguments(**remedies: str) -> Callable[[Callable[P, R]], Callable[P,
 
 
 class CheckedFields:
-    """Base of dataclasses whose fields are converted and checked by their annotations.
+    """Base class of dataclasses whose fields are converted and checked by their annotations.
 
-    A dataclass with a `__post_init__` of its own calls this one first. `_table` is what errors name before the fields,
-    with the name of the object where it has one.
+    A dataclass that defines `__post_init__` calls this one first. Errors prefix the field with `_table`, and with the
+    name of the object if it has one.
     """
 
     _table = ""
-    # Fields whose class checks them itself, in words of its own.
+    # Fields that the class checks itself, with its own error messages.
     _own: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -96,7 +98,7 @@ class CheckedFields:
 
 
 def with_fields(record: C, **changes: Any) -> C:
-    """A dataclass with other fields, like `replace`, without checks of them: complex numbers pass."""
+    """Return a copy of a dataclass with other field values, like `replace` but unchecked: complex numbers pass."""
     new = object.__new__(type(record))
     for each in fields(record):  # pyright: ignore[reportArgumentType]
         object.__setattr__(new, each.name, changes.get(each.name, getattr(record, each.name)))
@@ -104,7 +106,7 @@ def with_fields(record: C, **changes: Any) -> C:
 
 
 class _Field:
-    """The name of a field, composed only if an error needs it."""
+    """Name of a field, composed only if an error needs it."""
 
     __slots__ = ("name", "owner")
 
@@ -118,7 +120,19 @@ class _Field:
 
 
 def refused(value: object, field: object, what: str, remedy: str) -> InputError:
-    """The error for a value of a wrong kind."""
+    """Return the error for a value of a wrong type.
+
+    Parameters
+    ----------
+    value : object
+        Offending value; None is reported as missing.
+    field : object
+        Name of the field, converted with `str`.
+    what : str
+        Noun of the expected type, as in "a number".
+    remedy : str
+        Value to give instead.
+    """
     if value is None:
         return InputError("is not given", field=str(field), remedy=remedy)
     return InputError(f"not {what}", field=str(field), value=value, remedy=remedy)
@@ -151,7 +165,7 @@ def _takes(hints: Mapping[str, Any], module: str) -> dict[str, Take]:
 
 
 def _resolved(hint: Any, names: dict[str, Any]) -> Any:
-    """An annotation as a type; Any if its names exist for type checkers only."""
+    """Evaluate an annotation to a type; Any if its names exist for type checkers only."""
     try:
         return eval(hint, names) if isinstance(hint, str) else hint
     except NameError:
@@ -159,8 +173,8 @@ def _resolved(hint: Any, names: dict[str, Any]) -> Any:
 
 
 def take_as(hint: Any) -> Take | None:
-    """Function that takes a value as a type; None for a type that every value has."""
-    # Unions are equal in any order of their types, but errors name the types in the order of the annotation.
+    """Return the function that converts a value to a type, None for types that accept any value or are not checked."""
+    # Unions compare equal in any order of their members, but errors list these in the order of the annotation.
     return _take_as(hint, repr(hint))
 
 
@@ -185,12 +199,12 @@ def _take_as(hint: Any, _spelling: str) -> Take | None:
 
 
 def _is_row(hint: Any) -> bool:
-    """Whether a type has a fixed number of values, such as a place, and is not a list of any length."""
+    """Check whether a type is a tuple of fixed length, such as a point, and not a list of any length."""
     return typing.get_origin(hint) is tuple and typing.get_args(hint)[-1:] != (Ellipsis,)
 
 
 def _plain_of(is_one: Callable[[Any], bool], noun: str, remedy: str) -> Take:
-    """A value as it is, where it is of a plain kind."""
+    """Return the converter that passes a value unchanged if the predicate `is_one` holds."""
 
     def take(value: Any, field: str) -> Any:
         if is_one(value):
@@ -201,7 +215,7 @@ def _plain_of(is_one: Callable[[Any], bool], noun: str, remedy: str) -> Take:
 
 
 def _as_text(value: Any, field: str) -> Any:
-    """A text; for an object with a name, its name."""
+    """Return a text, or the name of an object that has one."""
     if isinstance(value, str):
         return value
     name = getattr(value, "name", None)
@@ -211,12 +225,12 @@ def _as_text(value: Any, field: str) -> Any:
 
 
 def _kind(value: Any) -> str:
-    """Kind of the numbers of an array; empty for anything else."""
+    """Return the NumPy kind of an array's dtype, an empty text for other objects."""
     return getattr(getattr(value, "dtype", None), "kind", "")
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a value is a real number that a float can be, or an array of one."""
+    """Check whether a value is a real number within the range of floats, or a zero-dimensional array of one."""
     if isinstance(value, Integral):
         return abs(int(value)) <= sys.float_info.max
     return isinstance(value, Real) or (getattr(value, "ndim", None) == 0 and _kind(value) in _REAL)
@@ -236,7 +250,7 @@ _PLAIN: dict[Any, Take | None] = {
 
 
 def _as_instance(kind: type) -> Take | None:
-    """An object of a class, or the one that its `taken_from` makes of another value."""
+    """Return the converter to an instance of a class; its `taken_from`, if any, converts other values."""
     if getattr(kind, "_is_protocol", False) and not getattr(kind, "_is_runtime_protocol", False):
         return None
     if issubclass(kind, Enum):
@@ -255,11 +269,11 @@ def _as_instance(kind: type) -> Take | None:
 
 
 def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
-    """One of several types: a value of one of them, or convertible to one of them."""
+    """Return the converter to one of several types: the value has one of them or is convertible to one of them."""
     takes = {kind: take_as(kind) for kind in kinds if kind is not NoneType}
     files = any(isinstance(kind, type) and issubclass(kind, PurePath) for kind in kinds)
     if files:
-        # The name of an object is no name of a file.
+        # Converting to text would take the name of an object as a file name.
         takes.pop(str, None)
     if any(take is None for take in takes.values()):
         return None
@@ -286,7 +300,7 @@ def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
 
 
 def _as_row(hint: Any, kinds: Sequence[Any]) -> Take:
-    """A fixed number of values, each of its type: a place in the plane."""
+    """Return the converter to a tuple of fixed length, each entry with its own type, such as a point in the plane."""
     takes = [take_as(kind) for kind in kinds]
 
     def take(value: Any, field: str) -> Any:
@@ -298,12 +312,21 @@ def _as_row(hint: Any, kinds: Sequence[Any]) -> Take:
 
 
 def numbers_in(value: Any, field: str, kinds: Collection[str] = _REAL) -> Any:
-    """The array of real numbers, or of other kinds of them, that NumPy makes of a value.
+    """Convert a value to an array of real numbers, or of other NumPy kinds.
+
+    Parameters
+    ----------
+    value : array_like
+        Numbers.
+    field : str
+        Name of the field, for the error.
+    kinds : collection of str
+        Accepted kinds of the dtype; by default Booleans, integers and real numbers.
 
     Raises
     ------
     InputError
-        Something else.
+        The value is not an array of such numbers.
     """
     if not isinstance(value, str | bytes | Mapping):
         try:
@@ -316,7 +339,7 @@ def numbers_in(value: Any, field: str, kinds: Collection[str] = _REAL) -> Any:
 
 
 def _as_many(hint: Any, kind: Any, collect: Callable[[Iterable[Any]], Any]) -> Take:
-    """Any number of one type; one alone is a list of one."""
+    """Return the converter to a collection of one type, of any length; a single value becomes a collection of one."""
     one = take_as(kind)
 
     def take(value: Any, field: str) -> Any:
@@ -338,7 +361,7 @@ def _as_many(hint: Any, kind: Any, collect: Callable[[Iterable[Any]], Any]) -> T
 
 
 def _as_table(hint: Any, kinds: Sequence[Any]) -> Take:
-    """Values by their keys."""
+    """Return the converter to a dictionary, each key and value with its type."""
     key, item = (take_as(kind) for kind in kinds) if kinds else (None, None)
 
     def take(value: Any, field: str) -> Any:
@@ -363,18 +386,18 @@ def _length(value: Any) -> int:
 
 
 def _same(given: Any, made: Any) -> Any:
-    """The given value if the made one equals it."""
+    """Return the given collection if it has the type and the very entries of the converted one, else the latter."""
     return given if type(given) is type(made) and all(a is b for a, b in zip(given, made, strict=True)) else made
 
 
 _NOUNS = {float: "a number", int: "a whole number", str: "a text", bool: "True or False"}
 _NUMBER_WORDS = {2: "two", 3: "three"}
-# What objects of a class are called, and how one comes by them.
+# Noun of a class in errors, and the value to give instead.
 _GIVEN_AS: dict[Any, tuple[str, str]] = {}
 
 
 def given_as(noun: str, wanted: str = "") -> Callable[[C], C]:
-    """Register the words of errors for a class: its noun, and the value to give."""
+    """Return a class decorator that registers the noun of the class in errors, and the value to give instead."""
 
     def register(kind: C) -> C:
         _GIVEN_AS[kind] = noun, wanted
@@ -384,7 +407,7 @@ def given_as(noun: str, wanted: str = "") -> Callable[[C], C]:
 
 
 def _noun(hint: Any) -> str:
-    """Noun of a type in error messages."""
+    """Return the noun of a type in error messages."""
     if hint in _NOUNS:
         return _NOUNS[hint]
     if _stripped(hint) in _GIVEN_AS:
@@ -406,7 +429,7 @@ def _noun(hint: Any) -> str:
 
 
 def _wanted(hint: Any) -> str:
-    """The value to give instead."""
+    """Return the description of the value to give instead."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     wanted = _GIVEN_AS.get(_stripped(hint), ("", ""))[1]
     if wanted:
@@ -423,13 +446,13 @@ def _wanted(hint: Any) -> str:
 
 
 def _stripped(hint: Any) -> Any:
-    """A type without None."""
+    """Return a type without its None member."""
     kinds = [kind for kind in typing.get_args(hint) if kind is not NoneType]
     return reduce(or_, kinds) if typing.get_origin(hint) in _UNIONS and kinds else hint
 
 
 def _members(kinds: Sequence[Any]) -> list[Any]:
-    """Types of a union, without None; and without str beside file names and enumerations."""
+    """Return the member types of a union without None, and without str beside file names or enumerations."""
     named = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, PurePath | Enum)]
     return [kind for kind in kinds if kind is not NoneType and not (named and kind is str)]
 

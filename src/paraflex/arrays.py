@@ -1,4 +1,4 @@
-"""Arrays of numbers in annotations; docstrings have their shapes."""
+"""Types of numeric arrays for annotations; the docstrings give the shapes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A folder for compiled kernels if Numba finds none: neither beside the sources nor in the user's cache folder.
+"""Fallback folder for compiled kernels, used if Numba can write neither beside the sources nor in the user's cache.
 
-Numba tries the folder of the sources and the user's cache folder, or NUMBA_CACHE_DIR alone where that is set, and
-refuses to import kernels where it may write to none of them: a read-only installation, run by a user without a home.
+Numba tries the folder of the sources and the user's cache folder, or only NUMBA_CACHE_DIR if that is set. If it can
+write to none of them, kernels cannot be imported: a read-only installation, run by a user without a home folder.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ VARIABLE = "NUMBA_CACHE_DIR"
 
 
 def ensure_cache_folder(sources: Path, environment: MutableMapping[str, str] = os.environ) -> None:
-    """Name a folder in the environment if Numba would find none; to be called before Numba is imported.
+    """Set NUMBA_CACHE_DIR if Numba would find no writable cache folder; call this before Numba is imported.
 
     Parameters
     ----------
     sources : Path
-        Folder of the kernels.
+        Folder of the kernel sources.
     environment : mapping
-        Changed where a folder is named.
+        Environment variables, changed in place; by default those of the process.
     """
     if not hasattr(os, "getuid"):
         return
     if named := environment.get(VARIABLE):
         if _can_write(Path(named)):
             return
-        # Handed on to processes that this one starts, which say nothing then.
+        # Child processes inherit the change and do not repeat the warning.
         del environment[VARIABLE]
         _warn(f"{VARIABLE}={named} cannot be written: compiled kernels are kept elsewhere")
     if not any(_can_write(folder) for folder in (sources / "__pycache__", _users(environment))):
@@ -37,14 +37,14 @@ def ensure_cache_folder(sources: Path, environment: MutableMapping[str, str] = o
 
 
 def _users(environment: MutableMapping[str, str]) -> Path:
-    """Folder of Numba's cache for this user."""
+    """Return the folder of Numba's cache for this user."""
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "numba"
     return Path(environment.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "numba"
 
 
 def _can_write(folder: Path) -> bool:
-    """Whether files can be created in a folder, or the folder itself."""
+    """Check whether files can be created in a folder, or the folder itself can be created."""
     existing = next((place for place in (folder, *folder.parents) if place.exists()), None)
     return existing is not None and existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
 
@@ -56,7 +56,7 @@ def _warn(text: str) -> None:
 
 
 def _own_folder() -> Path:
-    """A folder for temporary files that only this user can write to, as the content of a cache is executed."""
+    """Return a temporary folder that only this user can write to, because the contents of a cache are executed."""
     import tempfile
 
     user = os.getuid()
@@ -68,5 +68,5 @@ def _own_folder() -> Path:
             return folder
     except OSError:
         pass
-    # Somebody else's: kernels are compiled anew in every process.
+    # The folder belongs to another user: kernels are compiled anew in every process.
     return Path(tempfile.mkdtemp(prefix="paraflex-kernels-"))

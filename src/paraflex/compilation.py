@@ -1,6 +1,6 @@
-"""Compile the kernels beforehand, once after an installation or a change: `python -m paraflex.compilation`.
+"""Ahead-of-time compilation of the kernels, once after an installation or a change: `python -m paraflex.compilation`.
 
-Numba does so by itself when a kernel is first called, one after the other; here two processes do it at once.
+Numba would compile each kernel at its first call, one after the other; here two processes compile in parallel.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from paraflex.kinematics import Line
 from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
 from paraflex.tracking import plan_tracking
 
-# What each of the processes does; first of all it sees to it that it does not outlive this one.
+# Script of each child process; its first action makes it end with the parent.
 _CHILD = """
 import sys
 from paraflex.interrupts import end_with_parent
@@ -42,32 +42,33 @@ compile_parts(sys.argv[1:])
 
 
 def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:
-    """Whether the kernels for beams of this geometry are in the cache on disk."""
+    """Check whether the kernels for beams of this geometry are in the cache on disk."""
     return _stamp(as_enum(Geometry, geometry, "geometry")).exists()
 
 
 def compile_kernels(
     geometry: Geometry | str = Geometry.SECOND_ORDER, announce: Callable[[str], None] | None = None
 ) -> None:
-    """Compile the kernels for beams of a geometry unless they are compiled.
+    """Compile the kernels for beams of one geometry unless they are in the cache.
 
     Parameters
     ----------
     geometry : Geometry or str
-        Kernels for linear geometry are compiled without all that second-order geometry needs.
+        Geometry of the beams, second order by default; kernels for linear geometry omit the second-order terms.
     announce : callable, optional
-        Called with a line where it takes a while, once a process; by default that is logged: see `kernel.notice`.
+        Function called with a line of text before a long compilation, once per process; by default the line is logged,
+        see `kernel.notice`.
     """
     _compile([as_enum(Geometry, geometry, "geometry")], announce)
 
 
 def compile_all_kernels(announce: Callable[[str], None] | None = None) -> None:
-    """Compile the kernels for beams of every geometry that are not compiled."""
+    """Compile the kernels for beams of every geometry, except those in the cache."""
     _compile(list(Geometry), announce)
 
 
 def compile_kernels_for(mechanism: Mechanism, announce: Callable[[str], None] | None = None) -> None:
-    """Compile the kernels that a mechanism needs: see `compile_kernels`. Rigid bodies have no geometry of beams."""
+    """Compile the kernels that a mechanism needs, for rigid bodies those of linear geometry: see `compile_kernels`."""
     flexible = any(getattr(body, "flexible", False) for body in mechanism.bodies)
     compile_kernels(mechanism.geometry if flexible else Geometry.LINEAR, announce)
 
@@ -81,10 +82,10 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None)
     try:
         for share in _shares(missing):
             with starting_processes():
-                # They end where the other end of the pipe is closed.
+                # The child ends when this end of the pipe is closed.
                 line = [sys.executable, "-c", _CHILD, *share]
                 processes.append(subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL))
-        # What a process fails to leave in the cache is compiled when it is first called.
+        # A kernel missing from the cache is compiled at its first call.
         codes = [process.wait() for process in processes]
         if not any(codes):
             for geometry in missing:
@@ -96,16 +97,16 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None)
 
 
 def _shares(geometries: list[Geometry]) -> list[list[str]]:
-    """Parts of the compilation for two processes, as GEOMETRY:PART; common functions are compiled in both."""
+    """Divide the compilation into parts GEOMETRY:PART for two processes; common functions are compiled in both."""
     parts = [[f"{geometry.value}:{part}" for part in _PARTS] for geometry in geometries]
     if len(parts) == 1:
         return [parts[0][:1], parts[0][1:]]
-    # Of whatever geometry beams are, plans are of rigid bodies.
+    # The plan part is needed once: plans treat bodies as rigid, whatever the geometry of the beams.
     return [parts[0], parts[1][:-1]]
 
 
 def _stamp(geometry: Geometry) -> Path:
-    """A file beside the machine code that names Python and processor, as the folder may be shared."""
+    """Return the marker file of a complete compilation, named by Python and processor as the folder may be shared."""
     processor = (binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
     here = repr((sys.version, processor, vars(config)["CPU_NAME"], vars(config)["CPU_FEATURES"], STATE, PLAIN))
     return Path(march.cache_path) / f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"
@@ -122,7 +123,7 @@ def _free_beam(geometry: Geometry) -> NativeRun:
 def _call_start(geometry: Geometry) -> None:
     beam = _free_beam(geometry)
     beam.start()
-    # What a start with prescribed motion is checked with.
+    # Kernel that checks a start with prescribed motion.
     system, still = beam.problem.system, beam.state
     check_accelerations(system, beam.problem.signals, 0.0, still.q, still.v)
     # A linear model.
@@ -135,17 +136,17 @@ def _call_plan(_: Geometry) -> None:
 
 
 def compile_parts(parts: list[str]) -> None:
-    """Compile kernels in this process, which does nothing else: parts as `_shares` names them."""
-    # Who started this process has said so.
+    """Compile the given parts (GEOMETRY:PART, see `_shares`) in this process, which has no other task."""
+    # The parent process has already announced the compilation.
     LOG.setLevel(logging.ERROR)
-    # Nothing that compiling makes is garbage before the end.
+    # Objects made during compilation live until the end, so collecting garbage only takes time.
     gc.disable()
     for part in parts:
         geometry, what = part.split(":")
         _PARTS[what](Geometry(geometry))
 
 
-# The time loop takes as long as everything else together.
+# The time loop takes as long to compile as all other parts together.
 _PARTS = {"time-loop": lambda geometry: _free_beam(geometry).march(0), "start": _call_start, "plan": _call_plan}
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Views of objects in notebooks: tables of plain HTML that take their colours from the page, light or dark.
+"""HTML views of objects in notebooks: plain tables that take their colours from the page, light or dark.
 
-What a mechanism or a run shows takes drawings and metrics, which are made from them. Views therefore stand above what
-they show: `view` knows them by class, and `Shown` asks for them when a notebook does.
+The view of a mechanism or a run needs drawings and metrics, which import the classes of mechanisms and runs. Views are
+therefore registered by class with `view`, in higher modules, and `Shown` imports these when a notebook shows an object.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ from html import escape
 from importlib import import_module
 from typing import Any
 
-# Where views are registered; loaded one after the other until that of a class is there.
+# Modules that register views, imported in this order until the view of the class is registered.
 _VIEWS = ("paraflex.results.html", "paraflex.plots.mechanism_html", "paraflex.studies.html")
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
 
 
 @singledispatch
 def view(thing: object) -> str:
-    """The HTML of an object; `view.register(CLASS)` registers the view of a class."""
+    """Return the HTML of an object; `view.register(CLASS)` registers the function for a class."""
     raise TypeError(f"no view of {type(thing).__name__} is registered")
 
 
 class Shown:
-    """Base of objects with a view in notebooks."""
+    """Base class of objects with a view in notebooks."""
 
     def _repr_html_(self) -> str:
-        """HTML for notebooks."""
+        """Return the HTML for notebooks."""
         for module in _VIEWS:
             if view.dispatch(type(self)) is view.dispatch(object):
                 import_module(module)
@@ -36,17 +36,17 @@ class Shown:
 
 
 def page(title: str, *parts: str) -> str:
-    """A title and the HTML parts below it; empty ones are left out."""
+    """Return a title with HTML parts below it; empty parts are left out."""
     return f"<div><div><strong>{escape(title)}</strong></div>{''.join(part for part in parts if part)}</div>"
 
 
 def sentence(text: str) -> str:
-    """A line of text."""
+    """Return a line of text as HTML, empty for an empty text."""
     return f"<div>{escape(text)}</div>" if text else ""
 
 
 def facts(pairs: Iterable[tuple[str, Any]]) -> str:
-    """Names and values below one another; None and empty values are left out."""
+    """Return a two-column table of names and values; None and empty values are left out."""
     rows = [(name, value) for name, value in pairs if not (value is None or value in ("", [], ()))]
     cells = "".join(
         f'<tr><th style="text-align: left; font-weight: normal; opacity: 0.75">{escape(name)}</th>'
@@ -57,7 +57,7 @@ def facts(pairs: Iterable[tuple[str, Any]]) -> str:
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> str:
-    """A table: numbers on the right, text on the left; empty if there are no rows."""
+    """Return a table with numbers aligned right and text aligned left, an empty text if there are no rows."""
     body = "".join("<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows)
     if not body:
         return ""
@@ -68,7 +68,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str =
 
 
 def written(value: Any) -> str:
-    """A value as text: numbers to four digits, lists with commas, nothing for NaN."""
+    """Format a value as text: floats to four digits, lists with commas, an empty text for None, NaN and infinities."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str):

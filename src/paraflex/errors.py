@@ -1,8 +1,8 @@
-"""Typed errors with the problem, its place and the remedy.
+"""Exception and warning classes, which carry the problem, its place and the remedy.
 
-Two families. An `InputError` is the user's to mend: it names the field, the value and the remedy, and the
-command line turns it into one line and exit code 2. A `NumericalError` names time, step, cause and remedy, and
-carries what was computed until then.
+There are two families of errors. An `InputError` can be corrected by the user: it names the field, the value and the
+remedy, and the command line prints it as one line and exits with code 2. A `NumericalError` names time, step, cause and
+remedy, and carries the results computed until the failure.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from typing import Any, TypeVar
 
 E = TypeVar("E", bound=Enum)
 
-# Names in a message: more than a mechanism's members, or the metrics, are not read.
+# Largest number of names listed in a message; the members of a mechanism and the metrics are fewer.
 _LISTED = 60
 _PACKAGE = os.path.dirname(__file__) + os.sep
 
 
 def printable(text: str) -> str:
-    """A text for a terminal: what would move the cursor, colour or turn round what follows stands as its escape."""
+    """Return a text for a terminal: characters that move the cursor, set colours or reverse the writing are escaped."""
     if text.isprintable():
         return text
     return "".join(one if one.isprintable() or one == "\n" else one.encode("unicode_escape").decode() for one in text)
 
 
 class ParaflexError(Exception):
-    """Base class of every error that paraflex raises."""
+    """Base class of all errors raised by paraflex."""
 
 
 class InputError(ParaflexError, ValueError):
@@ -42,15 +42,15 @@ class InputError(ParaflexError, ValueError):
     Parameters
     ----------
     problem : str
-        What is wrong, in a few words.
+        Description of the error, in a few words.
     field : str
-        The field, option or argument at fault, as the user wrote it ("body.link1.length").
+        Offending field, option or argument, as the user wrote it ("body.link1.length").
     value : object, optional
-        The offending value; left out of the message where there is none.
+        Offending value; left out of the message if None.
     remedy : str
-        What to write instead.
+        Value or text to write instead; empty by default.
     source : str
-        The file the field stands in; empty for Python arguments and command-line options.
+        File that contains the field; empty for Python arguments and command-line options.
     """
 
     def __init__(self, problem: str, *, field: str, value: object = None, remedy: str = "", source: str = "") -> None:
@@ -68,26 +68,26 @@ class InputError(ParaflexError, ValueError):
         return printable(f"{where}: {self.problem}{value}{remedy}").replace("\n", "\\n")
 
     def in_file(self, source: str) -> InputError:
-        """The same error with the name of its file."""
+        """Return the same error with the name of its file."""
         return type(self)(self.problem, field=self.field, value=self.value, remedy=self.remedy, source=source)
 
     def at(self, field: str) -> InputError:
-        """The same error with another option or field."""
+        """Return the same error under another option or field, without a file."""
         return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy)
 
     def advising(self, remedy: str) -> InputError:
-        """The same error with another remedy."""
+        """Return the same error with another remedy."""
         return type(self)(self.problem, field=self.field, value=self.value, remedy=remedy, source=self.source)
 
     def within(self, table: str) -> InputError:
-        """The same error with its field inside a table."""
+        """Return the same error with its field inside a table."""
         field = f"{table}.{self.field}"
         return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy, source=self.source)
 
 
 @contextmanager
 def within(table: str) -> Iterator[None]:
-    """Context whose input errors name their fields inside a table."""
+    """Provide a context whose input errors name their fields inside a table."""
     try:
         yield
     except InputError as error:
@@ -96,7 +96,7 @@ def within(table: str) -> Iterator[None]:
 
 @contextmanager
 def renamed(field: str, *, only: str = "") -> Iterator[None]:
-    """Context whose input errors name another field: all of them, or those of one field only."""
+    """Provide a context that renames the field of input errors: of all, or of those of the field `only`."""
     try:
         yield
     except InputError as error:
@@ -104,16 +104,16 @@ def renamed(field: str, *, only: str = "") -> Iterator[None]:
 
 
 class OutputError(InputError):
-    """A place where results cannot be written."""
+    """A file or folder to which results cannot be written."""
 
 
 def as_enum(kind: type[E], value: E | str, field: str) -> E:
-    """A member of an enumeration from itself or from its value.
+    """Convert a member of an enumeration, or the value of one, to the member.
 
     Raises
     ------
     InputError
-        Anything else, under the field's name.
+        The value is neither; the error names the field.
     """
     try:
         return kind(value)
@@ -124,9 +124,9 @@ def as_enum(kind: type[E], value: E | str, field: str) -> E:
 
 
 def warn_user(warning: ParaflexWarning) -> None:
-    """Issue a warning at the line outside of this package that caused it.
+    """Issue a warning that points to the calling line outside of this package.
 
-    How many calls are between depends on decorators and short cuts, so that no constant `stacklevel` would do.
+    The number of calls in between depends on decorators and code paths, so a constant `stacklevel` cannot be used.
     """
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
@@ -135,9 +135,9 @@ def warn_user(warning: ParaflexWarning) -> None:
 
 
 def suggestion(name: object, known: Iterable[str]) -> str:
-    """A remedy for an unknown name: the nearest known one, or all of them if several are as near.
+    """Return a remedy for an unknown name: the closest known name, or all known names if there is no single closest.
 
-    Where no name is near, one of whose words is near stands for it: "center" for "centre_of_mass".
+    If no name is close as a whole, names that contain a close word are candidates: "centre_of_mass" for "center".
     """
     known = list(known)
     near = get_close_matches(str(name), known, n=2)
@@ -149,13 +149,13 @@ def suggestion(name: object, known: Iterable[str]) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names in a message, the first of them where they are many."""
+    """Join names for a message; beyond 60, only the first 60 and the number of others."""
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return ", ".join(names[:_LISTED]) + more
 
 
 def _short(value: object, limit: int = 80) -> str:
-    """A value in one line; for a longer one its kind."""
+    """Return a value in one line; longer text of built-in types is cut off, other objects are given by their class."""
     text = repr(value).replace("\n", " ")
     if len(text) <= limit:
         return text
@@ -172,11 +172,11 @@ class Moment:
     Attributes
     ----------
     time : float
-        [s]
+        Time [s].
     step : int
-        Accepted steps (or path samples) until then.
+        Number of accepted steps (or path samples) until then.
     position : tuple of float, optional
-        Of the end-effector in the ground frame [m], where it is known.
+        Position of the end-effector in the ground frame [m]; None if unknown.
     """
 
     time: float
@@ -196,13 +196,13 @@ class NumericalError(ParaflexError, ArithmeticError):
     Attributes
     ----------
     cause : str
-        Why, in words.
+        Reason of the failure.
     moment : Moment or None
-        When and where.
+        Time and place of the failure.
     partial : object or None
-        What was computed until then, of the type the function returns.
+        Results computed until the failure, of the type that the function returns.
     remedy : str
-        What to do about it; empty where nothing general can be said.
+        Advice to the user; empty if there is no general one.
     """
 
     def __init__(self, cause: str, moment: Moment | None = None, partial: Any = None, remedy: str = "") -> None:
@@ -222,22 +222,24 @@ class NumericalError(ParaflexError, ArithmeticError):
 
 
 class ProportionError(NumericalError):
-    """Numbers so far apart that equations of them cannot be solved in floating point."""
+    """Numbers of a model that differ by so many orders of magnitude that its equations cannot be solved in floats."""
 
 
 class AssemblyError(NumericalError):
-    """The mechanism's loops cannot be closed at a pose."""
+    """Failure to close the loops of a mechanism at a pose."""
 
 
 class UnreachablePathError(AssemblyError):
-    """The end-effector cannot follow the path: out of reach, or past a Type I singularity.
+    """A path that the end-effector cannot follow: out of reach, or past a Type I singularity.
 
     Attributes
     ----------
+    detail : str
+        Text appended to `problem`; empty by default.
     shortfall : float
-        Distance of the furthest point of the path from those that can be reached [m]; zero where all can.
+        Largest distance of a path point from the reachable points [m]; zero if all can be reached.
     shortfall_angle : float
-        The same of the end-effector's angle, where it is prescribed [rad].
+        Largest such difference of the end-effector's angle, if the path prescribes it [rad].
     """
 
     def __init__(
@@ -258,20 +260,20 @@ class UnreachablePathError(AssemblyError):
 
     @property
     def problem(self) -> str:
-        """Cause, moment, and distance of the path from the workspace."""
+        """Cause and moment, followed by `detail`: the distance of the path from the workspace."""
         return f"{super().problem}: {self.detail}" if self.detail else super().problem
 
 
 class InconsistentConstraintsError(NumericalError):
-    """Constraints that contradict one another in velocity or acceleration, though the loops are closed."""
+    """Constraints that are inconsistent in velocity or acceleration although the loops are closed."""
 
 
 class EquilibriumError(NumericalError):
-    """No static equilibrium is found: something is loose, or joints allow no more of what is given."""
+    """No static equilibrium was found: the mechanism can move freely, or the joints do not allow what is prescribed."""
 
 
 class LimitPointError(EquilibriumError):
-    """Loads or travel beyond the last limit point of a branch of equilibria."""
+    """Loads or prescribed travel beyond the last limit point of a branch of equilibria."""
 
 
 class ActuationError(NumericalError):
@@ -279,27 +281,27 @@ class ActuationError(NumericalError):
 
 
 class SingularActuationError(ActuationError):
-    """The path meets a Type II singularity of the chosen motors."""
+    """A path that meets a Type II singularity of the chosen motors."""
 
 
 class IntegrationError(NumericalError):
-    """Forward simulation stopped before its end: singular constraints, no convergence, or too many steps."""
+    """A forward simulation that stopped early: singular constraints, no convergence, or too many steps."""
 
 
 class SingularPositionError(IntegrationError):
-    """A run reached a singular position, where constraints depend on one another, and did not pass it."""
+    """A run that reached a singular position, where constraints become dependent, and did not pass it."""
 
 
 class SliderOffBeamError(IntegrationError):
-    """A sliding point reached the end of its beam, and the joint has `at_end` "error"."""
+    """A sliding point that reached the end of its beam, where the joint has `at_end` "error"."""
 
 
 class ConstraintDriftError(IntegrationError):
-    """Constraints are violated by more than errors of integration explain."""
+    """Constraint violations larger than integration errors can explain."""
 
 
 class ControllerError(NumericalError):
-    """A controller raised an error, or returned what cannot be torques: the run has ended there."""
+    """A controller that raised an error or returned invalid torques, which ended the run."""
 
 
 class ParaflexWarning(UserWarning):
@@ -308,23 +310,23 @@ class ParaflexWarning(UserWarning):
     Attributes
     ----------
     finding : Finding or None
-        What it is about, with code, place and remedy: see `paraflex.findings`.
+        Finding that the warning reports, with code, place and remedy: see `paraflex.findings`.
     """
 
     finding: Any = None
 
 
 class ModelWarning(ParaflexWarning):
-    """Something in a model or a study is doubtful, but may be intended: see `findings`."""
+    """A doubtful property of a model or a study, which may be intended: see `findings`."""
 
 
 class ResultWarning(ParaflexWarning):
-    """A result is implausible for the mass, size and speed of the mechanism: see `findings`."""
+    """A result that is implausible for the mass, size and speed of the mechanism: see `findings`."""
 
 
 class StiffnessWarning(ParaflexWarning):
-    """Stability requires very many steps of an explicit method."""
+    """An explicit method that needs very many steps, for stability alone."""
 
 
 class ValidityWarning(ParaflexWarning):
-    """The model is not valid for a run: see `validity`."""
+    """A run outside the range of validity of its model: see `validity`."""

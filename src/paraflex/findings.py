@@ -1,6 +1,6 @@
-"""What is found of a model, a study or a result: each finding has a stable code, a place, a text and a remedy.
+"""Findings on a model, a study or a result: each has a stable code, a place, a text and a remedy.
 
-The codes are listed in `CODES`; the page "Findings" of the documentation is made from that table.
+`CODES` lists the codes; the documentation page "Findings" is generated from this table.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from typing import Any
 
 from paraflex.errors import ModelWarning, ParaflexWarning, printable, warn_user
 
-# How a run ends that did what was asked.
+# Final statuses of a run that did what was asked.
 DONE_STATUSES = ("complete", "stopped")
-# Forces with larger errors, as a part of their largest values, are not resolved.
+# Largest error of a resolved force, relative to its largest value.
 RESOLVED = 0.01
 
 __all__ = ["CODES", "DONE_STATUSES", "Code", "Finding", "Level", "Verdict", "warn_of"]
 
 
 class Level(Enum):
-    """How much a finding weighs; a verdict takes the gravest.
+    """Severity of a finding; a verdict has that of its most severe finding.
 
     SOUND
-        Nothing was found.
+        There are no findings.
     DOUBTFUL
-        It may be meant, and runs; look at it before the numbers are trusted.
+        The model runs and may be intended; look at the finding before you trust the numbers.
     WRONG
-        What was asked cannot be had from it.
+        The requested result cannot be computed from the model.
     """
 
     SOUND = "sound"
@@ -38,13 +38,14 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class Code:
-    """What findings of one code have in common.
+    """Common properties of the findings of one code.
 
     Attributes
     ----------
     level : Level
+        Severity.
     meaning : str
-        When it is found, for the documentation.
+        Description of the condition, for the documentation.
     """
 
     level: Level
@@ -138,13 +139,13 @@ class Finding:
     Attributes
     ----------
     code : str
-        Of the table `CODES`; it stays the same from version to version.
+        Key of the table `CODES`, the same in all versions.
     place : str
-        The table or field of the model file it is about ("body.crank.section"), or the mode of a run.
+        Table or field of the model file concerned ("body.crank.section"), or the mode of a run.
     text : str
-        What was found, with numbers and units.
+        Description of the finding, with numbers and units.
     remedy : str
-        What to look at or to write instead.
+        Advice: where to look, or what to write instead.
     """
 
     code: str
@@ -160,7 +161,7 @@ class Finding:
 
     @property
     def level(self) -> Level:
-        """How much it weighs."""
+        """Severity of the finding."""
         return CODES[self.code].level
 
     def __str__(self) -> str:
@@ -168,23 +169,24 @@ class Finding:
         return printable(f"{where}{self.text}; {self.remedy} [{self.code}]")
 
     def to_dict(self) -> dict[str, str]:
-        """For JSON: code, level, place, text, remedy."""
+        """Return code, level, place, text and remedy as a dictionary for JSON."""
         texts = {"place": self.place, "text": self.text, "remedy": self.remedy}
         return {"code": self.code, "level": self.level.value, **texts}
 
     @classmethod
     def from_dict(cls, kept: Mapping[str, str]) -> Finding:
-        """What `to_dict` gave."""
+        """Return the finding from a dictionary made by `to_dict`."""
         return cls(kept["code"], kept["place"], kept["text"], kept["remedy"])
 
 
 @dataclass(frozen=True)
 class Verdict(Sequence[Finding]):
-    """What a check has found, the gravest first.
+    """Findings of a check, the most severe first.
 
     Attributes
     ----------
     findings : tuple of Finding
+        Findings without duplicates, sorted by severity.
     """
 
     findings: tuple[Finding, ...]
@@ -195,7 +197,7 @@ class Verdict(Sequence[Finding]):
 
     @property
     def level(self) -> Level:
-        """Of the gravest finding; sound where there is none."""
+        """Level of the most severe finding; sound if there is none."""
         return self.findings[0].level if self.findings else Level.SOUND
 
     @property
@@ -204,7 +206,7 @@ class Verdict(Sequence[Finding]):
         return tuple(one.code for one in self.findings)
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON: `level` and `findings`."""
+        """Return `level` and `findings` as a dictionary for JSON."""
         return {"level": self.level.value, "findings": [one.to_dict() for one in self.findings]}
 
     def __getitem__(self, k: Any) -> Any:
@@ -218,7 +220,7 @@ class Verdict(Sequence[Finding]):
 
 
 def warn_of(findings: Iterable[Finding], category: type[ParaflexWarning] = ModelWarning) -> None:
-    """Issue a warning of a class of ours for each finding, which is its `finding`."""
+    """Issue a warning of the class `category` for each finding, with the finding as its attribute `finding`."""
     for one in findings:
         warning = category(str(one))
         warning.finding = one

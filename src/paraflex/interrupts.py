@@ -1,7 +1,7 @@
-"""Signals that end a process: put off where they must not fall, kept from processes that this one starts and ends.
+"""Terminating signals: deferred in critical sections, and blocked in child processes, which this process ends itself.
 
-Ctrl-C, SIGTERM, and SIGHUP of a terminal that closes. What they do is up to whoever runs the process: the command says
-so in `cli/signals.py`.
+The signals are Ctrl-C, SIGTERM, and SIGHUP from a closing terminal. Their handlers are set by the application, for the
+command line in `cli/signals.py`.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-# Windows has no SIGHUP, and SIGBREAK for Ctrl-Break.
+# Windows has no SIGHUP, but SIGBREAK for Ctrl-Break.
 ENDING = tuple(
     signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if name in signal.Signals.__members__
 )
-# Of a process whose parent is gone: nobody asks for it.
+# Exit code of a process whose parent has ended; no process reads it.
 _ORPHANED = 1
 
 
 @contextmanager
 def uninterrupted() -> Iterator[list[int]]:
-    """Signals that Python answers are answered when the block is left; within, those that came are in a list."""
+    """Defer signals with Python handlers to the end of the block; the yielded list holds those that arrived within."""
     arrived: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield arrived
@@ -42,7 +42,7 @@ def uninterrupted() -> Iterator[list[int]]:
         try:
             _answer(answered)
         except BaseException:
-            # One came when it was answered again, and others were not yet.
+            # A signal arrived while the handlers were being restored: restore the rest.
             _answer(answered)
             raise
         for number in arrived[:1]:
@@ -55,25 +55,25 @@ def _answer(how: dict[signal.Signals, Any]) -> None:
 
 
 class Calls:
-    """Calls handed to a pool of threads or processes by a thread that signals may interrupt at any moment.
+    """Calls submitted to a pool of threads or processes by a thread that signals may interrupt at any time.
 
-    Pools and futures take their locks in Python: what is raised between leaves one taken, and a worker that ends, and
-    whoever waits for it, wait for ever. So signals are put off while a call is handed over, and the wait is for a
-    queue, whose lock is not left behind.
+    Pools and futures acquire their locks in Python code. An exception raised there by a signal handler would leave a
+    lock acquired, and the workers and their caller would wait for ever. Signals are therefore deferred while a call is
+    submitted, and results are awaited with a queue that does not leave its lock acquired.
     """
 
     def __init__(self) -> None:
         self._done: SimpleQueue[Future[Any]] = SimpleQueue()
 
     def hand(self, submit: Callable[..., Future[Any]], *arguments: Any) -> Future[Any]:
-        """What `submit` gives of the arguments."""
+        """Submit a call with signals deferred, and return the future that `submit` returns."""
         with uninterrupted():
             future = submit(*arguments)
             future.add_done_callback(self._done.put)
         return future
 
     def done(self) -> set[Future[Any]]:
-        """Those that ended since the last call, waited for; none at times, for Ctrl-C to be heard everywhere."""
+        """Return the futures that ended since the last call; wait at most 1 s for one, so that Ctrl-C gets through."""
         ended = set()
         with suppress(Empty):
             ended.add(self._done.get(timeout=1.0))
@@ -84,7 +84,7 @@ class Calls:
 
 @contextmanager
 def starting_processes() -> Iterator[None]:
-    """Processes started within never hear of Ctrl-C or a closed terminal, which reach all of a terminal at once.
+    """Provide a context in which started processes ignore Ctrl-C and SIGHUP, which a terminal sends to all processes.
 
     This process ends them; see `end_with_parent`.
     """
@@ -92,11 +92,11 @@ def starting_processes() -> Iterator[None]:
         if not hasattr(signal, "pthread_sigmask"):
             yield
             return
-        # Handed on to them. Unlike an ignored signal, one that comes meanwhile is not lost to this process.
+        # Child processes inherit the mask. Unlike an ignored signal, a blocked one is not lost to this process.
         kept = {signal.SIGINT, signal.SIGHUP}
         before = signal.pthread_sigmask(signal.SIG_BLOCK, kept)
         try:
-            # It lets SIGINT through again.
+            # Starting the tracker unblocks SIGINT, which is therefore blocked again.
             _start_tracker()
             signal.pthread_sigmask(signal.SIG_BLOCK, kept)
             yield
@@ -105,10 +105,10 @@ def starting_processes() -> Iterator[None]:
 
 
 def _start_tracker() -> None:
-    """Start the process, one for all, by which Python does away with locks that nobody uses any more."""
+    """Start Python's resource tracker, the single process that removes unused locks of multiprocessing."""
     from multiprocessing import resource_tracker
 
-    # What it would warn of is its task: locks of workers that were stopped.
+    # Its warnings about leaked locks are expected: workers are stopped while they hold some.
     sys.warnoptions.append("ignore:resource_tracker")
     try:
         resource_tracker.ensure_running()
@@ -117,13 +117,13 @@ def _start_tracker() -> None:
 
 
 def end_with_parent(pipe: int | None = None) -> None:
-    """End this process when the one that started it has ended, however it did.
+    """End this process when its parent process has ended for whatever reason.
 
     Parameters
     ----------
     pipe : int, optional
-        Descriptor of one that the parent holds the other end of, and writes nothing to; processes of `multiprocessing`
-        have their own.
+        File descriptor of a pipe whose other end the parent holds open without writing to it; not needed by processes
+        of `multiprocessing`.
     """
     from multiprocessing.connection import wait
 
@@ -135,7 +135,7 @@ def end_with_parent(pipe: int | None = None) -> None:
             os.read(pipe, 1)
         elif parent is not None:
             wait([parent.sentinel])
-        # Not `sys.exit`, which ends this thread alone: nothing is left to clean up for.
+        # `sys.exit` would end this thread alone; no clean-up is needed.
         os._exit(_ORPHANED)
 
     if pipe is not None or parent is not None:

@@ -1,4 +1,4 @@
-"""Mechanisms that come with the package: their names and files, and those that a function builds from numbers."""
+"""Mechanisms that come with the package: names and files, and functions that build mechanisms from parameters."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ __all__ = ["chain_of_segments", "environment", "four_bars_in_a_row", "names", "r
 
 
 def environment(name: str = "raparm_i", **settings: Any) -> Environment:
-    """The environment of a mechanism of the library along the path of its study: see `pf.Environment`.
+    """Return the environment of a library mechanism along the path of its study: see `pf.Environment`.
 
     Parameters
     ----------
     name : str
-        Of the mechanism.
+        Name of the mechanism.
     **settings
-        Of the environment.
+        Keyword arguments of `pf.Environment`.
 
     Raises
     ------
     InputError
-        An unknown name, a mechanism without a path, settings that `pf.Environment` refuses.
+        The name is unknown, the mechanism has no path, or `pf.Environment` refuses the settings.
     """
     from paraflex.control.environment import Environment
 

@@ -1,9 +1,9 @@
-"""Seals of binary files: a digest of all bytes, written last and checked when a file is read.
+"""Seals of binary files: a digest of all bytes, written last and checked when the file is read.
 
-A seal stands where other programs do not look: in netCDF files, which are HDF5, after the end that the file itself
-names; in Parquet files between the last page and the footer, which finds pages by their offsets. Programs that write
-such a file anew, or change it by the libraries of these formats, leave no seal, and it is read unchecked, as files of
-earlier releases are.
+The seal is stored at a place that other programs ignore: in netCDF files, which are HDF5, after the end of file that
+the superblock gives; in Parquet files between the last page and the footer, which addresses pages by their offsets.
+Programs that rewrite such a file, or change it with the libraries of these formats, leave no seal. The file is then
+read unchecked, like files of earlier releases.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from typing import BinaryIO
 from paraflex.errors import InputError
 
 NETCDF, PARQUET = b"\x89HDF", b"PAR1"
-# The last file without a seal that this process has read, if any: it may hold anything.
+# The last file without a seal that this process has read, if any; its contents are unchecked.
 unsealed: list[Path] = []
 _MARK = b"paraflex"
 _DIGEST = 24
 _SEAL = len(_MARK) + _DIGEST
-# So much is read at once [bytes].
+# Number of bytes read at once.
 _PIECE = 1 << 20
-# Behind a Parquet file's footer stand its length and the mark.
+# The footer of a Parquet file is followed by its length and the format's mark, 4 bytes each.
 _TAIL = 8
 
 
 def seal(file: Path) -> None:
-    """Put the digest of a netCDF or Parquet file into it."""
+    """Write the digest of a netCDF or Parquet file into the file."""
     with file.open("rb+") as stream:
         start, end = _place(stream)
         digest = _digest(stream, start, start)
@@ -38,18 +38,19 @@ def seal(file: Path) -> None:
 
 
 def check_seal(file: Path, remedy: str) -> None:
-    """See that a file is as it was written, as far as it has a seal.
+    """Check that a file is unchanged since it was sealed; a file without a seal is recorded in `unsealed`.
 
     Parameters
     ----------
     file : Path
+        netCDF or Parquet file.
     remedy : str
-        Of the errors.
+        Remedy of the error for a damaged file.
 
     Raises
     ------
     InputError
-        It is damaged, or cannot be read.
+        The file is damaged, or cannot be read.
     """
     try:
         with file.open("rb") as stream:
@@ -63,23 +64,23 @@ def check_seal(file: Path, remedy: str) -> None:
 
 
 def unreadable(error: OSError, file: Path, remedy: str = "check its permissions") -> InputError:
-    """The error of a file that cannot be read, with the system's reason."""
+    """Return the error for a file that cannot be read, with the reason that the system gives."""
     return InputError(f"cannot be read ({error.strerror or error})", field=str(file), remedy=remedy)
 
 
 def check_regular(file: Path) -> None:
-    """Raise an OSError for what may never end, or begin, to be read, as foreign folders may hold."""
+    """Raise an OSError for a pipe or a device, as reading it may block or never end."""
     if file.is_fifo() or file.is_char_device():
         raise OSError("a pipe or a device, not a file")
 
 
 def damaged(file: Path, why: str, remedy: str) -> InputError:
-    """The error of a file that is not what was written."""
+    """Return the error for a file that was changed or cut off after it was written."""
     return InputError(f"damaged: {why}", field=str(file), remedy=remedy)
 
 
 def _state(stream: BinaryIO) -> tuple[bool, bool]:
-    """Whether a file has a seal, and whether it is as it was written, as far as that can be seen."""
+    """Return whether a file has a seal, and whether it is unchanged as far as the seal or the given end can show."""
     start, end = _place(stream)
     start = max(start - _SEAL, 0)
     stream.seek(start)
@@ -90,7 +91,7 @@ def _state(stream: BinaryIO) -> tuple[bool, bool]:
 
 
 def _place(stream: BinaryIO) -> tuple[int, int]:
-    """Where a seal is to stand, or ends, and where the file ends."""
+    """Return the offset at which a seal is inserted, or at which an existing one ends, and the size of the file."""
     end = stream.seek(0, 2)
     stream.seek(0)
     if stream.read(len(PARQUET)) != PARQUET or end < _TAIL:
@@ -101,17 +102,17 @@ def _place(stream: BinaryIO) -> tuple[int, int]:
 
 
 def _named_end(stream: BinaryIO, end: int) -> int:
-    """Where an HDF5 file says that it ends: what lies behind it was a seal. Of other files where they do end."""
+    """Return the end of an HDF5 file according to its superblock; bytes behind it were a seal. Else return `end`."""
     stream.seek(0)
     head = stream.read(36)
-    # Superblocks of these versions, with offsets of 8 bytes.
+    # The end is read from superblocks of versions 2 and 3 with 8-byte offsets only.
     if head[:4] == NETCDF and len(head) == 36 and head[8] in (2, 3) and head[9] == 8:
         return int.from_bytes(head[28:36], "little")
     return end
 
 
 def _digest(stream: BinaryIO, stop: int, go_on: int) -> bytes:
-    """Of all bytes before one place and from another on."""
+    """Return the digest of all bytes before the offset `stop` and from the offset `go_on`."""
     found = hashlib.blake2b(digest_size=_DIGEST)
     stream.seek(0)
     left = stop

@@ -1,4 +1,4 @@
-"""Units of quantities: factors to SI units and dimensions, and quantities such as "80 mm" within a text."""
+"""Units of quantities: factors to SI units, dimensions, and parsing of quantities such as "80 mm" within a text."""
 
 from __future__ import annotations
 
@@ -9,55 +9,55 @@ from fractions import Fraction
 from functools import cache
 from typing import NamedTuple
 
-# Exponents of metre, kilogram, second, radian and ampere. An angle counts, so that a speed in rpm is none in m/s.
+# Exponents of metre, kilogram, second, radian and ampere. Angles have a dimension, so that rpm differs from 1/s.
 Dimension = tuple[int, int, int, int, int]
 PLAIN: Dimension = (0, 0, 0, 0, 0)
 ANGLE: Dimension = (0, 0, 0, 1, 0)
 
 
 class DisplayUnit(NamedTuple):
-    """A unit for display: its name, and the factor from SI."""
+    """Unit for display: its name, and the factor from SI units."""
 
     name: str
     factor: float
 
 
-# Of every stress that is printed or drawn; moduli may be in GPa.
+# Unit of every stress that is printed or drawn; moduli may be in GPa.
 STRESS = DisplayUnit("MPa", 1e-6)
 
 
 def printed_unit(unit: str) -> DisplayUnit:
-    """The unit of a quantity in tables of commands: MPa of stresses, nothing of plain numbers, else the SI unit."""
+    """Return the unit of a quantity in printed tables: MPa for stresses, empty for plain numbers, else the SI unit."""
     return STRESS if unit == "Pa" else DisplayUnit("" if unit == "1" else unit, 1.0)
 
 
 def speed_text(speed: float, unit: str, form: str = ".4g") -> str:
-    """A speed in m/s or rad/s; of the latter also in rpm, as what is given without a unit may have been meant so."""
+    """Format a speed in m/s or rad/s; the latter also in rpm, as a value given without a unit may have been in rpm."""
     turns = f", {speed * 30.0 / math.pi:{form}} rpm" if unit == "rad/s" else ""
     return f"{speed:{form}} {unit}{turns}"
 
 
 class Unit(NamedTuple):
-    """A unit: `factor` times pi to the power `pi` in SI units, exact, and its dimension."""
+    """Unit with its exact value in SI units, `factor` times pi to the power `pi`, and its dimension."""
 
     factor: Fraction
     pi: int
     dimension: Dimension
 
     def times(self, other: Unit, power: int) -> Unit:
-        """The product with a power of another unit."""
+        """Return the product with a power of another unit."""
         dimension = tuple(one + power * two for one, two in zip(self.dimension, other.dimension, strict=True))
         return Unit(self.factor * other.factor**power, self.pi + power * other.pi, dimension)  # type: ignore[arg-type]
 
     def in_si(self, number: str) -> float:
-        """A number of this unit in SI units, rounded once as far as pi allows: 1.1 mm is the float 0.0011."""
+        """Convert a number of this unit to SI units, rounded once (without pi): 1.1 mm is the float 0.0011."""
         try:
             return float(Fraction(number) * self.factor) * math.pi**self.pi
         except OverflowError:
             return math.inf
 
 
-# What most machines are described in; one wrong letter is sooner meant as one of these.
+# Units of most machine descriptions; an unknown unit with one wrong letter is more likely one of these.
 _COMMON = ("mm", "cm", "kg", "ms", "kN", "deg", "rad", "rpm", "MPa", "GPa")
 _ONE = Unit(Fraction(1), 0, PLAIN)
 
@@ -111,21 +111,21 @@ _POWERS = {"²": 2, "³": 3, "⁴": 4}
 
 
 def _factor(group: str) -> str:
-    """Pattern of a known unit and its power, with groups for both or without groups."""
+    """Return the pattern of a known unit and its power; `group` opens capturing or non-capturing groups for both."""
     known = "|".join(map(re.escape, sorted(UNITS, key=len, reverse=True)))
     return rf"{group}{known})(?![^\W²³⁴]|\()(?:\s*\^\s*{group}-?\d)|{group}[²³⁴]))?"
 
 
-# What joins units: no *, behind which a parameter or the time t may stand; and nothing is divided by tonnes.
+# Operators between units. The * is left out, as a parameter or the time t may follow it; /t is time, not tonnes.
 _OPERATOR = r"\s*/\s*(?!t\b)|\s*·\s*|\s+"
-# A number and a unit behind it; a quotient of units may begin with 1.
+# A number followed by a unit; a quotient of units may begin with 1.
 _QUANTITY = re.compile(rf"({_NUMBER})\s*((?:1\s*/\s*)?{_factor('(?:')}(?:(?:{_OPERATOR}){_factor('(?:')})*)")
 _FACTOR = re.compile(rf"({_OPERATOR}|^){_factor('(')}")
 _BEHIND_NUMBER = re.compile(rf"{_NUMBER}\s*([^\W\d]\w*)")
 
 
 class NumberWithUnit(NamedTuple):
-    """A number with a unit in a text: where it begins and ends, its value in SI units, and its unit as written."""
+    """Number with a unit in a text: its start and end, its value in SI units, and its unit as written."""
 
     start: int
     end: int
@@ -135,7 +135,7 @@ class NumberWithUnit(NamedTuple):
 
 @cache
 def unit_named(text: str) -> Unit:
-    """The unit of a text such as "mm", "N m/rad" or "1/s": a quotient divides by the next factor alone."""
+    """Return the unit of a text such as "mm", "N m/rad" or "1/s"; each / divides by the next factor alone."""
     unit = _ONE
     for found in _FACTOR.finditer(text.removeprefix("1")):
         power = int(found[3] or _POWERS.get(found[4], 1))
@@ -144,12 +144,12 @@ def unit_named(text: str) -> Unit:
 
 
 def unit_of(text: str) -> Unit | None:
-    """The unit that a text is, None for a text that is no unit."""
+    """Return the unit that a text names, or None if it is not a unit."""
     return unit_named(text.strip()) if _QUANTITY.fullmatch(f"1 {text.strip()}") else None
 
 
 def quantities_in(text: str) -> list[NumberWithUnit]:
-    """Numbers with units in a text, in their order."""
+    """Return the numbers with units in a text, in their order."""
     return [
         NumberWithUnit(*found.span(), unit_named(found[2]).in_si(found[1]), found[2])
         for found in _QUANTITY.finditer(text)
@@ -157,17 +157,17 @@ def quantities_in(text: str) -> list[NumberWithUnit]:
 
 
 def without_quantities(text: str) -> str:
-    """A text without its numbers with units."""
+    """Return a text with each number with a unit replaced by a space."""
     return _QUANTITY.sub(" ", text)
 
 
 def divisors_in(unit: str) -> set[str]:
-    """Names in a unit that stand behind /, where a parameter of an expression could stand as well."""
+    """Return the names in a unit that follow a /, where a parameter of an expression could stand as well."""
     return {found[2] for found in _FACTOR.finditer(unit) if "/" in found[1]}
 
 
 def unknown_unit(text: str) -> tuple[str, str] | None:
-    """The first word behind a number in a text that is no unit, and a remedy."""
+    """Return the first word after a number in a text that is not a unit, and a remedy; None if there is none."""
     for found in _BEHIND_NUMBER.finditer(text):
         if found[1] not in UNITS:
             near = list(dict.fromkeys([*_mistyped(found[1]), *get_close_matches(found[1], UNITS, n=1)]))
@@ -177,26 +177,26 @@ def unknown_unit(text: str) -> tuple[str, str] | None:
 
 
 def _mistyped(word: str) -> list[str]:
-    """Units of machines that differ from a word in one of its letters."""
+    """Return the common units that differ from a word in exactly one letter."""
     alike = (each for each in _COMMON if len(each) == len(word) > 1)
     return [each for each in alike if sum(one != other for one, other in zip(each, word, strict=True)) == 1]
 
 
-# Units of fields of files, as their descriptions name them.
+# Units of the fields of model files, as written in their descriptions.
 FIELD_UNITS = (
     "kg m^2", "kg/m^3", "kg m", "kg", "N m s/rad", "N m/rad/s", "N m/rad", "N s/m", "N m/s", "N m/A", "N m", "N/m/s",
     "N/m", "N/s", "m/s^2", "m^4", "m^2", "m/s", "rad/s", "rad/m", "rad", "Pa", "Hz", "1/s", "V s/rad", "V", "ohm", "m",
     "s", "N", "A", "H",
 )  # fmt: skip
 
-# What a travel, a torque, a stiffness or a speed at a joint is where the joint slides.
+# Units of travel, torque, stiffness and speed at a sliding joint, by their units at a revolute joint.
 WHERE_IT_SLIDES = {
     "N m/rad": "N/m", "N m s/rad": "N s/m", "N m": "N", "rad": "m", "rad/s": "m/s", "rad/N/m": "m/N",
 }  # fmt: skip
 
 
 def spelt(dimension: Dimension) -> str:
-    """The SI unit of a dimension."""
+    """Return the SI unit of a dimension, as the fields of files spell it where they have it."""
     for unit in FIELD_UNITS:
         if unit_named(unit).dimension == dimension:
             return unit

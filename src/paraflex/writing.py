@@ -1,7 +1,7 @@
-"""Files and folders that are written whole or not at all.
+"""Atomic writing of files and folders: each is written completely or not at all.
 
-What is being written has another name until it is complete. An error or Ctrl-C on the way leaves what was there before,
-and nothing half written beside it.
+A file has another name until it is complete. After an error or Ctrl-C, the previous file is still there and no partial
+file is left beside it.
 """
 
 from __future__ import annotations
@@ -20,31 +20,34 @@ from paraflex.errors import InputError, OutputError
 from paraflex.seals import check_regular, damaged, seal, unreadable
 
 ELSEWHERE = "choose another folder"
-# Under which key a file of JSON has the digest of the others.
+# Key of a JSON file under which the digest of all other entries is stored.
 _DIGEST = "digest"
-# What Windows takes in no name, and the names that it keeps for devices.
+# Characters that Windows forbids in file names, and names that it reserves for devices.
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
 _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(10))}
-# Of what is gone on with where it was left.
+# Remedy for computations that resume where they stopped.
 GO_ON = "what is written stays; free some space and run the same command again: it goes on from there"
 
 
 @contextmanager
 def whole_file(path: Path, *, remedy: str = ELSEWHERE, field: str = "", parents: bool = True) -> Iterator[Path]:
-    """The name to write a file under, which takes the place of `path` when it is complete and on the disk.
+    """Provide a temporary name for a file, which replaces `path` when it is complete and on the disk.
 
     Parameters
     ----------
     path : Path
+        File to write.
     remedy, field : str
-        Of the error; its field is the file by default.
+        Remedy and field of the error; the field is the file by default.
     parents : bool
-        Whether folders are made that the file is to be in.
+        Whether missing parent folders are created.
 
     Raises
     ------
+    InputError
+        `path` does not name a file.
     OutputError
-        It cannot be written.
+        The file cannot be written.
     """
     if not path.name:
         raise InputError("names no file", field=field or "path", value=str(path), remedy="give a file's name")
@@ -52,7 +55,7 @@ def whole_file(path: Path, *, remedy: str = ELSEWHERE, field: str = "", parents:
     try:
         if parents:
             path.parent.mkdir(parents=True, exist_ok=True)
-        # A link, perhaps, through which another file would be written.
+        # It may be a link, through which another file would be overwritten.
         unfinished.unlink(missing_ok=True)
         yield unfinished
         with unfinished.open("rb+") as opened:
@@ -67,7 +70,7 @@ def whole_file(path: Path, *, remedy: str = ELSEWHERE, field: str = "", parents:
 
 @contextmanager
 def sealed_file(path: Path, **options: Any) -> Iterator[Path]:
-    """The name to write a netCDF or Parquet file under, which gets a digest of its bytes; see `whole_file`."""
+    """Provide a temporary name for a netCDF or Parquet file, which is sealed with a digest; see `whole_file`."""
     with whole_file(path, **options) as unfinished:
         yield unfinished
         seal(unfinished)
@@ -75,20 +78,21 @@ def sealed_file(path: Path, **options: Any) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(path: Path, *, replaced: str, remedy: str = ELSEWHERE) -> Iterator[Path]:
-    """A folder to write files to, which move to `path` when all are complete.
+    """Provide a temporary folder, whose files move to `path` when all are complete.
 
     Parameters
     ----------
     path : Path
+        Folder to write.
     replaced : str
-        Pattern of the files of `path` that they replace; others stay.
+        Glob pattern of the existing files in `path` that are removed; others stay.
     remedy : str
-        Of the error.
+        Remedy of the error.
 
     Raises
     ------
     OutputError
-        It cannot be written.
+        The folder cannot be written.
     """
     unfinished = path.with_name(path.name + ".part")
     try:
@@ -109,30 +113,30 @@ def whole_folder(path: Path, *, replaced: str, remedy: str = ELSEWHERE) -> Itera
 
 
 def write_text(path: Path, text: str, **options: Any) -> None:
-    """Write a file of text; see `whole_file` for the options and errors."""
+    """Write a text file; see `whole_file` for the options and errors."""
     with whole_file(path, **options) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
 
 
 def write_json(path: Path, data: Any, **options: Any) -> None:
-    """Write plain values as JSON, others as their text; see `whole_file` for the options and errors.
+    """Write plain values as JSON, other objects as their text; see `whole_file` for the options and errors.
 
-    A table gets a digest of what it says, which `read_json` checks.
+    A dictionary gets a digest of its contents, which `read_json` checks.
     """
     if isinstance(data, dict):
-        # Of what is read again: keys and values are those of JSON.
+        # The digest is that of the data as read back, whose keys and values have JSON types.
         plain = json.loads(json.dumps(data, default=str))
         data = plain | {_DIGEST: _digest(plain)}
     write_text(path, json.dumps(data, indent=2, default=str) + "\n", **options)
 
 
 def read_json(file: Path, remedy: str = "run the same command again") -> dict[str, Any]:
-    """The table that a file of JSON holds, without its digest; see `read_values`.
+    """Read a dictionary from a JSON file, without its digest; see `read_values`.
 
     Raises
     ------
     InputError
-        It holds something else.
+        The file does not hold a dictionary.
     """
     found = read_values(file, remedy)
     if not isinstance(found, dict):
@@ -141,18 +145,19 @@ def read_json(file: Path, remedy: str = "run the same command again") -> dict[st
 
 
 def read_values(file: Path, remedy: str) -> Any:
-    """What a file of JSON holds; of a table with a digest all else.
+    """Read the contents of a JSON file; the digest of a dictionary is checked and left out.
 
     Parameters
     ----------
     file : Path
+        JSON file.
     remedy : str
-        Of the errors.
+        Remedy of the errors.
 
     Raises
     ------
     InputError
-        It is damaged, or cannot be read.
+        The file is damaged, or cannot be read.
     """
     try:
         check_regular(file)
@@ -172,12 +177,12 @@ def _digest(table: dict[str, Any]) -> str:
 
 
 def portable_name(text: str) -> str:
-    """A file's name on every system, of what users call modes, paths and models; the same where it is one already."""
+    """Convert the name of a mode, path or model to a file name valid on every system; valid names are unchanged."""
     name = _FORBIDDEN.sub("_", text).rstrip(". ")
     return f"_{name}" if name.partition(".")[0].upper() in _DEVICES else name or "_"
 
 
 def unwritable(error: Exception, field: str, remedy: str, value: str | None = None) -> OutputError:
-    """The error of a place that cannot be written, with the system's reason."""
+    """Return the error for a file or folder that cannot be written, with the reason that the system gives."""
     reason = (getattr(error, "strerror", None) or str(error)).lower()
     return OutputError(f"cannot be written ({reason})", field=field, value=value, remedy=remedy)

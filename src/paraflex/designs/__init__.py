@@ -1,1 +1,1 @@
-"""Designs: the parameters of a model, and the metrics of its runs."""
+"""Designs: values of the parameters of a model, and the metrics of its runs."""

@@ -1,4 +1,4 @@
-"""Metrics of runs as columns of a table, and as smooth functions of a run near another."""
+"""Metrics of runs as columns of a table, and as smooth functions of a perturbed run."""
 
 from __future__ import annotations
 
@@ -40,25 +40,34 @@ Runs = TrackingRun | MotionRun | Statics
 RunsTraces = RunTraces | MotionTraces | StaticsTraces
 _OF_RUNS = {PATH: "runs along a path", MOTION: "runs without a path", STATICS: "statics"}
 
-# Metrics of loads that redundant constraints may share, and those that short peaks between samples may be missing from.
+# Metrics of loads that redundant constraints may share, and those that may miss short peaks between samples.
 _SHARED_LOADS = ("drive_torque_max", "drive_power_max", "joint_force_max")
 _LARGEST_LOADS = ("stress_max", "safety_factor_min", "section_moment_max", *_SHARED_LOADS)
-# Metrics that have derivatives.
+# Metrics that are differentiable.
 SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)
 
 
 def metric_of(column: str) -> Metric:
-    """The metric of a column."""
+    """Return the metric of a column."""
     return METRICS[metric_name(column)]
 
 
 def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tuple(METRICS)) -> None:
-    """None if there is such a metric.
+    """Check that the metric of a column exists.
+
+    Parameters
+    ----------
+    column : str
+        Metric, or column NAME.MEMBER.
+    field : str
+        Field of the error.
+    known : sequence of str
+        Names that the error suggests; by default those of all metrics.
 
     Raises
     ------
     InputError
-        There is none; it proposes one of those known.
+        The metric does not exist.
     """
     name = metric_name(column)
     if name not in METRICS:
@@ -67,10 +76,10 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
 
 
 def members_of(mechanism: Mechanism, given: Conditions | None = None) -> Members:
-    """What of a mechanism metrics have a column each of, by name, and of these what slides.
+    """Return the names of the members with one column of a metric each, by kind, and of those that slide.
 
-    Motors, drives (prescribed motions) and joints, or of equilibria what is given: named coordinates, and those with a
-    stiffness.
+    The members are motors, drives (prescribed motions) and joints. If `given` holds the conditions of equilibria, they
+    are the named coordinates, and those with a stiffness.
     """
     if given is not None:
         straight = tuple(one.name for one in given.coordinates if one.unit == "m")
@@ -88,22 +97,23 @@ def members_of(mechanism: Mechanism, given: Conditions | None = None) -> Members
 def metrics_of(
     names: Sequence[str], error: ErrorSpan | str, mechanism: Mechanism | None = None, runs: str = PATH
 ) -> tuple[str, ...]:
-    """Metrics in the given order; if none is given those that are kept of such runs, with the ranking error first.
+    """Return the metrics of a study in the given order, followed by those that are always kept.
 
     Parameters
     ----------
     names : sequence of str
+        Names of the metrics; if empty, those kept by default for such runs, with the ranking error first.
     error : ErrorSpan or str
-        The tracking error that ranks runs along a path.
+        Tracking error that ranks runs along a path.
     mechanism : Mechanism, optional
-        Of the runs: without motors no metrics of these are kept.
+        Mechanism of the runs; without motors, metrics of motors are not kept by default.
     runs : str
-        "path", "motion" or "statics".
+        Kind of runs: "path", "motion" or "statics".
 
     Raises
     ------
     InputError
-        An unknown name, or one that such runs do not have.
+        A name is unknown, or such runs do not have the metric.
     """
     for name in names:
         check_metric(name)
@@ -122,14 +132,14 @@ def metrics_of(
         return tuple(dict.fromkeys([*names, *ALWAYS[runs]]))
     motors = mechanism is None or mechanism.motors
     kept = [one.name for one in METRICS.values() if one.is_kept_of(runs) and (motors or not one.of_motors)]
-    # First what such runs are made for.
+    # The metrics for which such runs are made come first.
     first = {PATH: [HEADLINE[as_enum(ErrorSpan, error, "error")]],
              STATICS: [name for name in kept if METRICS[name].runs == (STATICS,)]}.get(runs, [])  # fmt: skip
     return tuple(dict.fromkeys([*first, *kept, *ALWAYS[runs]]))
 
 
 def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
-    """Columns of the metrics by name, NAME.MEMBER for those of each motor, joint or other member."""
+    """Return the columns of metrics: NAME, or NAME.MEMBER for those of each motor, joint or other member."""
     if isinstance(run, Statics):
         members = members_of(run.system.described, run.equations.given)
     else:
@@ -138,17 +148,17 @@ def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def metric_values(traces: RunsTraces, nominal: RunsTraces, names: Sequence[str]) -> NDArray[Any]:
-    """Numbers of `metric_columns` for a run near another."""
+    """Return the values of `metric_columns` for a run, with maxima and signs decided by a nominal run."""
     return np.concatenate([np.zeros(0), *(np.ravel(METRICS[name].formula(traces, nominal)) for name in names)])
 
 
 def measure(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
-    """Metrics of a run that ran to its end by column, in the order of the names.
+    """Return the metrics of a complete run by column, in the order of the names.
 
     Raises
     ------
     IntegrationError
-        The run stopped before, at the end of a beam say: its numbers are not those of a whole run.
+        The run was stopped by an event, such as the end of a beam, so that metrics of a whole run do not exist.
     """
     solution = run.solution
     if solution.event:
@@ -161,7 +171,10 @@ def measure(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
 
 
 def coarseness(run: Runs, names: Sequence[str]) -> str:
-    """Why metrics of loads may be off: peaks between samples, errors of integration, shared loads; or nothing."""
+    """Return the reasons why load metrics are doubtful: peaks between samples, integration errors, shared loads.
+
+    The text is empty if there is no reason.
+    """
     found = [one for one in run.solution.findings if one.code == COARSE] if set(names) & set(_LARGEST_LOADS) else []
     if set(names) & set(_SHARED_LOADS):
         system = run_traces(run).system
@@ -170,24 +183,24 @@ def coarseness(run: Runs, names: Sequence[str]) -> str:
 
 
 def coarse_runs(runs: int) -> str:
-    """A sentence on runs whose loads `coarseness` doubts."""
+    """Return a sentence on the number of runs for whose loads `coarseness` gives a reason."""
     which = "one run has" if runs == 1 else f"{runs} runs have"
     what = "larger between samples, off by errors of integration, or not determined"
     return f"{which} loads that are {what} (column reason)"
 
 
 def smooth_metrics(names: Sequence[str]) -> tuple[str, ...]:
-    """The metrics that have derivatives."""
+    """Return the metrics that are differentiable."""
     return tuple(name for name in names if METRICS[name].smooth)
 
 
 def check_smooth(names: Sequence[str]) -> None:
-    """None if every metric of these names has derivatives.
+    """Check that all metrics are differentiable.
 
     Raises
     ------
     InputError
-        One that counts or measures what the integration did.
+        A metric is not differentiable, such as one that describes the integration.
     """
     for name in names:
         if name not in SMOOTH:
@@ -197,6 +210,6 @@ def check_smooth(names: Sequence[str]) -> None:
 
 
 def beyond_limits(runs: int) -> str:
-    """A sentence on runs whose validity is above 1."""
+    """Return a sentence on the number of runs whose validity is above 1."""
     which = "one run is" if runs == 1 else f"{runs} runs are"
     return f"{which} beyond what the model can describe (column {VALIDITY} above 1): use second-order geometry"

@@ -1,4 +1,4 @@
-"""A design without a path, ready to run: its mechanism moves under its loads, prescribed motions and given torques."""
+"""Designs without a path, ready to run: the mechanism moves under loads, prescribed motions and given torques."""
 
 from __future__ import annotations
 
@@ -17,19 +17,22 @@ from paraflex.motion import MotionRun, simulate_motion, state_at
 
 @dataclass(frozen=True)
 class OwnMotion:
-    """What `paraflex run` runs of a model without a path.
+    """Run of a model without a path, as by `paraflex run`.
 
     Attributes
     ----------
     mechanism : Mechanism
+        Mechanism to simulate.
     start : State
+        Initial state.
     duration : float
-        [s]
+        Duration [s].
     samples : int
+        Number of samples.
     torques : mapping of str to float or AngleLaw
-        Of motors by name.
+        Torque [N m] or force [N] of each motor by name, constant or over time.
     controllers : sequence of ControllerDescription
-        In place of torques.
+        Sampled controllers, which replace the torques; none by default.
     """
 
     mechanism: Mechanism
@@ -40,7 +43,7 @@ class OwnMotion:
     controllers: Sequence[ControllerDescription] = ()
 
     def simulate(self, options: IntegrationOptions, watch: Callable[[float], None] | None) -> MotionRun:
-        """Integrate it; `watch` is called with the time reached [s]."""
+        """Integrate the motion; `watch` is called with the time reached [s]."""
         if self.controllers:
             return simulate_controlled_motion(
                 self.mechanism, self.duration, self.controllers, samples=self.samples, start=self.start,
@@ -55,12 +58,25 @@ class OwnMotion:
 def own_motion(
     model: Model, duration: float | None, samples: int | None, assembly: str | None, *, balanced: bool
 ) -> OwnMotion:
-    """The motion of a model without a path; what is None is as its [study] has it.
+    """Return the run of a model without a path.
+
+    Parameters
+    ----------
+    model : Model
+        Model as read.
+    duration : float or None
+        Duration [s]; None for that of the [study] table.
+    samples : int or None
+        Number of samples; None for that of the [study] table.
+    assembly : str or None
+        Name of the assembly; None for that of the [study] table.
+    balanced : bool
+        Whether the run starts in the deflections of steady running.
 
     Raises
     ------
     InputError
-        There is no duration; or see `motion.state_at`.
+        There is no duration; see also `motion.state_at`.
     AssemblyError
         The loops do not close.
     """
@@ -72,12 +88,12 @@ def own_motion(
 
 
 def own_duration(model: Model, duration: float | None) -> float:
-    """How long a model without a path runs [s]: as asked, else as its [study] has it.
+    """Return the duration [s] of a model without a path: the given one, else that of its [study] table.
 
     Raises
     ------
     InputError
-        Neither says it.
+        There is neither.
     """
     duration = model.study.duration if duration is None else duration
     if duration is None:

@@ -1,4 +1,4 @@
-"""A design whose equilibria are found in place of a run."""
+"""Designs for which static equilibria are computed instead of a run."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ from paraflex.equilibria import Statics, statics
 from paraflex.errors import InputError
 from paraflex.files import Model
 
-# Fields of a study that are of runs.
+# Fields of a study that apply to runs only.
 _OF_RUNS = ("paths", "modes", "duration", "samples", "balanced", "integration")
 
 
 @dataclass(frozen=True)
 class OwnStatics:
-    """What `paraflex statics` finds of a model.
+    """Static analysis of a model, as by `paraflex statics`.
 
     Attributes
     ----------
     model : Model
+        Model as read.
     assembly : str, optional
-        By default its own start, else the assembly of its study.
+        Name of the assembly; by default the model's own start, else the assembly of its study.
     buckling : bool
-        Whether factors of buckling are asked for: they take half of the time.
+        Whether buckling factors are computed, which takes half of the time.
     """
 
     model: Model
@@ -31,18 +32,18 @@ class OwnStatics:
     buckling: bool
 
     def found(self) -> Statics:
-        """The equilibria; see `equilibria.statics` for the errors."""
+        """Compute the equilibria; see `equilibria.statics` for the errors."""
         own = None if self.model.start is not None else self.model.study.assembly
         return statics(self.model, assembly=self.assembly or own, buckling=None if self.buckling else 0, warning=False)
 
 
 def check_of_statics(given: Collection[str]) -> None:
-    """None if a study of equilibria, of which these fields are given, says nothing about runs.
+    """Check that a study of equilibria has no fields for runs, from the names of the fields given.
 
     Raises
     ------
     InputError
-        It does, by field.
+        A field applies to runs only; the error names it.
     """
     for name in _OF_RUNS:
         if name in given:

@@ -1,4 +1,4 @@
-"""A study's folder opened again: its parameters and mechanism, and single runs repeated."""
+"""Reopening of a study's folder: its parameters and mechanism, and repetition of single runs."""
 
 from __future__ import annotations
 
@@ -21,21 +21,24 @@ _AGAIN = "run the study again, in a new folder"
 
 @dataclass(frozen=True)
 class StudyFolder:
-    """Content of a folder's `study.json`.
+    """Contents of a folder's `study.json`.
 
     Attributes
     ----------
     folder : Path
+        Folder of the study.
     name : str
+        Name of the study.
     runs : int or None
-        Of the whole study; None of a search, which has no number of its own.
+        Number of runs of the whole study; None for a search, whose number of runs is not fixed.
     sampling : str
-        "grid", "sobol", ...; "search" of an optimisation.
+        Kind of sampling, such as "grid" or "sobol"; "search" for an optimisation.
     setting : Setting
+        Common settings of all runs.
     ranges : mapping of str to (float, float, str)
-        Lowest and highest value of parameters and how they are spread, where the folder tells.
+        Lowest and highest value of each parameter, and "log", "linear" or "values"; empty if the folder has none.
     versions : mapping of str to str
-        That its runs were made by.
+        Versions of the packages with which the runs were made.
     """
 
     folder: Path
@@ -48,36 +51,39 @@ class StudyFolder:
 
     @property
     def same_versions(self) -> bool:
-        """Whether runs made now would equal those of the folder to the last bit."""
+        """Whether runs made now would be bitwise equal to those of the folder."""
         return all(versions()[name] == had for name, had in self.versions.items() if name in versions())
 
 
 def study_account(
     name: str, setting: Setting, parameters: Sequence[Varied], content: Mapping[str, Any], **more: Any
 ) -> dict[str, Any]:
-    """Content of the `study.json` of a folder.
+    """Return the contents of the `study.json` of a folder.
 
     Parameters
     ----------
     name : str
+        Name of the study.
     setting : Setting
+        Common settings of all runs.
     parameters : sequence of Varied
+        Parameters of the study.
     content : mapping
-        What the results depend on, in plain values.
+        All inputs that determine the results, as plain values.
     **more
-        More of `StudyFolder`.
+        Further fields of `StudyFolder`.
     """
     account = {"content": digest(content), "versions": dict(setting.versions), "format": 1, "name": name}
     return account | more | {"ranges": {each.name: _range(each) for each in parameters}, "study": content}
 
 
 def open_study(folder: str | Path) -> StudyFolder:
-    """The study whose results a folder holds.
+    """Return the study whose results a folder holds.
 
     Raises
     ------
     InputError
-        `study.json` cannot be read, or is not that of a study.
+        `study.json` cannot be read, or does not describe a study.
     """
     folder = Path(folder)
     account = read_study(folder / STUDY)
@@ -102,23 +108,25 @@ def run_again(
     mode: str,
     watch: Callable[[float], None] | None = None,
 ) -> tuple[xr.Dataset, dict[str, float | int]]:
-    """A run of a design with all its samples, and its metrics.
+    """Run a design again, and return the dataset with all samples and the metrics.
 
     Parameters
     ----------
     setting : Setting
+        Common settings of the study.
     values : sequence of float
-        Of the parameters.
+        Values of the parameters.
     path, mode : str
+        Names of the path and of the actuation mode; empty for a run without a path.
     watch : callable, optional
-        Called with the time reached in the run [s]; a KeyboardInterrupt from it abandons the run.
+        Function called with the time reached in the run [s]; a KeyboardInterrupt from it abandons the run.
 
     Raises
     ------
     InputError, NumericalError
-        It cannot be run.
+        The design cannot be run.
     Abandoned
-        See `watch`.
+        The run was abandoned by `watch`.
     """
     planned, options = ready(setting, Task(0, 0, tuple(values), path))
     run = run_mode(planned, mode, options, watch)
@@ -126,7 +134,7 @@ def run_again(
 
 
 def _range(parameter: Varied) -> list[Any]:
-    """Its lowest and highest value, and "log", "linear" or "values"."""
+    """Return the lowest and highest value of a parameter, and "log", "linear" or "values"."""
     if parameter.values is not None:
         return [min(parameter.values), max(parameter.values), "values"]
     return [parameter.low, parameter.high, "log" if parameter.log else "linear"]

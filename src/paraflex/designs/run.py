@@ -1,4 +1,4 @@
-"""One design along one path in every mode: the function that all engines of a campaign call."""
+"""Runs of one design along one path in every mode: the function that all engines of a campaign call."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ _ID_DIGITS = 16
 
 
 class UnderControl(NamedTuple):
-    """A planned motion, and the controllers that act beside its torques."""
+    """Planned motion, and the controllers that act in addition to its torques."""
 
     task: TrackingTask
     controllers: tuple[ControllerDescription, ...]
 
 
-# What is ready to be run.
+# Inputs ready for `run_mode`.
 Planned = TrackingTask | UnderControl | OwnMotion | OwnStatics
 
 
 def under_control(task: TrackingTask, controllers: Sequence[ControllerDescription]) -> TrackingTask | UnderControl:
-    """A planned motion under controllers; the motion itself where there are none."""
+    """Combine a planned motion with controllers; return the motion itself if there are none."""
     return UnderControl(task, tuple(controllers)) if controllers else task
 
 
 class Task(NamedTuple):
-    """A design along a path: its number among all, the number and values of its design, and the path's name, if any."""
+    """Design along a path: number of the task, number and values of the design, name of the path ("" without one)."""
 
     number: int
     design: int
@@ -67,10 +67,11 @@ class Outcome:
     Attributes
     ----------
     task : Task
+        Task that was done.
     rows : list of dict
-        One a mode, by column.
+        Rows of the table, one for each mode, by column.
     trajectories : mapping of str to Dataset
-        Whole runs by run id, where they are kept.
+        Datasets of whole runs by run id, if they are kept.
     """
 
     task: Task
@@ -79,27 +80,29 @@ class Outcome:
 
 
 class Abandoned(Exception):
-    """A run was asked to stop; its results are discarded."""
+    """A run that was stopped on request and whose results are discarded."""
 
 
 def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None = None) -> Outcome:
     """Plan a design's motion along a path and simulate it in every mode.
 
-    The rows depend on nothing but setting and task.
+    The rows depend only on setting and task. An error of the design is reported in its rows and not raised.
 
     Parameters
     ----------
     setting : Setting
+        Common settings of all runs.
     task : Task
+        Design and path.
     watch : callable, optional
-        Called with the time reached in a run [s]; a KeyboardInterrupt from it abandons the task.
+        Function called with the time reached in a run [s]; a KeyboardInterrupt from it abandons the task.
 
     Raises
     ------
     InputError
         This process has other versions of the packages that results depend on.
     Abandoned
-        See `watch`.
+        The task was abandoned by `watch`.
     """
     for name, wanted in setting.versions.items():
         if versions()[name] != wanted:
@@ -118,19 +121,19 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
         measured, run = measured_mode(planned, row["mode"], options, setting.metrics, watch)
         row |= measured
         if run is not None and setting.trajectories:
-            # Of two runs of one design all must be equal.
+            # Datasets of repeated runs must be equal, so the wall time is left out.
             data = dataset_of(run, options).drop_vars("wall_time", errors="ignore")
             kept[row["id"]] = data.assign_attrs({name: row[name] for name in ("run", "id", "design")})
     return Outcome(task, rows, kept)
 
 
 def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
-    """What is to be found of a design, planned along its path or without one, or its statics; integration options.
+    """Prepare a design: return its planned motion, its motion without a path or its statics, and integration options.
 
     Raises
     ------
     InputError, NumericalError
-        Numbers that cannot be, a path out of reach, or loops that do not close.
+        The values are invalid, the path is out of reach, or the loops do not close.
     """
     model, options = setting.design(task.values)
     if setting.has_path:
@@ -145,12 +148,12 @@ def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
 
 
 def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOptions]:
-    """The planned motion of a design along its path, and the integration options of its runs without controllers.
+    """Return the planned motion of a design along its path without controllers, and the integration options.
 
     Raises
     ------
     InputError, NumericalError
-        Numbers that cannot be, or a path out of reach.
+        The values are invalid, or the path is out of reach.
     """
     model, options = setting.design(task.values)
     return _planned(setting, model, task), options
@@ -162,13 +165,13 @@ def _planned(setting: Setting, model: Model, task: Task) -> TrackingTask:
         task.path, duration=setting.duration, samples=setting.samples, assembly=setting.assembly, warning=False
     )
     if model.study.reduced:
-        # Chosen anew for each design, from its plan alone: no run with all coordinates is needed.
+        # The reduced coordinates are selected for each design from its plan alone, without a run of the full model.
         planned = planned.remodelled(reduced_mechanism(planned, model.study.reduced, modes=setting.modes))
     return planned
 
 
 def table_schema(setting: Setting, members: Members) -> pa.Schema:
-    """Columns of rows: runs, parameters, status, metrics; with units in the fields' metadata."""
+    """Return the schema of the table of rows: run, parameters, status, metrics, with units in the fields' metadata."""
     import pyarrow as pa
 
     whole, real, text = pa.int64(), pa.float64(), pa.string()
@@ -185,7 +188,7 @@ def table_schema(setting: Setting, members: Members) -> pa.Schema:
 
 
 def trouble(error: Exception) -> Row:
-    """Status, reason and time reached of a run that an error ended."""
+    """Return status, reason and time reached of a run that an error ended."""
     if isinstance(error, InputError):
         return {"status": STATUS_INVALID, "reason": str(error)}
     if isinstance(error, NumericalError):
@@ -195,19 +198,19 @@ def trouble(error: Exception) -> Row:
 
 
 def lost(setting: Setting, task: Task, reason: str) -> Outcome:
-    """Rows of a task that killed its workers."""
+    """Return the rows of a task whose workers were lost."""
     rows = [_blank(setting, task, mode) | {"status": STATUS_FAILED, "reason": reason} for mode in setting.modes]
     return Outcome(task, rows)
 
 
 def run_id(setting: Setting, task: Task, mode: str) -> str:
-    """Identity of a run, a digest of everything it depends on: the same in any study."""
+    """Return the id of a run, a digest of all inputs that it depends on, which is the same in every study."""
     numbers = sorted((str(place), number) for place, number in setting.numbers(task.values))
     return digest([setting.identity, numbers, task.path, mode])[:_ID_DIGITS]
 
 
 def is_row_of(setting: Setting, row: Row) -> bool:
-    """Whether a row is of what a setting says: its identity is that of its numbers, path and mode."""
+    """Check whether a row belongs to a setting: its id is that of its values, path and mode."""
     try:
         task = Task(0, 0, tuple(row[name] for name in setting.names), row["path"])
         return row["id"] == run_id(setting, task, row["mode"])
@@ -231,12 +234,12 @@ def _blank(setting: Setting, task: Task, mode: str) -> Row:
 
 
 def run_mode(planned: Planned, mode: str, options: IntegrationOptions, watch: Callable[[float], None] | None) -> Runs:
-    """Simulate what is ready, in a mode where it has a path; or find its equilibria.
+    """Simulate a prepared design in an actuation mode, which is ignored without a path, or compute its equilibria.
 
     Raises
     ------
     Abandoned
-        See `run_task`.
+        The run was abandoned by `watch`; see `run_task`.
     """
     if isinstance(planned, OwnStatics):
         return planned.found()
@@ -258,12 +261,14 @@ def measured_mode(
     metrics: Sequence[str],
     watch: Callable[[float], None] | None = None,
 ) -> tuple[Row, Runs | None]:
-    """Metrics of a mode and how its run ended, by column, and the run; of one that an error ended the reason alone.
+    """Run a mode, and return its metrics and status by column, and the run.
+
+    If an error ended the run, return the status and reason of the failure, and None.
 
     Raises
     ------
     Abandoned
-        See `run_task`.
+        The run was abandoned by `watch`; see `run_task`.
     """
     try:
         run = run_mode(planned, mode, options, watch)
@@ -274,14 +279,14 @@ def measured_mode(
         }
     except Abandoned:
         raise
-    # Whatever a strange design does, it is that design's row and not the end of the sweep.
+    # An unexpected error of one design is recorded in its row and does not end the sweep.
     except Exception as error:
         return trouble(error), None
     return row, run
 
 
 def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:
-    """A run with all its samples."""
+    """Return the dataset of a run with all its samples."""
     if isinstance(run, Statics):
         return statics_dataset(run)
     if isinstance(run, MotionRun):
@@ -290,7 +295,7 @@ def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:
 
 
 def _compile(mechanism: Mechanism) -> None:
-    """Compile the kernels if the parent process has not, once per process and geometry."""
+    """Compile the kernels if the parent process has not done so, once per process and geometry."""
     if mechanism.geometry not in _compiled:
         with _compiling:
             if mechanism.geometry not in _compiled:

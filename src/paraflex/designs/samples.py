@@ -18,24 +18,24 @@ KINDS = GRID, LIST, RANDOM, SOBOL = "grid", "list", "random", "sobol"
 
 @dataclass(frozen=True)
 class Varied:
-    """A parameter of a sweep.
+    """Parameter of a sweep.
 
     Attributes
     ----------
     name : str
-        Of its column in the table.
+        Name of the parameter and of its column in the table.
     fields : tuple of str
-        Of the mechanism's file; all are given the same number.
+        Fields of the mechanism's file, which all get the same value.
     values : tuple of float, optional
-        In a list or grid.
+        Values of a list or grid.
     low, high : float, optional
-        Its range, where it has no values of its own.
+        Range, if there are no values.
     number : int, optional
-        Of values of a grid from low to high.
+        Number of values of a grid from low to high.
     log : bool
-        Whether values are spaced, or spread, evenly in their logarithm.
+        Whether values are spaced or distributed evenly in their logarithm.
     whole : bool
-        Whether values are whole numbers.
+        Whether values are integers.
     """
 
     name: str
@@ -49,13 +49,13 @@ class Varied:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Low and high, of a parameter that has a range."""
+        """Low and high of a parameter with a range."""
         assert self.low is not None
         assert self.high is not None
         return self.low, self.high
 
     def spread(self, fraction: Array) -> Array:
-        """Values at fractions of the range, from 0 to 1."""
+        """Return the values at fractions of the range, from 0 to 1."""
         low, high = self.ends
         if self.whole:
             return np.minimum(np.floor(low + fraction * (high - low + 1.0)), high)
@@ -64,7 +64,7 @@ class Varied:
         return _between(low, high, fraction)
 
     def levels(self) -> Array:
-        """Values of a grid or list, (k,)."""
+        """Return the values (k,) of a grid or list."""
         if self.values is not None:
             return np.array(self.values, dtype=float)
         assert self.number is not None
@@ -79,7 +79,7 @@ def check_varied(parameter: Varied, kind: str) -> None:
     Raises
     ------
     InputError
-        What is missing, or does not fit; fields are named from the study file.
+        A field is missing or does not fit; the error names it as in the study file.
     """
     where = f"vary.{parameter.name}"
     if parameter.values is not None:
@@ -116,24 +116,24 @@ def check_varied(parameter: Varied, kind: str) -> None:
 
 
 def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> Array:
-    """All designs, (designs, parameters).
+    """Return all designs (designs, parameters).
 
     Parameters
     ----------
     parameters : sequence of Varied
-        Checked; see `check_varied`. Without any there is one design, the mechanism as it is.
+        Parameters, checked by `check_varied`. Without parameters there is one design, the mechanism as it is.
     kind : str
-        "grid" (every combination, the last parameter fastest), "list" (the first of all, the second of all, ...),
-        "random" or "sobol" (scrambled).
+        Kind of sampling: "grid" (all combinations, the last parameter fastest), "list" (the first values of all
+        parameters, the second values, ...), "random" or "sobol" (scrambled).
     number : int, optional
-        Of random or Sobol samples.
+        Number of random or Sobol samples.
     seed : int
-        Samples of a seed are the same everywhere; the first of many those of fewer.
+        Seed of the random generator. Samples of a seed are reproducible, and fewer samples are the first of more.
 
     Raises
     ------
     InputError
-        No such sampling, no number, too many designs, lists of different lengths.
+        The sampling is unknown, its number is missing, there are too many designs, or lists differ in length.
     """
     known(kind, KINDS, "sampling.kind", "sampling")
     _check_number(parameters, kind, number, seed)
@@ -151,7 +151,7 @@ def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: i
 
 
 def _grid(levels: Sequence[Array]) -> Array:
-    """Every combination of levels, the last fastest."""
+    """Return all combinations of levels, the last fastest."""
     total, columns, before = math.prod(level.size for level in levels), [], 1
     for level in levels:
         after = total // (before * level.size)
@@ -167,7 +167,7 @@ def _fractions(kind: str, number: int, dimensions: int, seed: int) -> Array:
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(dimensions, scramble=True, seed=generator)  # pyright: ignore[reportCallIssue]
-    # SciPy warns of numbers that are not powers of two: these are the first of more points.
+    # SciPy warns about numbers that are not powers of two: take the first of a power of two.
     return sequence.random_base2(max(number - 1, 0).bit_length())[:number]
 
 

@@ -1,4 +1,4 @@
-"""The schema of a sweep's study file in pydantic, and a function that reads study files."""
+"""Pydantic schema of the study file of a sweep, and a function that reads study files."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from paraflex.files.read import naming, read_toml, validate
 from paraflex.files.schema import Count, Number, NumberOfFields, Text, Yes
 
 T = TypeVar("T", bound=BaseModel)
-# Name of a study whose file gives none.
+# Name of a study whose file does not give one.
 DEFAULT_NAME = "sweep"
 
 
 class Table(BaseModel):
-    """A table of a study file."""
+    """Base class of the tables of a study file."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
 
 
 class VaryTable(Table):
-    """A parameter."""
+    """Table of a parameter."""
 
     fields: list[Text] = Field(default=[], description="fields of the mechanism's file, all given the same number")
     values: list[Any] | None = Field(default=None, description="a list of numbers, in the unit of its fields")
@@ -36,7 +36,7 @@ class VaryTable(Table):
 
 
 class SamplingTable(Table):
-    """Sampling of the ranges of the parameters."""
+    """Table of the sampling of the parameters' ranges."""
 
     kind: Literal["grid", "list", "random", "sobol"] = Field(
         default="grid", description='"grid", "list", "random" or "sobol"'
@@ -46,7 +46,7 @@ class SamplingTable(Table):
 
 
 class IntegrationTable(Table):
-    """Integration of the runs; by default that of the mechanism's [study], then the program's."""
+    """Table of integration options; the defaults are those of the mechanism's [study] table, then of the program."""
 
     method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
     tolerance: Number | None = Field(default=None, description="the tolerance in m")
@@ -62,7 +62,7 @@ class IntegrationTable(Table):
 
 
 class SweepTable(Table):
-    """A study file."""
+    """Contents of a study file."""
 
     name: Text = Field(default=DEFAULT_NAME, description="a name for the study")
     mechanism: Text = Field(description="a library mechanism or a file, seen from the study file's folder")
@@ -92,12 +92,19 @@ class SweepTable(Table):
 
 @contextmanager
 def study_table(kind: type[T], file: str | Path) -> Iterator[tuple[T, Path]]:
-    """A study file by its schema, and its folder; errors of what is made of it name the file.
+    """Provide the contents of a study file and its folder; input errors raised in the context name the file.
+
+    Parameters
+    ----------
+    kind : type
+        Schema of the file.
+    file : str or Path
+        Study file.
 
     Raises
     ------
     InputError
-        It cannot be read, or a field does not fit.
+        The file cannot be read, or a field does not fit.
     """
     source = str(file)
     table = validate(kind, read_toml(Path(file), source), source)

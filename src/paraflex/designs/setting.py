@@ -1,4 +1,4 @@
-"""Common settings of all runs of a study: a mechanism, its parameters, and how it is run."""
+"""Common settings of all runs of a study: mechanism, parameters, and options of the runs."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ from paraflex.results.following import Part
 from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS
 from paraflex.validity import doubtful_numbers
 
-# Default limit of attempted steps: a single design with violent motion must not delay a study.
+# Default limit of attempted steps, so that a single design with violent motion does not delay a study.
 DESIGN_MOST_STEPS = 200_000
-# A field of this table is one of the study's own [integration], and may be one of these.
+# Table of a study's own integration options, and those of them that may be parameters.
 INTEGRATION = "integration"
 INTEGRATION_NUMBERS = ("tolerance", "step", "alpha", "beta")
 # Columns of every table of designs that are neither parameters nor metrics.
 FIXED_COLUMNS = ("run", "id", "design", "path", "mode", "status", "reason", "time_reached")
-# What a run without a path has as the names of its path and of its mode.
+# Names of the path and of the mode of a run without a path.
 NO_PATH, NO_MODE = "", ""
 # Packages that results depend on.
 _RESULT_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
@@ -50,40 +50,42 @@ _RESULT_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
 @dataclass(frozen=True)
 class Setting:
-    """All inputs of a run but its own numbers; sent to worker processes.
+    """Inputs of a run except the values of its design; sent to worker processes.
 
     Attributes
     ----------
     data : mapping
-        The mechanism's file as parsed.
+        Parsed contents of the mechanism's file.
     source : str
-        Its name.
+        Name of the file.
     names : tuple of str
-        Of the parameters.
+        Names of the parameters.
     places : tuple
-        For each of them the places in the data that it sets.
+        Places in the data that each parameter sets.
     whole : tuple of bool
-        Which parameters are whole numbers.
+        Whether each parameter is an integer.
     paths, modes : tuple of str
-        By name.
+        Names of the paths and of the actuation modes.
     duration : float or None
-        [s]; the mechanism's own where None.
+        Duration of the runs [s]; None for that of the mechanism's file.
     samples : int or None
+        Number of samples of a run; None for that of the mechanism's file.
     assembly : str or None
+        Name of the assembly; None for that of the mechanism's file.
     integration : mapping
-        Of `IntegrationOptions`, what is not to be as the mechanism's [study] has it.
+        Fields of `IntegrationOptions` that override those of the mechanism's [study] table.
     metrics : tuple of str
-        Names of `METRICS`.
+        Names of metrics in `METRICS`.
     trajectories : bool
-        Whether whole runs are kept.
+        Whether datasets of whole runs are kept.
     versions : mapping of str to str
-        Of the packages that results depend on.
+        Versions of the packages that results depend on.
     text : str
-        The mechanism's file, for its comments.
+        Text of the mechanism's file, for its comments.
     balanced : bool
         Whether runs without a path start in the deflections of steady running.
     statics : bool
-        Whether equilibria are found, as the data's [statics] say, in place of runs.
+        Whether static equilibria are computed instead of runs, as the [statics] table of the data describes.
     """
 
     data: Mapping[str, Any]
@@ -106,18 +108,18 @@ class Setting:
 
     @property
     def has_path(self) -> bool:
-        """Whether runs are along paths, and not a mechanism's own motion."""
+        """Whether runs are along paths rather than a mechanism's own motion."""
         return self.paths != (NO_PATH,)
 
     @cached_property
     def identity(self) -> str:
-        """Digest of the common settings of all runs, for their ids."""
+        """Digest of the common settings of all runs, part of their ids."""
         asked = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
         more = [name for name in ("balanced", "statics") if getattr(self, name)]
         return digest([dict(self.data), *asked, *more])
 
     def numbers(self, values: tuple[float, ...]) -> list[tuple[Place, float | int]]:
-        """Every place that a design sets, and its value."""
+        """Return all places in the data that a design sets, with their values."""
         return [
             (place, int(value) if whole else value)
             for places, whole, value in zip(self.places, self.whole, values, strict=True)
@@ -125,12 +127,12 @@ class Setting:
         ]
 
     def design(self, values: tuple[float, ...]) -> tuple[Model, IntegrationOptions]:
-        """A design's model, and the integration options of its runs.
+        """Return the model of a design, and the integration options of its runs.
 
         Raises
         ------
         InputError
-            Numbers that cannot be.
+            The values are invalid.
         """
         numbers = self.numbers(values)
         inside = [(place, number) for place, number in numbers if place[0] != INTEGRATION]
@@ -139,7 +141,7 @@ class Setting:
         return model, self.options(model, chosen)
 
     def parts(self) -> dict[str, Part]:
-        """The part of each path that runs too short for it do, for the design that the file describes."""
+        """Return the covered part of each path that runs do not complete, for the design that the file describes."""
         model = model_from(dict(self.data), self.source)
         found = {}
         for name in self.paths if self.has_path else ():
@@ -148,30 +150,30 @@ class Setting:
         return {name: part for name, part in found.items() if part is not None}
 
     def verdict(self) -> Verdict:
-        """Findings on the design that the file describes, and on paths for which runs are too short."""
+        """Return findings on the design that the file describes, and on paths that runs do not complete."""
         model = model_from(dict(self.data), self.source)
         parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
         duration = None if self.has_path or self.statics else own_duration(model, self.duration)
         return Verdict([*doubtful_numbers(model.mechanism, duration), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
-        """Integration options of a design: its own, else those of the study, else those of its file.
+        """Return the integration options of a design: its own, else those of the study, else those of its file.
 
         Raises
         ------
         InputError
-            They do not go together.
+            The options are inconsistent.
         """
         return model.study.integration(dict(self.integration) | dict(chosen or {}))
 
 
 def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Varied, ...], Model]:
-    """The common settings of a study, its parameters, and the mechanism's model as in its file.
+    """Return the common settings of a study, its parameters, and the mechanism's model as in its file.
 
     Raises
     ------
     InputError
-        Anything that does not fit the mechanism, whatever designs are taken.
+        A field does not fit the mechanism, independently of the designs.
     """
     name, beside = table.mechanism, folder / table.mechanism
     own = name not in library_names() and not is_generated(name) and exists(beside)
@@ -213,17 +215,17 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Va
 
 @cache
 def versions() -> Mapping[str, str]:
-    """Versions of the packages that results depend on."""
+    """Return the versions of the packages that results depend on."""
     return {name: version(name) for name in _RESULT_PACKAGES}
 
 
 def digest(content: Any) -> str:
-    """SHA-256 of plain values, independent of the order of keys."""
+    """Return the SHA-256 digest of plain values, independent of the order of keys."""
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def _with_statics(model: Model, said: Mapping[str, Any]) -> Model:
-    """The model with what a study says of its [statics], which it need not have."""
+    """Return the model with its [statics] table, if any, overridden by that of the study."""
     data = dict(model.parameters) | {"statics": chosen_over(model.parameters.get("statics", {}), said)}
     try:
         return replace(model_from(data, model.source, model.text), settings=model.settings)
@@ -259,7 +261,7 @@ def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> Varied:
 
 
 def _value(name: str, value: Any, data: Mapping[str, Any], fields: tuple[str, ...]) -> float | int:
-    """A value of a list, in SI units."""
+    """Return a value of a list in SI units."""
     field, remedy = f"vary.{name}.values", "give a list of numbers"
     if isinstance(value, str):
         try:
@@ -302,7 +304,7 @@ def _paths(model: Model, names: list[str]) -> tuple[str, ...]:
 
 
 def _no_modes(table: SweepTable) -> tuple[str, ...]:
-    """The modes of runs without a path: none."""
+    """Return the single empty mode name of runs without a path; raise an InputError if the study has modes."""
     if table.modes:
         raise InputError(
             "a mechanism without a path has no actuation modes, its torques are given", field="modes",
@@ -350,7 +352,7 @@ def _check(setting: Setting, model: Model) -> None:
 
 
 def _check_columns(parameters: tuple[Varied, ...]) -> None:
-    # A metric of members has columns NAME.MEMBER, so that a parameter may have its name.
+    # The columns of a metric of members are NAME.MEMBER, so a parameter may have the name of such a metric.
     taken = {*FIXED_COLUMNS, *(metric.name for metric in METRICS.values() if not metric.each)}
     for parameter in parameters:
         if parameter.name in taken:

@@ -1,4 +1,4 @@
-"""Sweeps: thousands of runs of a mechanism, one row each, independent of the workers and of restarts."""
+"""Sweeps: thousands of runs of a mechanism, one row each, whose results do not depend on workers and restarts."""
 
 from __future__ import annotations
 
@@ -57,22 +57,23 @@ class SweepResult(KeptResult):
     Attributes
     ----------
     name : str
-        Of the study.
+        Name of the study.
     folder : Path
+        Folder of the results.
     total : int
-        Runs of the study.
+        Number of runs of the study.
     counts : mapping of str to int
-        Rows by status: "complete", "failed", "invalid".
+        Number of rows by status: "complete", "failed", "invalid".
     fresh : int
-        Runs of this session.
+        Number of runs in this session.
     seconds : float
-        It took.
+        Duration of this session [s].
     interrupted : bool
-        Whether the user stopped it.
+        Whether the user stopped the session.
     beyond : int
-        Runs beyond what their model can describe: validity above 1.
+        Number of runs outside the range of validity of their model (validity above 1).
     coarse : int
-        Runs with too few samples for their largest loads: complete, with a reason.
+        Number of complete runs with doubtful largest loads, for which the rows give a reason (see `coarseness`).
     """
 
     values_file = "summary.json"
@@ -88,7 +89,7 @@ class SweepResult(KeptResult):
 
     @property
     def done(self) -> int:
-        """Rows written."""
+        """Number of rows written."""
         return sum(self.counts.values())
 
     @property
@@ -97,25 +98,26 @@ class SweepResult(KeptResult):
         return self.done == self.total
 
     def to_dict(self) -> dict[str, Any]:
-        """Counts in plain values; the time taken stands nowhere in them, for it is no result."""
+        """Return the counts as plain values; the computing time is left out because it is not a result."""
         counts = {"runs": self.total, "done": self.done, "status": dict(self.counts)}
         return {"name": self.name} | counts | {"beyond_validity": self.beyond, "too_few_samples": self.coarse}
 
 
 @dataclass(frozen=True)
 class SweptResult(KeptResult):
-    """What is found from the runs of a sweep; it stands in their folder.
+    """Base class of results evaluated from the runs of a sweep, stored in their folder.
 
     Attributes
     ----------
     sweep : SweepResult
+        State of the sweep.
     """
 
     sweep: SweepResult
 
     @property
     def folder(self) -> Path:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Of the runs, and of what is found from them."""
+        """Folder of the runs and of the results evaluated from them."""
         return self.sweep.folder
 
     @property
@@ -127,18 +129,22 @@ class SweptResult(KeptResult):
 @given_as("a sweep", "a SweepStudy")
 @dataclass(frozen=True)
 class SweepStudy(Study["SweepResult"]):
-    """A sweep: a mechanism, what varies in it, what is run and what is kept.
+    """Parameter sweep of a mechanism: its settings, parameters and designs.
 
     Attributes
     ----------
     name : str
+        Name of the study.
     setting : Setting
+        Common settings of all runs.
     parameters : tuple of Varied
+        Parameters.
     kind : str
-        Of sampling.
+        Kind of sampling.
     designs : (k, parameters) array
+        Values of the parameters of each design.
     members : mapping of str to tuple of str
-        Names of the mechanism's motors, drives, joints or named coordinates, of which metrics have a column each.
+        Names of the mechanism's motors, drives, joints or named coordinates, each of which has a column of a metric.
     """
 
     name: str
@@ -150,15 +156,15 @@ class SweepStudy(Study["SweepResult"]):
 
     @property
     def runs(self) -> int:
-        """Number of runs: designs times paths times modes."""
+        """Number of runs: number of designs times paths times modes."""
         return len(self.designs) * len(self.setting.paths) * len(self.setting.modes)
 
     def model(self) -> Model:
-        """The mechanism as its file has it."""
+        """Return the model of the mechanism as its file describes it."""
         return model_from(dict(self.setting.data), self.setting.source)
 
     def content(self) -> dict[str, Any]:
-        """What the results depend on, in plain values: the same content gives the same table."""
+        """Return all inputs that determine the results, as plain values: equal contents give equal tables."""
         setting = self.setting
         return {
             "mechanism": dict(setting.data),
@@ -187,16 +193,17 @@ class SweepStudy(Study["SweepResult"]):
         limit: int | None = None,
         run: RunTask = run_task,
     ) -> SweepResult:
-        """Do the runs that a folder has no rows for yet; see `Study.run`.
+        """Do the runs for which a folder has no rows yet; see `Study.run`.
 
         Parameters
         ----------
         folder, workers, on_progress
-            See `Study.run`.
+            Folder of the results, workers and progress callback; see `Study.run`.
         limit : int, optional
-            Of runs in this session, rounded up to whole designs.
+            Largest number of runs in this session, rounded up to whole tasks (all modes of a design along a path); no
+            limit by default.
         run : callable
-            What is done for a task.
+            Function that does a task; by default `run_task`.
         """
         folder, setting = kept_in(folder), self.setting
         if limit is not None and limit < 1:
@@ -215,7 +222,7 @@ class SweepStudy(Study["SweepResult"]):
         return Task(number, design, tuple(self.designs[design].tolist()), self.setting.paths[path])
 
     def _has(self, row: Row) -> bool:
-        """Whether a row is of this study, and of the run that it says."""
+        """Check whether a row belongs to this study, and to the run whose number it has."""
         number, mode = divmod(row["run"], len(self.setting.modes))
         if not 0 <= row["run"] < self.runs or not is_row_of(self.setting, row):
             return False
@@ -224,24 +231,24 @@ class SweepStudy(Study["SweepResult"]):
 
 @checked_arguments()
 def load_sweep(file: str | Path) -> SweepStudy:
-    """Read a study file.
+    """Read the study file of a sweep.
 
     Parameters
     ----------
     file : str or Path
-        TOML; see docs/sweeps.md.
+        TOML file; see docs/sweeps.md.
 
     Raises
     ------
     InputError
-        Anything in it that does not fit the file or the mechanism: it names file, field, value and remedy.
+        A field does not fit the schema or the mechanism; the error names file, field, value and remedy.
     """
     with study_table(SweepTable, file) as (table, folder):
         return make_study(table, folder)
 
 
 def make_study(table: SweepTable, folder: Path) -> SweepStudy:
-    """A study from a file in a folder; see `load_sweep`."""
+    """Return the sweep that a study file in a folder describes; see `load_sweep`."""
     setting, parameters, model = make_setting(table, folder)
     for parameter in parameters:
         check_varied(parameter, table.sampling.kind)
@@ -266,16 +273,25 @@ def sweep(
     on_progress: OnProgress | None = None,
     run: RunTask = run_task,
 ) -> SweepResult:
-    """Do the runs of a study, or of its file, that a folder has no rows for yet.
+    """Do the runs of a sweep for which a folder has no rows yet; equivalent to `study.run(folder)`.
 
-    `study.run(folder)` in one call: see there and `Workers`.
+    Parameters
+    ----------
+    study : SweepStudy, str or Path
+        Sweep, or its study file.
+    folder : str or Path
+        Folder of the results.
+    workers : Workers or int, optional
+        Workers, or number of threads: see `Workers`.
+    limit, on_progress, run
+        Arguments of `SweepStudy.run`.
     """
     study = study if isinstance(study, SweepStudy) else load_sweep(study)
     return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, limit=limit, run=run)
 
 
 class _Session:
-    """One session of a sweep: its finished runs, and how it ended."""
+    """Session of a sweep, with its finished tasks."""
 
     def __init__(self, study: SweepStudy, campaign: Campaign, on_progress: OnProgress | None) -> None:
         self.study, self.setting, self.campaign = study, study.setting, campaign
@@ -283,13 +299,13 @@ class _Session:
         self.began, self.fresh = time.perf_counter(), 0
         rows = np.zeros(study.runs // len(self.setting.modes), dtype=np.intp)
         for number in self._runs():
-            if 0 <= number < study.runs:  # others are of whoever sent the folder
+            if 0 <= number < study.runs:  # a foreign folder may have others
                 rows[number // len(self.setting.modes)] += 1
-        # Of a task that lacks a row all are made again.
+        # A task with a missing row is repeated completely.
         self.done: NDArray[np.bool_] = rows == len(self.setting.modes)
 
     def _runs(self) -> Iterator[int]:
-        """The runs of all rows, but for those whose trajectory was taken out of the folder to be made again."""
+        """Yield the run numbers of all rows, except of complete runs whose trajectory was removed from the folder."""
         kept = self.campaign.folder.path / TRAJECTORIES
         if not (self.setting.trajectories and kept.is_dir()):
             return self.campaign.journal.runs()
@@ -302,7 +318,7 @@ class _Session:
         return bool(np.all(self.done))
 
     def go(self, engine: Engine, run: Callable[..., Outcome], limit: int | None) -> bool:
-        """Do the remaining runs; whether the user stopped it. The engine is closed."""
+        """Do the remaining runs, close the engine, and return whether the user stopped the session."""
         began = time.perf_counter()
         try:
             with engine:
@@ -317,7 +333,7 @@ class _Session:
         return False
 
     def end(self, interrupted: bool) -> SweepResult:
-        """Write the table, and counts beside it."""
+        """Write the table and the counts, and return the state of the sweep."""
         with self.campaign.published(finished=self.complete) as new:
             table = read_parquet(new / table_name(finished=self.complete), ["status", "reason", VALIDITY])
             complete = table["status"].to_numpy() == STATUS_COMPLETE

@@ -1,4 +1,4 @@
-"""Units of the numbers that designs vary, from the descriptions in the schemas of files."""
+"""Units of the parameters of designs, from the descriptions in the schemas of files."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from paraflex.results.metrics import Members, metric_unit
 
 
 def unit_of(data: Mapping[str, Any], place: Place) -> str:
-    """The unit of a number of a mechanism's file, or of a study's [integration]; empty if it has none, or any."""
+    """Return the unit of a number in a mechanism's file or a study's [integration]; empty unless there is one."""
     units = units_at(_schema(place), data, place) or ()
     return units[0] if len(units) == 1 else ""
 
 
 def check_unit_of(data: Mapping[str, Any], place: Place, text: str, field: str) -> None:
-    """Check the unit of an expression that a study gives for a number of a mechanism's file.
+    """Check the unit of an expression that a study gives for a number in a mechanism's file.
 
     Raises
     ------
     InputError
-        See `files.fields.check_unit`.
+        The unit is not that of the number; see `files.fields.check_unit`.
     """
     schema = _schema(place)
     check_unit(text, {}, units_at(schema, data, place), field, field_at(schema, data, place).description)
 
 
 def check_unit_of_metric(value: float, column: str, members: Members, field: str) -> None:
-    """Check the unit of an expression that a study gives for what a metric is to be.
+    """Check the unit of an expression that a study gives for the target or limit of a metric.
 
     Raises
     ------
     InputError
-        See `files.fields.check_unit`.
+        The unit is not that of the metric; see `files.fields.check_unit`.
     """
     if isinstance(value, NumberOfText):
         unit = metric_unit(column, members)

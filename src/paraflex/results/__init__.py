@@ -1,11 +1,11 @@
 """Results: one labelled dataset per study, saved as netCDF with provenance; metrics.
 
-Names are imported when they are first used: files are read without what computes them.
+Names are imported at their first use, so that files can be read without importing the code that computes them.
 """
 
 import lazy_loader
 
-# The module has the name of its function, and would replace it if imported later.
+# The module `summary` has the name of its function and would replace it if it were imported later.
 from paraflex.results.summary import summary as summary
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

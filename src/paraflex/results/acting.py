@@ -1,4 +1,4 @@
-"""What acts on a mechanism over a study: sizes of its loads, and which way its joints are driven."""
+"""Loads over the duration of a study: onset and size of each load, and directions of the first joint movements."""
 
 from __future__ import annotations
 
@@ -12,34 +12,35 @@ from paraflex.dynamics import System, joint_coordinate
 from paraflex.mechanism import AngleLaw, Load, Mechanism, PrescribedAngle, TabulatedLaw
 from paraflex.mechanism.laws import marks
 
-# Times that a law is looked at, besides its knots and rows; of a study without a duration within the first second.
+# Number of times at which a profile is evaluated, besides its knots and rows, and the default end of these times [s].
 _LOOKS, _FIRST = 1001, 1.0
-# Values below this share of the largest are none: rounding of expressions.
+# Values below this fraction of the largest count as zero: rounding of expressions.
 _NOTHING = 1e-9
-# A joint has moved by more than this share of its travel.
+# A joint has moved if its displacement exceeds this fraction of its travel.
 _MOVED = 1e-2
 _HALVINGS = 50
-# A load that begins before this share of the study acts from its start.
+# A load with an onset before this fraction of the study acts from the start.
 _AT_ONCE = 1e-6
-# From here on loads are in kN and kN m.
+# Loads of at least this magnitude are printed in kN and kN m.
 _LARGE = 1e4
 
 
 @dataclass(frozen=True)
 class ActingLoad:
-    """A load over a study.
+    """Onset and size of a load over a study.
 
     Attributes
     ----------
     load : Load
+        Force or torque.
     shown : (c,) array
-        Its components at the start; of a load that is zero there, when it is largest [N, N m].
+        Components at the start, or at the time of the largest magnitude if the load is zero at the start [N, N m].
     begins : float or None
-        When it first acts [s]; None if it never does.
+        Onset [s]; None if the load is zero throughout.
     largest : float
-        Its largest magnitude [N, N m].
+        Largest magnitude [N, N m].
     grows : bool
-        Whether it is zero at the start only.
+        Whether the load is zero at the start and acts immediately after it.
     """
 
     load: Load
@@ -50,12 +51,12 @@ class ActingLoad:
 
     @property
     def later(self) -> bool:
-        """Whether it does not act at the start."""
+        """Whether the load does not act from the start."""
         return self.begins != 0.0
 
     @property
     def size(self) -> str:
-        """Its size with unit: at the start, or from when it acts, with the largest where that is more."""
+        """Description of the size with unit: value at the start, or largest value and onset."""
         unit = self.load.unit
         if self.begins is None:
             return f"0 {unit}"
@@ -69,7 +70,15 @@ class ActingLoad:
 
 
 def acting_load(load: Load, duration: float | None = None) -> ActingLoad:
-    """A load over a study of a duration [s]; without one over the first second and all its knots."""
+    """Return the onset and size of a load over a study.
+
+    Parameters
+    ----------
+    load : Load
+        Force or torque.
+    duration : float, optional
+        Duration of the study [s]; by default the first second, or up to the last knot if that is later.
+    """
     times = _times(load.laws, duration)
     values = load.evaluate(times)
     sizes = np.linalg.norm(values, axis=1)
@@ -86,7 +95,7 @@ def acting_load(load: Load, duration: float | None = None) -> ActingLoad:
 
 
 def _onset(load: Load, before: float, after: float, least: float) -> float:
-    """When a load first exceeds a size, between two times."""
+    """Return the time [s] at which a load first exceeds a magnitude, found by bisection between two times."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (before + after)
         acts = float(np.linalg.norm(load.evaluate(np.array([middle])))) > least
@@ -95,14 +104,14 @@ def _onset(load: Load, before: float, after: float, least: float) -> float:
 
 
 def drive_speed(drive: PrescribedAngle, slides: bool, duration: float | None = None) -> str:
-    """The largest speed of a prescribed motion over a study, with its unit."""
+    """Format the largest speed of a prescribed motion over a study, with its unit."""
     rates = np.abs(drive.law.evaluate(_times((drive.law,), duration))[1])
     constant = np.ptp(rates) <= _NOTHING * rates.max()
     return ("" if constant else "up to ") + sized(float(rates.max()), "m/s" if slides else "rad/s")
 
 
 def first_movements(mechanism: Mechanism, duration: float | None = None) -> dict[str, int]:
-    """Signs of the first movement of joints with prescribed motions; 0 of those that stay."""
+    """Return the signs of the first movement of joints with prescribed motions, 0 for joints at rest."""
     return {
         drive.joint: _first_sign(drive.law.evaluate(_times((drive.law,), duration))[1], _NOTHING)
         for drive in mechanism.prescribed
@@ -110,7 +119,7 @@ def first_movements(mechanism: Mechanism, duration: float | None = None) -> dict
 
 
 def first_movements_along(system: System, q: Array) -> dict[str, int]:
-    """Signs of the first movement of joints with motors along a motion (k, n)."""
+    """Return the signs of the first movement of joints with motors along a motion q (k, n), 0 for joints at rest."""
     mechanism, moved = system.mechanism, {}
     for motor in mechanism.motors:
         travel = joint_coordinate(system, motor.joint, q).value
@@ -119,7 +128,7 @@ def first_movements_along(system: System, q: Array) -> dict[str, int]:
 
 
 def load_variables(mechanism: Mechanism, times: Array) -> Mapping[str, tuple[tuple[str, ...], Array]]:
-    """Forces and torques of all loads at times (k,), zero of what a load has not; none without loads."""
+    """Return forces and torques of all loads at times (k,): zero where a load has none, empty without loads."""
     if not mechanism.loads:
         return {}
     force, torque = np.zeros((len(times), len(mechanism.loads), 2)), np.zeros((len(times), len(mechanism.loads)))
@@ -133,12 +142,15 @@ def load_variables(mechanism: Mechanism, times: Array) -> Mapping[str, tuple[tup
 
 
 def sized(value: float, unit: str) -> str:
-    """A size with its unit, large forces and torques in thousands: "800 N", "12.5 kN"."""
+    """Format a magnitude with its unit, large forces and torques in thousands: "800 N", "12.5 kN"."""
     return f"{value / 1e3:.4g} k{unit}" if value >= _LARGE and unit[0] == "N" else f"{value:.4g} {unit}"
 
 
 def _times(laws: tuple[AngleLaw, ...], duration: float | None) -> Array:
-    """Times at which laws are looked at: over a study, no further than tables go, and at their knots and rows."""
+    """Return the times at which profiles are evaluated: all knots, and a grid over the study up to the end of tables.
+
+    Without a duration [s] the grid covers the first second, or up to the last knot if that is later.
+    """
     known = [time for law in laws for time in marks(law)]
     end = max([_FIRST, *known]) if duration is None else duration
     end = min([end, *(law.times[-1] for law in laws if isinstance(law, TabulatedLaw))])
@@ -146,6 +158,6 @@ def _times(laws: tuple[AngleLaw, ...], duration: float | None) -> Array:
 
 
 def _first_sign(values: Array, least: float) -> int:
-    """Sign of the first value above a share of the largest; 0 where all are zero."""
+    """Return the sign of the first value above a fraction of the largest magnitude, 0 if all values are zero."""
     moves = np.flatnonzero(np.abs(values) > least * np.max(np.abs(values)))
     return int(np.sign(values[moves[0]])) if moves.size else 0

@@ -1,4 +1,4 @@
-"""Two runs side by side: how far their numbers, their settings and their motions differ."""
+"""Comparison of two runs: differences of their metrics, settings and motions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from paraflex.results.loads import load_figures, ranked
 from paraflex.results.metrics import METRICS
 from paraflex.results.storage import open_results
 
-# Variables whose motions are compared, by the kind of results.
+# Time-dependent variables that are compared, by the kind of results.
 _ENERGIES = ("strain_energy", "kinetic_energy")
 _MOTIONS: Mapping[str, tuple[str, ...]] = {
     "tracking": ("end_effector", "torque", "angle", "deflection", "stress", *_ENERGIES),
@@ -37,30 +37,31 @@ _MOTIONS: Mapping[str, tuple[str, ...]] = {
         *_ENERGIES,
     ),
 }
-# Dimensions whose members are compared one by one; components along "axis" make one distance.
+# Dimensions whose members are compared one by one; components along "axis" are combined to a Euclidean distance.
 _PARTS = ("motor", "drive", "body", "point", "joint")
 _VERSIONS = ("mechanism", "paraflex_version", "numba_version", "numpy_version")
-# Numbers of the integration, besides the metrics that are.
+# Variables that describe the integration, in addition to the metrics marked `of_solver`.
 _OF_SOLVER = ("wall_time", "factorisations", "constraint_velocity_max")
-# A cubic spline needs so many samples.
+# Fewest samples of a cubic spline.
 _FEWEST = 4
 
 
 @dataclass(frozen=True)
 class NumberPair:
-    """A number of a mode in both runs.
+    """Scalar of a mode in both runs.
 
     Attributes
     ----------
     mode : str
-        Empty for runs without a path.
+        Actuation mode; empty for runs without a path.
     name : str
-        Of the variable, and of the motor: "peak_torque.tau1".
+        Name of the variable, followed by that of the motor if any: "peak_torque.tau1".
     unit : str
+        Unit of both values.
     first, second : float
-        NaN where a run has none.
+        Values in the two runs; NaN if a run has none.
     of_solver : bool
-        Whether it tells of the integration, and not of the mechanism.
+        Whether the number describes the integration rather than the mechanism.
     """
 
     mode: str
@@ -72,30 +73,31 @@ class NumberPair:
 
     @property
     def difference(self) -> float:
-        """The second less the first."""
+        """Second value minus first value."""
         return self.second - self.first
 
     @property
     def relative(self) -> float:
-        """The difference by the magnitude of the first; NaN where that is zero."""
+        """Difference divided by the magnitude of the first value; NaN if that is zero."""
         return self.difference / abs(self.first) if self.first else float("nan")
 
 
 @dataclass(frozen=True)
 class MotionPair:
-    """A quantity over time in both runs.
+    """Time-dependent quantity in both runs.
 
     Attributes
     ----------
     mode, name, part : str
-        The variable, and the motor, body, point or joint; empty where there is one.
+        Actuation mode, variable, and motor, body, point or joint; the part is empty for a variable without parts.
     unit : str
+        Unit of the quantity.
     first, second : float
-        Largest magnitudes.
+        Largest magnitudes in the two runs.
     difference : float
-        Largest magnitude of the difference, of points the largest distance; NaN where the runs have no time in common.
+        Largest magnitude of the difference (for points the largest distance); NaN if the runs have no time in common.
     time : float
-        When that is [s].
+        Time of the largest difference [s].
     """
 
     mode: str
@@ -110,23 +112,25 @@ class MotionPair:
 
 @dataclass(frozen=True)
 class RunComparison:
-    """What differs between two runs: from `compare`.
+    """Differences between two runs, as returned by `compare`.
 
     Attributes
     ----------
     kind : str
-        "tracking" or "motion".
+        Kind of both results, "tracking" or "motion".
     names : (str, str)
-        What the runs are called: their folders or files, else "A" and "B".
+        Names of the runs: their folders or files, else "A" and "B".
     numbers : tuple of NumberPair
-        By mode: the largest loads ("stress_max.rod") first, then those that differ most (relative to the first),
-        those of the integration last.
+        Scalars by mode: the largest loads ("stress_max.rod") first, then the others by their relative difference, the
+        largest first, and those of the integration last.
     motions : tuple of MotionPair
+        Time-dependent quantities.
     settings : mapping of str to (value, value)
-        Parameters of the model and of the run that differ, and versions; None where one run has none.
+        Parameters of the model and of the run that differ, and versions; None if a run has no such value.
     notes : tuple of str
-        What only one run has, and what was left out for that.
+        Members that only one run has, different endings, and different sample times.
     data : (Dataset, Dataset)
+        Results of both runs.
     """
 
     kind: str
@@ -139,11 +143,11 @@ class RunComparison:
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """Modes that both runs have; one without a name for runs without a path."""
+        """Modes that both runs have; a single empty name for runs without a path."""
         return _common_modes(*self.data)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, for JSON; None for what is not a number."""
+        """Return the comparison as plain values for JSON, with None for NaN."""
         modes: dict[str, Any] = {mode: {"numbers": {}, "motions": {}} for mode in self.modes}
         for pair in self.numbers:
             values = (pair.first, pair.second, pair.difference, pair.relative)
@@ -169,21 +173,21 @@ _WORDS = ("first", "second", "difference", "relative")
 def compare(
     first: xr.Dataset | str | Path, second: xr.Dataset | str | Path, modes: Sequence[str] = ()
 ) -> RunComparison:
-    """Compare two runs: their numbers, settings and motions.
+    """Compare two runs: their metrics, settings and motions.
 
-    Of runs of different mechanisms, modes or times that is compared which both have; `notes` names the rest.
+    Runs of different mechanisms, modes or times are compared in the members that both have; `notes` names the others.
 
     Parameters
     ----------
     first, second : Dataset, str or Path
         Two runs along paths, or two without; or their folders or files.
     modes : sequence of str
-        Those compared; by default all that both have.
+        Modes to compare; by default all that both runs have.
 
     Raises
     ------
     InputError
-        Results of another kind, of two kinds, without a mode in common, or without such a mode.
+        The results are of another kind or of two kinds, have no mode in common, or lack one of `modes`.
     """
     data, names = (_opened(first), _opened(second)), (_name(first, "A"), _name(second, "B"))
     kinds = [kind_of(each) for each in data]
@@ -219,9 +223,9 @@ def compare(
 
 
 def on_times_of(first: xr.Dataset, second: xr.Dataset, name: str) -> tuple[Array, ...]:
-    """Times that two runs have in common, and the values of a variable of both then.
+    """Return the times that two runs have in common, and the values of a variable at these times in both.
 
-    Samples of the first; the second is interpolated by cubic splines where it has other samples.
+    The times are samples of the first run. The second run is interpolated by cubic splines if its samples differ.
     """
     time, other = first["time"].values, second["time"].values
     here, there = (run[name].transpose("time", ...).values.astype(float) for run in (first, second))
@@ -238,7 +242,7 @@ def on_times_of(first: xr.Dataset, second: xr.Dataset, name: str) -> tuple[Array
 
 
 def _reached(values: Array) -> int:
-    """Number of samples until the first that is not a number."""
+    """Return the number of samples before the first that is not finite."""
     finite = np.isfinite(values.reshape(values.shape[0], -1)).all(axis=1)
     return int(finite.size if finite.all() else np.argmin(finite))
 
@@ -281,7 +285,7 @@ def _run(data: xr.Dataset, mode: str) -> xr.Dataset:
 
 
 def _differing_members(data: tuple[xr.Dataset, xr.Dataset], names: tuple[str, str]) -> Iterator[str]:
-    """Modes, motors and bodies that only one of two runs has."""
+    """Yield notes on modes, motors, drives, bodies, points and joints that only one of two runs has."""
     for dim, plural in (("mode", "modes"), *((part, f"{part}s" if part != "body" else "bodies") for part in _PARTS)):
         if not all(dim in each.coords for each in data):
             continue
@@ -293,7 +297,7 @@ def _differing_members(data: tuple[xr.Dataset, xr.Dataset], names: tuple[str, st
 
 
 def _differing_ends(data: tuple[xr.Dataset, xr.Dataset], names: tuple[str, str]) -> Iterator[str]:
-    """Runs that ended in different ways, and samples at different times."""
+    """Yield notes on runs with different final statuses, and on different sample times."""
     for mode in _common_modes(*data):
         ends = [str(_run(each, mode)["status"].item()) for each in data]
         if ends[0] != ends[1]:
@@ -306,7 +310,7 @@ def _differing_ends(data: tuple[xr.Dataset, xr.Dataset], names: tuple[str, str])
 
 
 def _numbers(mode: str, first: xr.Dataset, second: xr.Dataset) -> list[NumberPair]:
-    """Numbers of a mode that both runs have."""
+    """Return the scalars of a mode that both runs have."""
     pairs, loads = [], _load_numbers(mode, first, second)
     for name in map(str, first.data_vars):
         values = first[name]
@@ -325,7 +329,7 @@ def _numbers(mode: str, first: xr.Dataset, second: xr.Dataset) -> list[NumberPai
 
 
 def _load_numbers(mode: str, first: xr.Dataset, second: xr.Dataset) -> list[NumberPair]:
-    """Largest loads of a mode that both runs have: of beams and prescribed motions, and of all joints the largest."""
+    """Return the largest loads of a mode that both runs have: per beam, per prescribed motion, and over all joints."""
     pairs, nothing = [], float("nan")
     both = [load_figures(run) for run in (first, second)]
     for group, numbers in _LOADS.items():
@@ -343,7 +347,7 @@ def _load_numbers(mode: str, first: xr.Dataset, second: xr.Dataset) -> list[Numb
     return pairs
 
 
-# Numbers of `load_figures` by group: name in a comparison and unit, or the figure that has the unit.
+# Entries of `load_figures` by group: name in a comparison, and the unit or the key of the unit.
 _LOADS = {
     "beams": {"stress_max": ("stress_max", "Pa"), "place": ("stress_place", "m"),
               "safety_factor": ("safety_factor", "1")},
@@ -353,14 +357,14 @@ _LOADS = {
 
 
 def _weight(pair: NumberPair) -> float:
-    """What numbers are ordered by: infinite where only one run has the number, or the first is zero."""
+    """Return the sort key of a number: its relative difference; infinite if one run has none or the first is zero."""
     if pair.first == pair.second:
         return 0.0
     return abs(pair.relative) if np.isfinite(pair.relative) else float("inf")
 
 
 def _motions(kind: str, mode: str, first: xr.Dataset, second: xr.Dataset) -> Iterator[MotionPair]:
-    """Quantities over time of a mode that both runs have."""
+    """Yield the time-dependent quantities of a mode that both runs have."""
     for name in _MOTIONS[kind]:
         if name not in first or name not in second:
             continue
@@ -368,13 +372,13 @@ def _motions(kind: str, mode: str, first: xr.Dataset, second: xr.Dataset) -> Ite
         for part in [""] if dim is None else [str(each) for each in first[dim].values]:
             if dim is None or part in second[dim].values:
                 pair = [run if dim is None else run.sel({dim: part}) for run in (first, second)]
-                # A rigid body has no stress.
+                # All values are NaN for the stress of a rigid body.
                 if any(np.isfinite(run[name].values).any() for run in pair):
                     yield _motion(mode, name, part, *pair)
 
 
 def _motion(mode: str, name: str, part: str, first: xr.Dataset, second: xr.Dataset) -> MotionPair:
-    """A quantity of one part in both runs."""
+    """Compare a quantity of one part in both runs."""
     time, here, there = on_times_of(first, second, name)
     apart = _sizes(there - here)
     at = int(np.argmax(apart)) if apart.size else -1
@@ -394,22 +398,22 @@ def _largest(values: xr.DataArray) -> float:
 
 
 def _sizes(values: Array) -> Array:
-    """Magnitudes (samples,) of numbers or of vectors (samples, 2)."""
+    """Return the magnitudes (samples,) of numbers or of vectors (samples, 2)."""
     return np.abs(values) if values.ndim == 1 else np.linalg.norm(values, axis=-1)
 
 
 def _settings(first: xr.Dataset, second: xr.Dataset) -> dict[str, tuple[Any, Any]]:
-    """Parameters and versions that differ."""
+    """Return the parameters and versions that differ."""
     both = [_flat(json.loads(data.attrs.get("parameters", "{}"))) for data in (first, second)]
     for flat, data in zip(both, (first, second), strict=True):
         flat |= {name: data.attrs[name] for name in _VERSIONS if name in data.attrs}
-    # What --set said stands in the model.
+    # Values given by --set are already in the model.
     names = dict.fromkeys(name for flat in both for name in flat if not name.startswith("run.set."))
     return {name: (both[0].get(name), both[1].get(name)) for name in names if both[0].get(name) != both[1].get(name)}
 
 
 def _flat(tables: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Values of nested tables by their names with dots: "run.tolerance"."""
+    """Flatten nested tables to values by dotted names, such as "run.tolerance"."""
     flat: dict[str, Any] = {}
     for name, value in tables.items():
         full = f"{before}{name}"

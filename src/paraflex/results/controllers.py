@@ -1,4 +1,4 @@
-"""What controllers did, in datasets of runs: each with samples of its own."""
+"""Records of sampled controllers in datasets of runs, each with its own sample times."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from paraflex.results.numbers import finite_or_none, largest
 if TYPE_CHECKING:
     from paraflex.control.loop import ControllerRecord
 
-# The attribute of a dataset that describes its controllers by name.
+# Attribute of a dataset that describes its controllers by name.
 CONTROLLERS = "controllers"
-# The part of torques that only strains links.
+# Part of the torques that only strains links against one another.
 INTERNAL = "internal_torque"
-# Dimensions of a controller NAME, as KIND_NAME; that of samples has their times.
+# Dimensions of a controller NAME, as KIND_NAME; the coordinate of SAMPLE holds the sample times.
 SAMPLE, INPUT, OUTPUT = "sample", "input", "output"
-# And its variables: dimension besides that of samples, meaning.
+# Variables of a controller, as KIND_NAME: dimension in addition to that of samples, and meaning.
 READINGS, WANTED, GIVEN = "reading", "wanted_torque", "given_torque"
 _VARIABLES = {
     READINGS: (INPUT, "reading of a sensor as the law is given it, quantised and filtered"),
@@ -35,21 +35,23 @@ _ACTS = "acts after the delay, from one sample to the next; on the joint's secon
 
 @dataclass(frozen=True)
 class ControllerData:
-    """A controller in a dataset.
+    """Controller in a dataset.
 
     Attributes
     ----------
     name, law : str
+        Name of the controller, and description of its control law.
     period, delay : float
-        [s]
+        Sampling period and delay [s].
     limits : mapping of str to pair
-        Lowest and highest torque of each motor [N m, N]; None without.
+        Lowest and highest torque of each motor [N m, N]; None where there is no limit.
     rates : mapping of str to float or None
-        Largest change of each motor's torque in a second [N m/s, N/s].
+        Rate limit of each motor's torque [N m/s, N/s]; None where there is no limit.
     units : mapping of str to str
-        Of each sensor and motor.
+        Unit of each sensor and motor.
     data : xarray.Dataset
-        `time`, `reading`, `wanted_torque` and `given_torque` over `sample`; the first has no modes.
+        Sample times `sample`, and over them `reading`, `wanted_torque` (before limiting) and `given_torque` (after
+        saturation and rate limiting); the times are common to all modes.
     """
 
     name: str
@@ -63,36 +65,37 @@ class ControllerData:
 
     @property
     def limited(self) -> xr.DataArray:
-        """At which samples a limit was met."""
+        """Boolean array of the samples at which a limit was active."""
         return (self.data[WANTED] != self.data[GIVEN]).where(self.data[GIVEN].notnull(), False).any(OUTPUT)
 
     @property
     def samples(self) -> xr.DataArray:
-        """How many samples there are, of each run."""
+        """Number of samples of each run."""
         return self.data[GIVEN].notnull().any(OUTPUT).sum(SAMPLE)
 
 
 def dimension(kind: str, controller: str) -> str:
-    """The name of a controller's dimension or variable."""
+    """Return the name of a dimension or variable of a controller."""
     return f"{kind}_{controller}"
 
 
 def with_controllers(data: xr.Dataset, runs: Sequence[Sequence[ControllerRecord]], motors: Sequence[str]) -> xr.Dataset:
-    """A dataset with what controllers did in its runs, in the order of its modes; the same where they did nothing.
+    """Return a dataset with the records of the controllers of its runs; unchanged if there are no controllers.
 
     Parameters
     ----------
     data : xarray.Dataset
-        Of runs along a path, or of one without, which has no modes.
+        Results of runs along a path, or of one run without a path, which has no modes.
     runs : sequence of sequences of ControllerRecord
-        NaN stands for samples that a run did not reach, and for motors that are not active in its mode.
+        Records of each run, in the order of the modes. In the dataset, samples that a run did not reach and motors that
+        are not active in its mode are NaN.
     motors : sequence of str
-        Of the mechanism, in their order.
+        Names of the mechanism's motors, in their order.
 
     Raises
     ------
     InputError
-        Controllers of one name with other periods, delays or laws.
+        Controllers with the same name have different periods, delays or laws.
     """
     names = list(dict.fromkeys(one.name for records in runs for one in records))
     described = {}
@@ -108,7 +111,7 @@ def with_controllers(data: xr.Dataset, runs: Sequence[Sequence[ControllerRecord]
 def _controller(
     name: str, runs: Sequence[ControllerRecord | None], motors: Sequence[str]
 ) -> tuple[xr.Dataset, dict[str, Any]]:
-    """Variables of a controller over mode and its samples, and what it is."""
+    """Return the variables of a controller over modes and samples, and its description."""
     done = [one for one in runs if one is not None]
     first = max(done, key=lambda one: one.t.size)
     for one in done:
@@ -146,7 +149,7 @@ def _attributes(meaning: str, units: Sequence[str], comment: str) -> dict[str, s
 
 
 def _about(done: Sequence[ControllerRecord], outputs: Mapping[str, str]) -> dict[str, Any]:
-    """Law, period, delay and bounds of a controller; None where a torque has no bound."""
+    """Return law, period, delay and bounds of a controller; None where a torque has no bound."""
     first = done[0]
     limits, rates = {}, {}
     for motor in outputs:
@@ -158,7 +161,7 @@ def _about(done: Sequence[ControllerRecord], outputs: Mapping[str, str]) -> dict
 
 
 def controllers_of(data: xr.Dataset) -> list[ControllerData]:
-    """The controllers of a dataset, or of one of its runs; none where there were none."""
+    """Return the controllers of a dataset or of one of its runs; an empty list if there are none."""
     found = []
     for name, about in json.loads(data.attrs.get(CONTROLLERS, "{}")).items():
         own = {dimension(kind, name): kind for kind in (SAMPLE, INPUT, OUTPUT, *_VARIABLES)}
@@ -170,23 +173,24 @@ def controllers_of(data: xr.Dataset) -> list[ControllerData]:
 
 
 def controller_names(data: xr.Dataset) -> list[str]:
-    """Names of the controllers of a dataset."""
+    """Return the names of the controllers of a dataset."""
     return list(json.loads(data.attrs.get(CONTROLLERS, "{}")))
 
 
 def controller_variables(name: str) -> list[str]:
-    """The variables of a controller."""
+    """Return the names of the variables of a controller."""
     return [dimension(variable, name) for variable in _VARIABLES]
 
 
 def controller_figures(run: xr.Dataset) -> dict[str, Any]:
-    """`controllers` of one run as plain numbers; empty where results have none.
+    """Return the controllers of one run as plain numbers; empty if results have none.
 
     Returns
     -------
     dict
-        `controllers.<name>` with law, period and delay [s], samples, saturated_share, and of each motor `torques` with
-        unit, wanted_max, given_max, lowest, highest and rate, None of what has no limit.
+        `controllers.<name>` with law, period and delay [s], samples, saturated_share, and for each motor `torques` with
+        unit, wanted_max, given_max, lowest, highest and rate, None where there is no limit; and, if the dataset has
+        internal torques, `internal_torque_max`, the largest norm of their vector.
     """
     figures = {}
     for one in controllers_of(run):

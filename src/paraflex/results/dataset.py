@@ -1,4 +1,4 @@
-"""The labelled dataset of a tracking study: every mode's run with dimensions, units and provenance."""
+"""Labelled dataset of a tracking study: the runs of all modes with dimensions, units and provenance."""
 
 from __future__ import annotations
 
@@ -43,30 +43,34 @@ def tracking_dataset(
     error: ErrorSpan | str = ErrorSpan.MOTION,
     findings: Iterable[Finding] = (),
 ) -> xr.Dataset:
-    """One dataset of the runs of several modes of a task.
+    """Return one dataset of the runs of several modes of a task.
 
     Parameters
     ----------
     runs : sequence of TrackingRun or Record
-        Of one task; runs that did not finish hold NaN after their last sample and say so in `status`, and in `event`
-        and `event_time` where that stopped them. Runs of finite segments are reported as the links they were cut from.
+        Runs of one task. Runs that did not finish have NaN after their last sample, which `status` reports, and
+        `event` and `event_time` if an event stopped them. Finite segments are reported as the links they divide.
     options : IntegrationOptions, optional
-        Kept as provenance; those of the first run by default.
+        Integration options, stored as provenance; by default those of the first run.
     parameters : dict, optional
-        Kept as provenance: the model as read, and what was asked for.
+        Model as read and requested options, stored as provenance.
     error : ErrorSpan or str
-        Which tracking error stands for a run in tables and figures: that "motion" alone, or that of the "whole" run,
-        dwell included (Eq. 64). Both are in the dataset.
+        Tracking error that represents a run in tables and figures: during the "motion" alone, or over the "whole" run,
+        dwell included (Eq. 64). The dataset holds both.
     findings : iterable of Finding
-        Reasons to doubt the model, found before it ran; kept with those of its numbers and of the runs.
+        Findings on the model from checks before the run, stored with those on its numbers and on the runs.
 
     Returns
     -------
     xarray.Dataset
         Dimensions mode, time, axis, body, motor, joint, row, point, station, spring, end, section, drive, load,
-        sensor;
-        of each controller NAME sample_NAME, input_NAME and output_NAME (see `results.controllers`);
-        units and signs in the attributes of every variable. `shape` and what else drawings are made from is float32.
+        sensor; for each controller NAME also sample_NAME, input_NAME and output_NAME (see `results.controllers`).
+        The attributes of every variable give units and signs. `shape` and the other variables of drawings are float32.
+
+    Raises
+    ------
+    InputError
+        There is no run.
     """
     if not runs:
         raise InputError("no run to keep", field="runs", remedy="simulate at least one mode")
@@ -120,7 +124,7 @@ def tracking_dataset(
 
 
 def _findings(records: Sequence[Record]) -> Iterator[Finding]:
-    """Findings on the numbers of the mechanism, and on each run."""
+    """Yield findings on the numbers of the mechanism, and on each run."""
     task = records[0].task
     yield from doubtful_numbers(task.mechanism)
     part = part_of(task.path, float(task.motion.t[-1]))
@@ -134,7 +138,7 @@ def _findings(records: Sequence[Record]) -> Iterator[Finding]:
 
 
 def _frame(one: Record) -> Variables:
-    """A run's variables: dimensions besides mode and time, and values at the samples reached."""
+    """Return the variables of a run: dimensions besides mode and time, and values at the samples reached."""
     return {
         "end_effector": (("axis",), one.end_effector.position),
         "end_effector_velocity": (("axis",), one.end_effector.velocity),
@@ -146,5 +150,5 @@ def _frame(one: Record) -> Variables:
 
 
 def part_of(path: Path, end: float) -> Part | None:
-    """The part of a path done by runs that end at a time [s] before its end; None if they reach it."""
+    """Return the part of a path covered by runs that end at a time [s]; None if they reach the end of the path."""
     return Part(end, path.duration, length_fraction(path, end)) if too_short(end, path.duration) else None

@@ -1,4 +1,4 @@
-"""Findings in datasets, summaries and reports."""
+"""Storage of findings in datasets, and their lines in summaries and reports."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.findings import DONE_STATUSES, Finding, Level, Verdict
 
-# Prefix of the places of findings about single runs.
+# Prefix of `Finding.place` in findings on single runs.
 MODE = "mode "
 _LEVEL_WORDS = {Level.WRONG: "wrong", Level.DOUBTFUL: "warning"}
 # Attribute of a dataset that holds its findings, as JSON.
@@ -19,22 +19,22 @@ FINDINGS = "findings"
 
 
 def finished(data: xr.Dataset) -> NDArray[np.bool_]:
-    """Which runs of a dataset came to their end or to an event; of the others numbers are of a part of the run."""
+    """Return which runs of a dataset reached their end or an event; metrics of the others cover a part of the run."""
     return np.isin(np.atleast_1d(data["status"].values), DONE_STATUSES)
 
 
 def keep_findings(data: xr.Dataset, findings: Iterable[Finding]) -> None:
-    """Write findings into a dataset's attributes, each once, the gravest first."""
+    """Write findings into a dataset's attributes, without duplicates, the most severe first."""
     data.attrs[FINDINGS] = json.dumps([one.to_dict() for one in Verdict(findings)])
 
 
 def verdict_of(data: xr.Dataset) -> Verdict:
-    """The findings of a dataset; none in files of earlier versions."""
+    """Return the findings of a dataset; files of earlier versions have none."""
     return Verdict(map(Finding.from_dict, json.loads(data.attrs.get(FINDINGS, "[]"))))
 
 
 def doubt_lines(verdict: Iterable[Finding]) -> list[str]:
-    """A line for each finding; those of several modes with the same code share one."""
+    """Return a line for each finding; after the first, all modes with the same code share one line."""
     lines, further = [], {}
     for one in verdict:
         whose = one.place.partition(MODE)[2] if one.place.startswith(MODE) else ""

@@ -1,4 +1,4 @@
-"""Geometry from which a mechanism is drawn: stations of all bodies, joints and springs over time, from any model."""
+"""Geometry of drawings of a mechanism: stations of all bodies, joints and springs over time, from any model."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from paraflex.results.numbers import stacked
 from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
 from paraflex.results.stiff import rigid_frames
 
-# Joints of wheels and of racks: whether they slide, and what they hold.
+# Joints of wheels and of racks: whether they slide, and the constraints they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})
-# How far a rack's axis is from its pinion, in radii.
+# Range of the distance of a rack's axis from its pinion, in radii.
 _NEAREST, _FARTHEST = 0.5, 2.0
 
 
@@ -30,18 +30,19 @@ _NEAREST, _FARTHEST = 0.5, 2.0
 class Drawing:
     """Geometry of a mechanism at k samples, in the ground frame.
 
-    Magnified by a factor m, stations are at `base + m (shape - base)`, and so are joints: they keep together whatever
-    m is, as both the bodies and their base satisfy the joints.
+    With deflections magnified by a factor m, stations are at `base + m (shape - base)`, and so are joints. Bodies stay
+    connected for any m, as both the deformed bodies and the undeformed base satisfy the joints.
 
     Attributes
     ----------
     shape, base : (k, stations, 2) arrays
-        Bodies as they are, body after body, and drawn stiff: where something slides along a beam held at three or more
-        places in line, in the nearest pose of the rigid mechanism, else between the joints that hold them [m].
+        Stations of the deformed bodies, body after body, and of the undeformed bodies [m]. If a joint slides along a
+        beam that is held at three or more places in line, the undeformed bodies are in the nearest pose of the rigid
+        mechanism; otherwise each is placed between the joints that hold it.
     joints, joint_bases : (k, joints, 2) arrays
-        Each on its second body, a rod on the ground where it is on that, and in the base [m].
+        Positions of the joints, on the second body (of a rod to the ground, on the ground), and in the base [m].
     directions, direction_bases : (k, joints) arrays
-        Of the axes of joints that slide, NaN of others, and in the base [rad].
+        Directions of the axes of sliding joints, NaN for other joints, and in the base [rad].
     springs : (k, springs, 2, 2) array
         Both ends of the springs between points [m].
     """
@@ -61,18 +62,18 @@ def drawing(
     angle: Callable[[PointRef], Array],
     frame: Callable[[str], tuple[Array, Array]],
 ) -> Drawing:
-    """A drawing from a model's motion of its bodies.
+    """Return the drawing of a mechanism from the motion of its bodies in any model.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Uncut.
+        Mechanism as described, not divided into finite segments.
     shapes : mapping of str to (k, s, 2) array
-        Of each body, where its stations are [m]: see `outlines`.
+        Positions of the stations of each body [m]: see `outlines`.
     angle : callable
-        Of the material at a point (k,) [rad].
+        Function that returns the angle (k,) of the material at a point [rad].
     frame : callable
-        Origin (k, 2) and angle (k,) of a body's frame.
+        Function that returns the origin (k, 2) [m] and angle (k,) [rad] of a body's frame.
     """
     drawn = {one.body: one for one in outlines(mechanism)}
     samples = len(next(iter(shapes.values())))
@@ -112,7 +113,7 @@ def drawing(
 
 
 def system_drawing(system: System, q: Array) -> Drawing:
-    """The drawing of a system for coordinates (k, n)."""
+    """Return the drawing of a system for coordinates q (k, n)."""
 
     def frame(name: str) -> tuple[Array, Array]:
         body = system.body(name)
@@ -123,10 +124,10 @@ def system_drawing(system: System, q: Array) -> Drawing:
 
 
 def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
-    """Drawing variables of a mechanism in its first assembly, undeformed, as a run of one sample.
+    """Return the drawing variables of a mechanism in its first assembly, undeformed, as a run of one sample.
 
-    Loops are closed as well as the angles close them; bodies whose places do not follow are NaN. None without an
-    assembly, or where no place follows.
+    Loops are closed only as accurately as the given angles close them. Bodies whose poses cannot be derived from the
+    assembly are NaN. Return None without an assembly, or if no pose can be derived.
     """
     try:
         poses = placed_poses(mechanism, mechanism.assemblies[0]) if mechanism.assemblies else {}
@@ -144,7 +145,7 @@ def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
 
 
 def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
-    """A drawing at times (k,) as a run: what is drawn, and nothing else."""
+    """Return a drawing at times (k,) as a dataset of a run that holds the drawn variables only."""
     effector = mechanism.end_effector
     return xr.Dataset(
         {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(one).items()},
@@ -154,7 +155,7 @@ def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
 
 
 def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """Variables of a dataset over time: their other dimensions and values (k, ...); springs if there are any."""
+    """Return the variables of a drawing: dimensions besides time, and values (k, ...); springs if there are any."""
     springs = {"spring_position": (("spring", "end", "axis"), one.springs)} if one.springs.size else {}
     return {
         "shape": (("station", "axis"), one.shape),
@@ -168,10 +169,10 @@ def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
 
 
 def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
-    """Labels of these variables: points, joints, bodies of the stations, stations of the points, kinds of the joints.
+    """Return the labels of drawing variables: points, joints, bodies of stations, stations of points, kinds of joints.
 
-    Points are in their order body after body, as everywhere in the results; a spring's end on the ground has station
-    -1, and so has the rail of a joint without one on a moving body.
+    Points are ordered body after body, as everywhere in the results. The station is -1 for the end of a spring on the
+    ground, and for the rail of a joint that has none on a moving body.
     """
     drawn = outlines(mechanism)
     first = dict(zip([one.body for one in drawn], np.cumsum([0, *(len(one.places) for one in drawn)]), strict=False))
@@ -211,22 +212,22 @@ def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def _drawn_ends(joint: Joint) -> tuple[PointRef, PointRef]:
-    """The point at which a joint is drawn, of a rod that on the ground, and its other point."""
+    """Return the point at which a joint is drawn (of a rod, the point on the ground if any), and its other point."""
     return (joint.a, joint.b) if "distance" in joint.holds and joint.a.on_ground else (joint.b, joint.a)
 
 
 def _rail_station(joint: Joint, stations: Mapping[PointRef, int]) -> int:
-    """The station that a joint's rail or rod goes through; the rail of what slides along a beam is the beam."""
+    """Return the station that a joint's rail or rod passes through; -1 without one, or if the rail is the beam."""
     drawn = (joint.slides and not joint.follows_beam) or "distance" in joint.holds
     return stations.get(_drawn_ends(joint)[1], -1) if drawn else -1
 
 
 def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
-    """Radii of two external gears, or of a pinion and its rack, at joints on one body or the ground.
+    """Return the pitch radii [m] of two external gears, or of a pinion and its rack, at joints on one carrier body.
 
-    Of a rack, whose joint slides without turning, infinity: positive where its pitch line lies to the right of the
-    joint's direction as seen from the pinion, else negative. NaN of anything else [m], also where the rack's axis is
-    not about a radius from the pinion: a screw's ratio is no radius.
+    The radius of a rack, whose joint slides without turning, is infinite: positive if its pitch line lies to the right
+    of the joint's direction as seen from the pinion, else negative. Radii are NaN for any other relation, and if the
+    distance of the rack's axis from the pinion is far from the radius: the ratio of a screw is not a radius.
     """
     unknown = np.nan, np.nan
     if isinstance(one, SumRelation):
@@ -254,14 +255,14 @@ def pitch_radii(mechanism: Mechanism, one: Relation) -> tuple[float, float]:
 
 
 def _touches(rail: Joint, side: float, arm: Array, radius: float) -> bool:
-    """Whether a rail is about a radius from a pinion, at an arm from it in their carrier."""
+    """Check whether the distance of a rail from a pinion is about the radius; `arm` is from the pinion to the rail."""
     direction = rail.direction - (0.0 if side > 0.0 else rail.angle)
     distance = abs(arm[0] * np.sin(direction) - arm[1] * np.cos(direction))
     return bool(_NEAREST * radius <= distance <= _FARTHEST * radius)
 
 
 def _joined(mechanism: Mechanism) -> dict[str, list[tuple[Joint, PointRef]]]:
-    """Joints of each body, each with its point there."""
+    """Return the joints of each body, each with its point on the body."""
     joined: dict[str, list[tuple[Joint, PointRef]]] = {body.name: [] for body in mechanism.bodies}
     for joint in mechanism.joints:
         for ref in (joint.a, joint.b):
@@ -271,7 +272,7 @@ def _joined(mechanism: Mechanism) -> dict[str, list[tuple[Joint, PointRef]]]:
 
 
 def _bends_between_holds(body: Body, one: Outline, joined: list[tuple[Joint, PointRef]]) -> bool:
-    """Whether joints hold a flexible beam at three or more places in line, one of which slides along it."""
+    """Check whether joints hold a flexible beam at three or more places in line, one of which slides along it."""
     if isinstance(body, RigidBody) or not body.flexible:
         return False
     moving = [joint for joint, ref in joined if joint.follows_beam and ref is joint.a]
@@ -282,7 +283,7 @@ def _bends_between_holds(body: Body, one: Outline, joined: list[tuple[Joint, Poi
 def _driven(
     mechanism: Mechanism, directions: Array, place: Callable[[PointRef], Array], angle: Callable[[PointRef], Array]
 ) -> dict[str, Array]:
-    """Coordinates (k,) of the joints with motors or prescribed motions [rad, m]."""
+    """Return the coordinates (k,) of the joints with motors or prescribed motions [rad, m]."""
     names = {one.joint for one in (*mechanism.motors, *mechanism.prescribed)}
     out = {}
     for joint, direction in zip(mechanism.joints, directions.T, strict=True):
@@ -304,14 +305,14 @@ def _base(
     angle: Callable[[PointRef], Array],
     frame: Callable[[str], tuple[Array, Array]],
 ) -> Array:
-    """The undeformed body between the joints that hold it."""
+    """Return the stations (k, s, 2) of the undeformed body placed between the joints that hold it [m]."""
     if isinstance(body, RigidBody) or not body.flexible:
         return shape
     held: dict[int, PointRef] = {}
     moving = []
     for joint, ref in joined:
         if joint.follows_beam and ref is joint.a:
-            # Its place on the undeformed beam.
+            # Abscissa of the sliding point on the undeformed beam.
             there, (origin, turn) = _complex(place(joint.b)), frame(one.body)
             moving.append(Hold(((there - _complex(origin)) * np.exp(-1j * turn)).real.astype(complex), there))
         else:
@@ -333,7 +334,7 @@ def _directions(
     angle: Callable[[PointRef], Array],
     frame: Callable[[str], tuple[Array, Array]],
 ) -> Array:
-    """Of the axes of joints that slide (k, joints), NaN of others [rad]."""
+    """Return the directions (k, joints) of the axes of sliding joints, NaN for other joints [rad]."""
     out = np.full((samples, len(mechanism.joints)), np.nan)
     for i, joint in enumerate(mechanism.joints):
         if joint.slides and joint.follows_beam:

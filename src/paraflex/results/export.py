@@ -1,4 +1,4 @@
-"""Results for other programs: tables as CSV or Parquet, a struct for MATLAB, netCDF."""
+"""Export of results to other programs: tables as CSV or Parquet, a struct for MATLAB, netCDF."""
 
 from __future__ import annotations
 
@@ -33,34 +33,40 @@ EXPORT_FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
 TIME_SERIES, FIGURES_TABLE, SHAPES, SECTIONS = "time_series", "figures", "shapes", "sections"
 LAWS = "laws"
-# Dimensions that rows of tables are of, outermost first, before that along which results go.
+# Dimensions of the rows of tables, outermost first; the independent variable is the innermost.
 _ROW_DIMENSIONS = ("model", "law", "mode")
-# The dimension along which results of a kind go, and its table; of others time.
+# Independent variable of a kind of results, and name of its table; time for other kinds.
 _ALONG = {"statics": ("step", "steps"), "reduction": ("frequency", "frequencies")}
-# MATLAB takes longer names apart.
+# Longest name of a variable or field in MATLAB.
 _LONGEST_NAME = 63
 
 
 @checked_arguments()
 def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.DataFrame]:
-    """Results as tidy tables, one row per observation; times that a run did not reach are NaN.
+    """Return results as tidy tables, one row per observation, with NaN at times that a run did not reach.
 
     Parameters
     ----------
     data : xarray.Dataset
-        Of a run, with a path or without, of a verification, of equilibria or of reduced models.
+        Results of a run with or without a path, of a verification, of equilibria, of reduced models or of a comparison
+        of control laws.
     shapes : bool
-        Also the deformed shapes, and section forces along beams: many rows.
+        Whether to include deformed shapes and section forces along beams, which have many rows.
 
     Returns
     -------
     dict of str to pandas.DataFrame
-        `time_series`: a row a model (of a verification), mode and time; a variable of more dimensions makes a column
-        for each of their labels, `torque_tau1` or `joint_force_B1_x`; of equilibria it is `steps`, of reduced models
-        `frequencies`. `figures`: a row a model and mode. `shapes`: a row a model, mode, time and drawn point;
-        `sections`: a row a model, mode, time and place along a beam; `controller_NAME`: a row a mode and sample of a
-        controller. Of control laws it is `laws` alone, a row a law and mode. Their `attrs` hold `units` and `meanings`
-        of columns.
+        `time_series`: one row per model (of a verification), mode and time. A variable with more dimensions has one
+        column per label, such as `torque_tau1` or `joint_force_B1_x`. For equilibria the table is called `steps`, for
+        reduced models `frequencies`. `figures`: one row per model and mode. `shapes`: one row per model, mode, time and
+        drawn point. `sections`: one row per model, mode, time and place along a beam. `controller_NAME`: one row per
+        mode and sample of a controller. For control laws there is only `laws`, with one row per law and mode. The
+        `attrs` of the tables hold `units` and `meanings` of the columns.
+
+    Raises
+    ------
+    InputError
+        The results are linear models, which are not tables.
     """
     if kind_of(data) == "linear":
         raise InputError(
@@ -98,7 +104,7 @@ def _table(data: xr.Dataset, names: Sequence[Any], rows: Sequence[str]) -> pd.Da
     units: dict[str, str] = {}
     meanings: dict[str, str] = {}
     for name in (*rows, *names):
-        # Over rows that a variable does not depend on it is the same.
+        # A variable is repeated over row dimensions that it does not have.
         array = data[name].broadcast_like(every)
         others = [dim for dim in array.dims if dim not in rows]
         values = array.transpose(*rows, *others).values
@@ -113,7 +119,7 @@ def _table(data: xr.Dataset, names: Sequence[Any], rows: Sequence[str]) -> pd.Da
 
 
 def _unit_and_meaning(array: xr.DataArray, index: tuple[int, ...] = ()) -> tuple[str, str]:
-    """Unit and meaning of a variable, or of the label of it at an index, where each has a unit of its own."""
+    """Return unit and meaning of a variable, or of one of its labels if `units_each` gives each its own unit."""
     each = str(array.attrs.get("units_each", "")).split(", ")
     unit = each[index[0]] if each != [""] and len(index) == 1 else str(array.attrs.get("units", ""))
     return ("" if unit == "1" else unit), str(array.attrs.get("long_name", ""))
@@ -121,32 +127,34 @@ def _unit_and_meaning(array: xr.DataArray, index: tuple[int, ...] = ()) -> tuple
 
 @checked_arguments()
 def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = False, force: bool = False) -> list[Path]:
-    """Write results for other programs; every file appears whole or not at all.
+    """Write results for other programs; every file is written completely or not at all.
 
     Parameters
     ----------
     data : xarray.Dataset
+        Results.
     output : str or Path
-        A folder, made if it is not there, for a file a table, or results.mat, results.nc. A name that ends in .csv or
-        .parquet is a file for the time series alone, one in .mat or .nc that file.
+        Folder for one file per table, or for results.mat or results.nc; created if missing. A name that ends in .csv or
+        .parquet is a file for the time series alone, a name that ends in .mat or .nc is the file itself.
     to : str
-        "csv", names of columns with their units; "parquet", units in the metadata of the columns; "mat", see
-        `matlab_struct`; "netcdf".
+        Format: "csv", with units in the column names; "parquet", with units in the metadata of the columns; "mat", see
+        `matlab_struct`; or "netcdf".
     shapes : bool
-        Also the table of deformed shapes; .mat and netCDF always hold them.
+        Whether to add the tables of deformed shapes and section forces; .mat and netCDF files always hold them.
     force : bool
-        Whether files may be written over.
+        Whether existing files may be overwritten.
 
     Returns
     -------
     list of Path
+        Files written.
 
     Raises
     ------
     InputError
-        An unknown format, or a file that is there already.
+        The format is unknown, the file's ending does not match it, or a file exists already.
     OutputError
-        It cannot be written.
+        A file cannot be written.
     """
     if to not in EXPORT_FORMATS:
         raise InputError("no such format", field="to", value=to, remedy=suggestion(to, EXPORT_FORMATS))
@@ -175,13 +183,13 @@ def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = Fals
 
 @contextmanager
 def _added(file: Path) -> Iterator[Path]:
-    """The name to write a file under, which becomes part of the results in whose folder it lies."""
+    """Provide a temporary name for a file, which becomes part of the results in its folder."""
     with added_to(file.parent) as folder, whole_file(folder / file.name) as unfinished:
         yield unfinished
 
 
 def _write_table(table: pd.DataFrame, file: Path, to: str, about: Mapping[str, str]) -> None:
-    """Write a table as CSV, units in the names of columns, or Parquet, units in their metadata."""
+    """Write a table as CSV with units in the column names, or as Parquet with units in the metadata of the columns."""
     import pyarrow as pa
 
     units, meanings = table.attrs["units"], table.attrs["meanings"]
@@ -205,12 +213,12 @@ def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
 
 
 def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
-    """Results as a struct for MATLAB.
+    """Return results as a struct for MATLAB.
 
-    A field a variable or coordinate. Time, or the step of equilibria, is the first dimension, so that
-    `plot(results.time, results.torque(:, :, 1))` draws the torques of the first mode; mode and model are the last.
-    Labels are cells of text. `units`, `dims` and `meaning` have the same fields: text, cells of names of dimensions,
-    text. `attributes` says where results come from.
+    Each variable or coordinate is a field. Time, or the step of equilibria or the frequency, is the first dimension, so
+    that `plot(results.time, results.torque(:, :, 1))` plots the torques of the first mode; mode and model are the last.
+    Labels are cell arrays of text. `units`, `dims` and `meaning` have the same fields: text, cell arrays of dimension
+    names, text. `attributes` holds the provenance.
     """
     struct: dict[str, Any] = {"units": {}, "dims": {}, "meaning": {}}
     samples = [dimension(SAMPLE, name) for name in controller_names(data)]
@@ -228,7 +236,7 @@ def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
 
 
 def matlab_name(name: str) -> str:
-    """A name as MATLAB allows it: letters, digits and underscores, a letter first."""
+    """Convert a name to a valid MATLAB name: letters, digits and underscores, a letter first, at most 63 characters."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     if not re.match(r"[A-Za-z]", plain):
         plain = f"x{plain}"
@@ -242,7 +250,7 @@ def _matlab_value(values: NDArray[Any]) -> Any:
 
 
 def _cells(texts: Sequence[str]) -> NDArray[Any]:
-    """A column of cells."""
+    """Return texts as a column of cells."""
     cells = np.empty((len(texts), 1), dtype=object)
     cells[:, 0] = texts
     return cells
@@ -256,14 +264,30 @@ def _write_mat(variables: dict[str, Any], file: Path) -> None:
 
 
 def export_table(source: Path, output: Path, to: str, *, force: bool = False) -> list[Path]:
-    """Write the table of a study of many runs, which is Parquet, as CSV or for MATLAB (a struct, a field a column).
+    """Write the Parquet table of a study of many runs as CSV, or for MATLAB as a struct with one field per column.
+
+    Parameters
+    ----------
+    source : Path
+        Parquet table of the study.
+    output : Path
+        File with the ending of the format, or folder for results.csv or results.mat.
+    to : str
+        Format, "csv" or "mat".
+    force : bool
+        Whether an existing file may be overwritten.
+
+    Returns
+    -------
+    list of Path
+        File written.
 
     Raises
     ------
     InputError
-        Another format, a file that is there already, or a table that cannot be read.
+        The format is another one, the file exists already, or the table cannot be read.
     OutputError
-        It cannot be written.
+        The file cannot be written.
     """
     if to not in ("csv", "mat"):
         raise InputError(
@@ -284,7 +308,7 @@ def export_table(source: Path, output: Path, to: str, *, force: bool = False) ->
 
 
 def _values(column: pa.ChunkedArray) -> NDArray[Any]:
-    """Values of an Arrow column; missing numbers are NaN, missing text is empty."""
+    """Return the values of an Arrow column; missing numbers are NaN, missing text is empty."""
     import pyarrow as pa
     from pyarrow import compute
 

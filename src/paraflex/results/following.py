@@ -1,4 +1,4 @@
-"""Metrics of the runs of a dataset along their paths, the ranking metric, and the part of a path that was run."""
+"""Tracking metrics of the runs of a dataset, the metric that ranks runs, and the part of a path that was covered."""
 
 from __future__ import annotations
 
@@ -16,61 +16,71 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.metrics import METRICS, Metric
 from paraflex.results.traces import data_traces
 
-# Variables of a dataset from which metrics are computed.
+# Variables of a dataset from which tracking metrics are computed.
 _TRACES = ["end_effector", "end_effector_desired", "torque"]
 
 
 class ErrorSpan(Enum):
-    """The time span of the tracking error that ranks runs.
+    """Time span of the tracking error that ranks runs.
 
     MOTION
         The motion along the path, from its start to its end.
     WHOLE
-        All samples, the dwell after the path among them: the paper's index (Eq. 64).
+        All samples, including the dwell after the path: the paper's index (Eq. 64).
     """
 
     MOTION = "motion"
     WHOLE = "whole"
 
 
-# The metric that ranks runs, and its label.
+# Metric that ranks runs, and its time span in words.
 HEADLINE = {ErrorSpan.MOTION: "tracking_rms_motion", ErrorSpan.WHOLE: "tracking_rms"}
 SPAN_WORDS = {ErrorSpan.MOTION: "during the motion", ErrorSpan.WHOLE: "over the whole run, dwell included"}
 
 
 @checked_arguments()
 def tracking_error(data: xr.Dataset) -> xr.DataArray:
-    """Root mean square distance of the end-effector from its desired place over the samples (Eq. 64) [m]."""
+    """Return the RMS distance of the end-effector from its desired position over all samples (Eq. 64) [m]."""
     return metric_variables(data)["tracking_rms"]
 
 
 @checked_arguments()
 def residual_vibration(data: xr.Dataset, motion_end: float) -> xr.DataArray:
-    """Root mean square distance of the end-effector after the motion's end from its drift [m]: see `vibration`.
+    """Return the root mean square distance of the end-effector from its drift after the motion [m]: see `vibration`.
 
-    NaN where the run has too few samples after it, or did not get to its end.
+    The value is NaN if a run has too few samples after the motion, or did not finish.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Results of runs along a path.
+    motion_end : float
+        End of the motion along the path [s].
     """
     return metric_variables(data, motion_end=motion_end)["residual_vibration"]
 
 
 @checked_arguments()
 def settling_times(data: xr.Dataset, band: float | None = None, motion_end: float | None = None) -> xr.DataArray:
-    """Time from the end of the motion until every run's end-effector stays within a band of its desired place [s].
+    """Return the settling time [s] of each run: from the end of the motion until the error stays within a band.
 
-    NaN of runs that do not, or have no samples after the motion.
+    The error is the distance of the end-effector from its desired position. The time is NaN for runs that do not settle
+    or have no samples after the motion.
 
     Parameters
     ----------
     data : xarray.Dataset
+        Results of runs along a path.
     band : float, optional
-        [m]; by default 5 % of the largest tracking error of the run, as the metric `settling_time` has it.
+        Width of the band [m]; by default 5 % of the largest tracking error of the run, as in the metric
+        `settling_time`.
     motion_end : float, optional
         End of the motion along the path [s]; that of the dataset by default.
 
     Raises
     ------
     InputError
-        A band that is not positive.
+        The band is not positive.
     """
     from paraflex.mechanism.quantities import positive
 
@@ -81,7 +91,7 @@ def settling_times(data: xr.Dataset, band: float | None = None, motion_end: floa
     return _of_runs(data, [metric], motion_end)["settling_time"]
 
 
-# Metrics that are variables of datasets; and those of tracking.
+# Metrics that are variables of datasets, and those of them that have one value per run.
 KEPT_METRICS = tuple(metric.name for metric in METRICS.values() if metric.kept)
 FOLLOWING = tuple(name for name in KEPT_METRICS if not METRICS[name].each)
 
@@ -89,12 +99,14 @@ FOLLOWING = tuple(name for name in KEPT_METRICS if not METRICS[name].each)
 def metric_variables(
     data: xr.Dataset, names: Sequence[str] = FOLLOWING, motion_end: float | None = None
 ) -> dict[str, xr.DataArray]:
-    """Metrics of every run of a dataset by name, NaN over spans that a run did not finish.
+    """Return metrics of every run of a dataset by name; NaN over spans that a run did not finish.
 
     Parameters
     ----------
     data : xarray.Dataset
+        Results of runs along a path.
     names : sequence of str
+        Names of the metrics; by default those of tracking.
     motion_end : float, optional
         End of the motion along the path [s]; that of the dataset by default.
     """
@@ -117,16 +129,16 @@ def _of_runs(data: xr.Dataset, metrics: Sequence[Metric], motion_end: float | No
 
 
 def headline(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """The tracking error that ranks the runs of a dataset [m], and its time span in words.
+    """Return the tracking error that ranks the runs of a dataset [m], and its time span in words.
 
-    Results that earlier versions wrote are ranked by the whole run, as they were then.
+    Results of earlier versions are ranked by the error over the whole run, as in those versions.
     """
     span = ErrorSpan.MOTION if ranked_by_motion(data) else ErrorSpan.WHOLE
     return data[HEADLINE[span]], SPAN_WORDS[span]
 
 
 def below_tolerance_line(errors: Mapping[str, float | None], tolerance: float) -> str:
-    """Which tracking errors [m] are below the tolerance of integration [m]: these tell nothing. Empty if none is."""
+    """Return a line on tracking errors [m] below the integration tolerance [m], which are meaningless; else ""."""
     small = [name for name, error in errors.items() if error is not None and error < tolerance]
     if not small:
         return ""
@@ -137,20 +149,20 @@ def below_tolerance_line(errors: Mapping[str, float | None], tolerance: float) -
 
 
 def ranked_by_motion(data: xr.Dataset) -> bool:
-    """Whether the error of the motion ranks the runs of a dataset; else that of the whole run."""
+    """Check whether the error during the motion ranks the runs of a dataset; otherwise that of the whole run does."""
     return data.attrs.get("error", ErrorSpan.WHOLE.value) == ErrorSpan.MOTION.value
 
 
 @dataclass(frozen=True)
 class Part:
-    """The part of a path that runs did which were too short for it.
+    """Part of a path that runs covered which ended before the path.
 
     Attributes
     ----------
     duration, path : float
-        Of the runs, and of the path [s].
+        Durations of the runs and of the path [s].
     length : float
-        Of the path's length, the part that was run.
+        Fraction of the path's length that was covered.
     """
 
     duration: float
@@ -164,21 +176,21 @@ class Part:
         )
 
     def finding(self, place: str = "study.duration") -> Finding:
-        """The same as a finding."""
+        """Return the part as a finding."""
         return Finding("path-cut-short", place, str(self), f"the path takes {self.path:.4g} s")
 
     def to_dict(self) -> dict[str, float | str]:
-        """The part as plain numbers, and in words."""
+        """Return the part as plain numbers, and in words."""
         return {"duration": self.duration, "path": self.path, "length": self.length, "message": str(self)}
 
 
 def too_short(end: float, path_duration: float) -> bool:
-    """Whether a run that ends at a time [s] ends before its path does [s]."""
+    """Check whether a run ends before its path; both times in s."""
     return end < path_duration * (1.0 - SAME_TIME)
 
 
 def part_run(data: xr.Dataset) -> Part | None:
-    """The part of a path done by the runs of a dataset that were too short for it; None if they were not."""
+    """Return the part of the path that the runs of a dataset covered; None if they reached its end."""
     end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
     if "path_length_run" not in data.attrs or not too_short(end, path):
         return None
@@ -187,11 +199,11 @@ def part_run(data: xr.Dataset) -> Part | None:
 
 @checked_arguments()
 def peak_torque(data: xr.Dataset) -> xr.DataArray:
-    """Largest magnitude of each motor's torque [N m]."""
+    """Return the largest magnitude of each motor's torque [N m], of sliding motors of the force [N]."""
     return metric_variables(data, ["peak_torque"])["peak_torque"]
 
 
 @checked_arguments()
 def rms_torque(data: xr.Dataset) -> xr.DataArray:
-    """Root mean square of each motor's torque over the run [N m]."""
+    """Return the root mean square of each motor's torque over the run [N m], of sliding motors of the force [N]."""
     return metric_variables(data, ["rms_torque"])["rms_torque"]

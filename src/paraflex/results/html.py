@@ -1,4 +1,4 @@
-"""Runs in notebooks: status, results, and counts of the solver."""
+"""HTML views of runs in notebooks: status, results, and counts of the solver."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from paraflex.results.outlines import deflections
 from paraflex.results.run_traces import run_traces
 from paraflex.tracking import TrackingRun
 
-# Points listed one by one.
+# Largest number of points in the table.
 _MOST_LISTED = 20
 
 
 @view.register(TrackingRun)
 def tracking_run_html(run: TrackingRun) -> str:
-    """Status, tracking error, torques and deflection of one mode, and counts of the solver."""
+    """Return the view of a run along a path: status, tracking error, torques, deflection and counts of the solver."""
     task, solution = run.task, run.solution
     whole = task if task.whole is None else task.whole
     torque = run.applied
@@ -45,7 +45,7 @@ def tracking_run_html(run: TrackingRun) -> str:
 
 @view.register(MotionRun)
 def motion_run_html(run: MotionRun) -> str:
-    """Status of a run without a path, places of its points at the end, and counts of the solver."""
+    """Return the view of a run without a path: status, positions of its points at the end and counts of the solver."""
     solution, system = run.solution, run.system
     energies: list[tuple[str, Any]] = []
     points: list[tuple] = []
@@ -79,14 +79,14 @@ def _verdict(run: TrackingRun | MotionRun) -> str:
 def _ended(solution: Solution) -> str:
     if not solution.t.size:
         return solution.status
-    # A run fails after its last sample; its message has the time.
+    # A run fails after its last sample; its message gives the time.
     until = " at" if solution.status in ("complete", "stopped") else ", its last sample at"
     return f"{solution.status}{until} t = {solution.t[-1]:.4g} s"
 
 
 def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
     task, solution = run.task, run.solution
-    # The state at an event is a sample more than the task's times.
+    # The state at an event is one sample in addition to the task's times.
     if task.mechanism.end_effector is None or solution.t.size == bool(solution.event):
         return []
     traces = run_traces(run)
@@ -105,7 +105,7 @@ def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
 
 
 def _deflection(run: TrackingRun | MotionRun) -> str | None:
-    """Largest deflection of any flexible body from its chord."""
+    """Return the largest deflection of any flexible body from its chord as text in mm; None if there is none."""
     system = run.task.system if isinstance(run, TrackingRun) else run.system
     bent = np.abs(deflections(system, run.solution.q))
     return f"{1e3 * np.nanmax(bent):.4g} mm" if np.isfinite(bent).any() else None

@@ -1,4 +1,4 @@
-"""The kinds of datasets of results, and the error for a wrong one."""
+"""Kinds of datasets of results, and the error for a dataset of a wrong kind."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MADE_BY = {
 
 @checked_arguments()
 def kind_of(data: xr.Dataset) -> str:
-    """Kind: "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking"."""
+    """Return "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking"."""
     if "model" in data.dims:
         return "verification"
     kind = str(data.attrs.get("kind"))
@@ -35,12 +35,12 @@ def kind_of(data: xr.Dataset) -> str:
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:
-    """None if a dataset is of one of some kinds.
+    """Check that a dataset is of one of the given kinds.
 
     Raises
     ------
     InputError
-        It is of another, or of none.
+        The dataset is of another kind, or does not hold results of paraflex.
     """
     kind = kind_of(data)
     if kind not in kinds:
@@ -50,7 +50,7 @@ def check_kind(data: xr.Dataset, *kinds: str) -> None:
 
 
 def wrong_kind(kind: str, kinds: Iterable[str], field: str = "data") -> InputError:
-    """The error for results of a wrong kind."""
+    """Return the error for results of a wrong kind."""
     wanted = list(kinds)
     makers = [_MADE_BY[each] for each in wanted if each in _MADE_BY]
     remedy = "give those of the kind " + " or ".join(f'"{each}"' for each in wanted)

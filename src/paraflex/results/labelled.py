@@ -1,4 +1,4 @@
-"""Common parts of datasets of runs: variables of the links, labels, units, conventions, provenance."""
+"""Common parts of datasets of runs: variables of the links, labels, units, sign conventions, provenance."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ UNITS = (
     | STRESS_UNITS
 )
 
-# Conventions of variables: body, frame, sign.
+# Conventions of variables: body, frame and sign.
 _COMMENTS = {
     "motor_power": "torque or force times the rate of the joint: positive drives the mechanism, negative brakes it",
     "joint_force": (
@@ -146,12 +146,12 @@ _COMMENTS = {
 } | STRESS_COMMENTS
 
 
-# Variables that are forces where all motors, or prescribed motions, slide.
+# Variables that are forces if all motors slide.
 _TORQUES = ("torque", "internal_torque", "peak_torque", "rms_torque", "applied_torque")
 
 
 def link_variables(links: Links, mechanism: Mechanism) -> Variables:
-    """Variables of the links of a mechanism, at the samples reached."""
+    """Return the variables of the links of a mechanism at the samples reached: dimensions besides time, and values."""
     return {
         "angle": (("body",), links.angle),
         "angular_velocity": (("body",), links.rate),
@@ -178,7 +178,7 @@ def link_variables(links: Links, mechanism: Mechanism) -> Variables:
 
 
 def _load_variables(links: Links, mechanism: Mechanism) -> Variables:
-    """What only models with coordinates of their own give: joints, prescribed motions, loads of frame and sections."""
+    """Return variables that only some models have: joint coordinates, drives, frame loads, sensors, section forces."""
     out: Variables = {}
     for name, dim in (("joint_coordinate", "joint"), ("joint_speed", "joint"), ("drive_torque", "drive"),
                       ("drive_speed", "drive")):  # fmt: skip
@@ -195,7 +195,7 @@ def _load_variables(links: Links, mechanism: Mechanism) -> Variables:
 
 
 def error_variables(links: Links) -> Variables:
-    """How far loads of joints and drives may be off in a run; none where that is not known."""
+    """Return bounds of the integration errors of joint and drive loads in a run; empty if they are unknown."""
     if links.load_errors is None:
         return {}
     force, moment, drive = links.load_errors
@@ -204,7 +204,7 @@ def error_variables(links: Links) -> Variables:
 
 
 def with_totals(data: xr.Dataset) -> xr.Dataset:
-    """A dataset with what follows from its variables: powers, energies, the largest stresses."""
+    """Return a dataset with derived variables added: powers, energies, the largest stresses."""
     for torque, name in (("torque", "motor"), ("applied_torque", "motor"), ("drive_torque", "drive")):
         if torque in data:
             power = data[torque] * data[f"{name}_speed"]
@@ -216,14 +216,14 @@ def with_totals(data: xr.Dataset) -> xr.Dataset:
 
 
 def padded(values: NDArray[Any], total: int) -> NDArray[Any]:
-    """Values over all samples, NaN where a run did not reach them."""
+    """Return values padded with NaN to all samples of the study, for a run that did not reach them."""
     out = np.full((total, *values.shape[1:]), np.nan, dtype=values.dtype)
     out[: values.shape[0]] = values
     return out
 
 
 def link_coordinates(system: System, links: Links) -> dict[str, Any]:
-    """Labels of the dimensions that the variables of links have."""
+    """Return the coordinate labels of the dimensions of the link variables."""
     mechanism = system.described
     drives, sensors = ([one.name for one in members] for members in (mechanism.prescribed, mechanism.sensors))
     return {
@@ -239,7 +239,7 @@ def link_coordinates(system: System, links: Links) -> dict[str, Any]:
 
 
 def label(data: xr.Dataset, mechanism: Mechanism) -> None:
-    """Meaning, unit and conventions of every variable into its attributes; "_desired" is the desired value of one."""
+    """Write meaning, unit and conventions into the attributes of every variable, "_desired" ones included."""
     for name in map(str, data.variables):
         plain = name.removesuffix("_desired")
         if plain in UNITS:
@@ -260,7 +260,7 @@ def label(data: xr.Dataset, mechanism: Mechanism) -> None:
 
 
 def _name_efforts(data: xr.Dataset, units: Iterable[str], speed: str, names: Iterable[str]) -> None:
-    """Units of torques or forces and of the speeds of their joints; `units_each` of motors of both kinds, in order."""
+    """Write units of torques or forces and of their joints' speeds; `units_each` if there are both kinds, in order."""
     each = list(units)
     units = sorted(set(each), reverse=True) or ["N m"]
     speeds = {"N m": "rad/s", "N": "m/s"}
@@ -273,7 +273,7 @@ def _name_efforts(data: xr.Dataset, units: Iterable[str], speed: str, names: Ite
 
 
 def name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -> None:
-    """All units of a variable; where these are several `units_each`, those of its labels in their order."""
+    """Write the units of a variable; if there are several, also `units_each`, one for each label in their order."""
     array.attrs["units"] = ", ".join(units)
     if len(units) > 1:
         array.attrs["units_each"] = ", ".join(each)
@@ -282,9 +282,9 @@ def name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -
 def provenance(
     system: System, method: str, options: IntegrationOptions | None, parameters: dict[str, Any] | None
 ) -> dict[str, Any]:
-    """Origin of results: mechanism, method, options of own methods, the model as read, versions."""
+    """Return the provenance of results: mechanism, method, options of own methods, the model as read, versions."""
     mechanism, options = system.described, options or IntegrationOptions()
-    # Other models and engines integrate in ways of their own.
+    # Other models and engines have their own integrators, which these options do not describe.
     ours = options.to_dict() if method == options.method.title else {}
     effector = mechanism.end_effector
     return {

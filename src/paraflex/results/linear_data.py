@@ -1,4 +1,4 @@
-"""The labelled dataset of linear models, one for each actuation mode: matrices, poles, zeros, responses, shapes."""
+"""Labelled dataset of linear models, one for each actuation mode: matrices, poles, zeros, responses, mode shapes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from paraflex.linear.motions import Motions
 from paraflex.results.drawing import Drawing, drawing_coordinates, system_drawing
 from paraflex.results.storage import origin
 
-# Motors turn freely, or those of the mode are held.
+# Motors are free, or those of the actuation mode are held.
 HOLDINGS = ("free", "held")
 ENCODERS, END_EFFECTOR = "encoders", "end_effector"
-# Undamped modes with shapes, and frequencies of the response that are evenly spaced on a logarithmic axis.
+# Number of undamped modes with mode shapes, and of logarithmically spaced frequencies of the response.
 _SHAPES, _EVEN = 8, 300
-# The response reaches from a part of the lowest frequency to a multiple of that of the last shape; near every pole and
-# zero there are frequencies this far off, as parts of it.
+# The response ranges from _BELOW times the lowest natural frequency to _ABOVE times that of the last mode shape, with
+# additional frequencies at the relative distances _NEAR from every pole and zero.
 _BELOW, _ABOVE, _NEAR = 0.1, 2.0, (3e-4, 3e-3, 2e-2)
-# And at least over so many times its lowest frequency.
+# Least ratio of the highest to the lowest frequency of the response.
 _LEAST = 1e3
-# Coordinates are displaced by this part of their units, to both sides, to find how drawn points move.
+# Step of the central difference of drawn points, relative to the units of the coordinates.
 _STEP = 1e-5
-# Drawn points, by their names in `Drawing`: of poses, and what they do in an undamped mode.
+# Drawn quantities by their names in `Drawing`, of the pose and of the undamped modes, with their dimensions.
 DRAWN: dict[str, tuple[str, ...]] = {
     "shape": ("station", "axis"),
     "joints": ("joint", "axis"),
@@ -68,29 +68,30 @@ def linear_dataset(
     along: Sequence[Sequence[LinearModel]] = (),
     parameters: dict[str, Any] | None = None,
 ) -> xr.Dataset:
-    """Linear models of one mechanism, one for each actuation mode, labelled.
+    """Return the labelled dataset of linear models of one mechanism, one for each actuation mode.
 
     Parameters
     ----------
     models : sequence of LinearModel
-        Each of another mode.
+        Linear models of different actuation modes.
     along : sequence of sequence of LinearModel
-        Of every mode, at the same moments of a motion: their poles become branches.
+        Linear models of every mode at the same instants of a motion, whose poles are connected to branches; none by
+        default.
     parameters : dict, optional
-        Kept as provenance: what was asked for.
+        Requested options, stored as provenance.
 
     Returns
     -------
     xarray.Dataset
         Dimensions mode, state, state_of, input, output, holding (motors free or held), order, pole, map (motors to
-        encoders, to the end-effector), zero, frequency, station, joint, spring, moment, branch; NaN where a mode has
-        no such input, pole or zero. Units in the attributes of every variable, and of states, inputs and outputs in
-        `state_unit`, `input_unit`, `output_unit`.
+        encoders, to the end-effector), zero, frequency, station, joint, spring, moment, branch. Values are NaN where a
+        mode has no such input, pole or zero. The attributes of every variable give units; `state_unit`, `input_unit`
+        and `output_unit` give those of states, inputs and outputs.
 
     Raises
     ------
     InputError
-        No model, several of one mode, or of several mechanisms.
+        There is no model, or the models are of equal modes or of several mechanisms.
     """
     _check(models)
     first = models[0]
@@ -126,13 +127,16 @@ def linear_dataset(
 
 
 def motors_of(model: LinearModel) -> list[str]:
-    """The motors among a model's inputs."""
+    """Return the names of the motors among a model's inputs."""
     own = [motor.name for motor in model.minimal.system.mechanism.motors]
     return [one.name for one in model.inputs if one.name in own]
 
 
 def zero_maps(model: LinearModel) -> dict[str, Complex]:
-    """Zeros of the motors of a mode to their own encoders, and to the end-effector; of all inputs without motors."""
+    """Return the transmission zeros of a mode's motors to their encoders and to the end-effector.
+
+    Without motors, the zeros are those of all inputs.
+    """
     mechanism = model.minimal.system.mechanism
     motors, outputs = motors_of(model), [one.name for one in model.outputs]
     joints = {motor.name: motor.joint for motor in mechanism.motors}
@@ -146,7 +150,7 @@ def zero_maps(model: LinearModel) -> dict[str, Complex]:
 
 
 def end_effector_outputs(model: LinearModel) -> list[str]:
-    """Outputs that are the end-effector's coordinates."""
+    """Return the names of the outputs that are the end-effector's coordinates."""
     effector = model.minimal.system.mechanism.end_effector
     return [] if effector is None else [axis for axis in ("x", "y") if axis in effector.coordinates]
 
@@ -161,7 +165,7 @@ def _check(models: Sequence[LinearModel]) -> None:
 
 
 def _matrices(models: Sequence[LinearModel], named: dict[str, dict[str, str]]) -> dict[str, Any]:
-    """A, B, C and D among the names of all modes."""
+    """Return A, B, C and D over the states, inputs and outputs of all modes."""
     names = {key: list(own) for key, own in named.items()}
     out = {}
     for matrix, (rows, columns) in {
@@ -198,7 +202,7 @@ def _zeros(maps: Sequence[dict[str, Complex]]) -> dict[str, Any]:
 
 
 def padded(rows: Sequence[Sequence[Numbers]]) -> Complex:
-    """Rows of arrays of different sizes as one array, NaN where there is nothing."""
+    """Combine rows of arrays of different sizes to one array, padded with NaN."""
     sizes = [one.shape for row in rows for one in row] or [(0,)]
     out = np.full((len(rows), len(rows[0]), *np.max(sizes, axis=0)), complex(np.nan, np.nan))
     for i, row in enumerate(rows):
@@ -208,7 +212,7 @@ def padded(rows: Sequence[Sequence[Numbers]]) -> Complex:
 
 
 def _frequencies(free: Sequence[Motions], held: Sequence[Motions], zeros: Sequence[Complex]) -> Array:
-    """Frequencies of the response [Hz]: evenly on a logarithmic axis, and near poles and zeros."""
+    """Return the frequencies of the response [Hz]: logarithmically spaced, and near poles and zeros."""
     natural = np.sort(np.concatenate([one.frequencies for one in (*free, *held)]))
     natural = natural[natural > 0.0] / (2.0 * np.pi)
     low = _BELOW * natural.min(initial=1.0 if not natural.size else np.inf)
@@ -232,7 +236,7 @@ def _responses(models: Sequence[LinearModel], frequency: Array, names: dict[str,
 
 
 def _along(along: Sequence[Sequence[LinearModel]]) -> dict[str, Any]:
-    """Branches of poles along a motion, motors free and held."""
+    """Return the branches of poles along a motion, with motors free and held."""
     found = [[pole_branches(each, held) for held in ((), motors_of(each[0]))] for each in along]
     values = padded(found)
     dims = ("mode", "holding", "moment", "branch")
@@ -240,7 +244,7 @@ def _along(along: Sequence[Sequence[LinearModel]]) -> dict[str, Any]:
 
 
 def _drawings(models: Sequence[LinearModel], free: Sequence[Motions], held: Sequence[Motions]) -> dict[str, Any]:
-    """What is drawn at the poses, and how it moves in the lowest undamped modes."""
+    """Return the drawn quantities at the poses, and their changes in the lowest undamped modes."""
     poses = [_drawn(model, np.zeros((model.minimal.system.n, 0))) for model in models]
     modal = [
         [_drawn(model, one.shapes[:, :_SHAPES]) for one in pair]
@@ -257,7 +261,10 @@ def _drawings(models: Sequence[LinearModel], free: Sequence[Motions], held: Sequ
 
 
 def _drawn(model: LinearModel, shapes: Array) -> dict[str, Array]:
-    """Drawn points at the pose (1, ...), or how they change in shapes (n, k), by at most one."""
+    """Return drawn quantities at the pose (1, ...), or their changes (k, ...) in mode shapes (n, k).
+
+    Changes are scaled so that the largest displacement of a station is one.
+    """
     system, q = model.minimal.system, model.minimal.point.q
     if not shapes.shape[1]:
         return {name: getattr(system_drawing(system, q[None]), name) for name in DRAWN}

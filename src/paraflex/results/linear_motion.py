@@ -1,4 +1,4 @@
-"""Undamped modes of linear models as motions that can be drawn."""
+"""Undamped modes of linear models, converted to motions that can be drawn."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from paraflex.arrays import Array
 from paraflex.results.linear_data import DRAWN, HOLDINGS
 from paraflex.results.linear_summary import common_poles
 
-# Variables of a drawn run, and of its base, by their names in `Drawing`.
+# Variables of a drawn run and of its undeformed base, by their names in `Drawing`.
 _VARIABLES = {
     "shape": ("shape", "shape_base"), "joints": ("joint_position", "joint_base"),
     "directions": ("joint_direction", "joint_direction_base"), "springs": ("spring_position", ""),
 }  # fmt: skip
-# First words of labels of what is drawn.
+# First words of the coordinate labels that drawings need.
 _LABELS = ("station", "point", "joint", "spring", "gear", "axis")
-# The largest displacement of a point, as a share of the mechanism's size.
+# Largest displacement of a point, as a fraction of the mechanism's size.
 SWING = 0.08
 
 
 class DrawnMode(NamedTuple):
-    """An undamped mode that is drawn: the actuation mode, whether its motors are held, its number and frequency [Hz].
+    """Undamped mode to be drawn: actuation mode, motors "free" or "held", number and natural frequency [Hz].
 
-    Of motors that turn freely, the actuation mode is empty where all have the same frequencies.
+    With free motors, the actuation mode is empty if all actuation modes have the same poles.
     """
 
     mode: str
@@ -36,14 +36,14 @@ class DrawnMode(NamedTuple):
 
 
 def drawn_modes(data: xr.Dataset, *, rigid: bool = True) -> Iterator[DrawnMode]:
-    """The undamped modes that a dataset of linear models has shapes of.
+    """Yield the undamped modes of which a dataset of linear models holds the mode shapes.
 
     Parameters
     ----------
     data : xarray.Dataset
-        From `linear_dataset`.
+        Dataset made by `linear_dataset`.
     rigid : bool
-        Whether motions without a frequency are among them.
+        Whether to include rigid-body modes, whose natural frequency is zero.
     """
     modes, drawn = data["mode"].values.tolist(), data.sizes["drawn"]
     frequency = data["natural_frequency"].transpose("mode", "holding", "order").values[:, :, :drawn]
@@ -56,10 +56,20 @@ def drawn_modes(data: xr.Dataset, *, rigid: bool = True) -> Iterator[DrawnMode]:
 
 
 def modal_motion(data: xr.Dataset, one: DrawnMode, phases: Array, share: float = SWING) -> xr.Dataset:
-    """A mode as a run: what is drawn at phases (k,) [rad], the whole swing at a quarter of a turn.
+    """Return an undamped mode as a dataset of a run, whose times are phases (k,) [rad].
 
-    The largest displacement of a point is a share of the mechanism's size. Displacements are linear, and so links are
-    longer where they turn far.
+    Displacements are proportional to the sine of the phase. They are linear, so links that rotate far appear longer.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Dataset made by `linear_dataset`.
+    one : DrawnMode
+        Undamped mode.
+    phases : (k,) array
+        Phases of the vibration [rad].
+    share : float
+        Largest displacement of a point, as a fraction of the mechanism's size.
     """
     mode = one.mode or str(data["mode"].values[0])
     own = data.sel(mode=mode, holding=one.holding).isel(drawn=one.number)

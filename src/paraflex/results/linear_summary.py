@@ -1,4 +1,4 @@
-"""Linear models in plain numbers and in words: poles, zeros, which of them are in the right half plane."""
+"""Summaries of linear models as plain numbers and in words: poles, zeros, and those in the right half-plane."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from paraflex.dynamics.linearise import BALANCED
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import ENCODERS, END_EFFECTOR, HOLDINGS
 
-# A value nearer to the imaginary axis than this part of its size is on it, as far as numbers tell.
+# A value whose real part is below this fraction of its magnitude is on the imaginary axis, within rounding.
 _ON_AXIS = 1e-4
-# Zeros that grow by less than this part of their size limit no bandwidth: in motion, and where double ones come apart.
+# Zeros with a real part below this fraction of their magnitude do not limit the bandwidth. They occur in motion, and
+# where double zeros are split.
 _BESIDE_AXIS = 0.05
-# Poles or zeros that agree this well are one, several times: rounding takes double ones apart.
+# Poles or zeros with a relative difference below this one are multiple: rounding splits double ones.
 _SAME = 1e-4
-# Free poles of modes that differ by less are the same.
+# Poles with motors free of different modes are equal if their relative difference is below this one.
 _COMMON = 1e-6
-# Poles and zeros below this part of their median are zero: double ones at zero come apart by the root of rounding.
+# Poles and zeros below this fraction of the median magnitude are zero: a double one at zero is split by the square root
+# of the rounding error.
 _ZERO = 1e-7
 MAP_WORDS = {ENCODERS: "motors to their encoders", END_EFFECTOR: "motors to the end-effector"}
 HELD_WORDS = {"free": "motors free", "held": "motors held"}
@@ -34,7 +36,7 @@ SOURCES = {
 
 
 class Root(NamedTuple):
-    """A pole or zero: its value in the upper half plane, whether its mirror image is one too, and how often."""
+    """Pole or zero: value in the upper half-plane, whether its mirror image is one as well, and multiplicity."""
 
     value: complex
     mirrored: bool
@@ -42,17 +44,17 @@ class Root(NamedTuple):
 
     @property
     def on_axis(self) -> bool:
-        """Whether it is on the imaginary axis."""
+        """Whether the value is on the imaginary axis."""
         return not self.mirrored and abs(self.value.real) <= _ON_AXIS * abs(self.value)
 
     @property
     def right(self) -> bool:
-        """Whether it, or its mirror image, is in the right half plane."""
+        """Whether the value or its mirror image is in the right half-plane."""
         return self.mirrored or self.value.real > _ON_AXIS * abs(self.value)
 
     @property
     def text(self) -> str:
-        """As people say it: "51.35 Hz", "±1409 rad/s", "-3.20 ± 45.1i rad/s"; an asterisk in the right half plane."""
+        """Printed form: "51.35 Hz", "±1409 rad/s", "-3.20 ± 45.1i rad/s"; an asterisk marks the right half-plane."""
         size = abs(self.value)
         times = f" ×{self.times}" if self.times > 1 else ""
         if size == 0.0:
@@ -66,12 +68,12 @@ class Root(NamedTuple):
 
 
 def _digits(value: float) -> str:
-    """Four digits, without an exponent below a million."""
+    """Format a number to four digits, without an exponent below a million."""
     return f"{value:.4g}" if value < 1e4 or value >= 1e6 else f"{value:.0f}"
 
 
 def roots(values: Complex) -> list[Root]:
-    """Poles or zeros, by magnitude, conjugates and mirror images together."""
+    """Group poles or zeros by magnitude; conjugates and mirror images (at the imaginary axis) form one root."""
     known, out = _without_rounding(values[np.isfinite(values.real)]), list[Root]()
     left = list(known[np.argsort(np.abs(known), kind="stable")])
     while left:
@@ -87,22 +89,22 @@ def roots(values: Complex) -> list[Root]:
 
 
 def _without_rounding(values: Complex) -> Complex:
-    """Values, zero where they are that but for rounding."""
+    """Return values, with those that are zero within rounding set to zero."""
     return np.where(np.abs(values) <= _ZERO * np.median(np.abs(values)), 0.0, values) if values.size else values
 
 
 def _alike(one: complex, other: complex) -> bool:
-    """Whether values are the same, or conjugates."""
+    """Check whether two values are equal or conjugate within rounding."""
     return abs(complex(one.real, abs(one.imag)) - complex(other.real, abs(other.imag))) <= _SAME * abs(other)
 
 
 def poles_of(data: xr.Dataset, mode: str, holding: str) -> Complex:
-    """Poles of a mode [rad/s], motors free or held."""
+    """Return the poles of a mode [rad/s], with motors "free" or "held"."""
     return _known(data, "pole", mode=mode, holding=holding)
 
 
 def zeros_of(data: xr.Dataset, mode: str, channels: str) -> Complex:
-    """Zeros of a mode [rad/s], motors to "encoders" or to the "end_effector"."""
+    """Return the zeros of a mode [rad/s], from its motors to "encoders" or to the "end_effector"."""
     return _known(data, "zero", mode=mode, map=channels)
 
 
@@ -112,14 +114,18 @@ def _known(data: xr.Dataset, name: str, **chosen: str) -> Complex:
 
 
 def common_poles(data: xr.Dataset) -> Complex | None:
-    """Poles with motors free [rad/s], where all modes have the same; None where they differ, or there is one mode."""
+    """Return the poles with motors free [rad/s] if all modes have the same; None if not, or if there is one mode."""
     first, *others = (poles_of(data, mode, "free") for mode in data["mode"].values.tolist())
     same = (one.size == first.size and np.allclose(abs(one), abs(first), rtol=_COMMON, atol=0.0) for one in others)
     return first if others and all(same) else None
 
 
 def gains_of(data: xr.Dataset, mode: str, channels: str) -> Array:
-    """Singular values (frequencies, k), descending, of a mode's motors to "encoders" or to the "end_effector"."""
+    """Return the descending singular values (frequencies, k) of the frequency response of a mode's motors.
+
+    The outputs are the "encoders" of these motors or the "end_effector". Without motors, the inputs are those of the
+    mode. Values are NaN if there are no inputs or no outputs.
+    """
     motors = motors_of_mode(data, mode)
     inputs, outputs = motors or inputs_of_mode(data, mode), _outputs(data, channels, motors)
     if not (inputs and outputs):
@@ -135,13 +141,13 @@ def _outputs(data: xr.Dataset, channels: str, motors: Sequence[str]) -> list[str
 
 
 def gain_unit(data: xr.Dataset, channels: str) -> str:
-    """Unit of the gains of motors to "encoders" or to the "end_effector"."""
+    """Return the unit of the gains from motors to "encoders" or to the "end_effector"."""
     motors = [*json.loads(data.attrs["motor_joints"])]
     return channel_unit(data, motors or data["input"].values.tolist(), _outputs(data, channels, motors))
 
 
 def channel_unit(data: xr.Dataset, inputs: Sequence[str], outputs: Sequence[str]) -> str:
-    """Unit of responses of some outputs to some inputs; "SI units" where they differ."""
+    """Return the unit of the responses of outputs to inputs, "SI units" if the units differ."""
     unit = {
         what: dict(zip(data[what].values.tolist(), data[f"{what}_unit"].values.tolist(), strict=True))
         for what in ("input", "output")
@@ -153,43 +159,48 @@ def channel_unit(data: xr.Dataset, inputs: Sequence[str], outputs: Sequence[str]
 
 
 class Oscillation(NamedTuple):
-    """A pair of poles: its frequency |s| / 2 pi [Hz] and damping ratio."""
+    """Frequency |s| / (2 pi) [Hz] and damping ratio of a pair of complex poles s."""
 
     frequency: float
     damping_ratio: float
 
 
 def oscillations(poles: Complex) -> list[Oscillation]:
-    """Pairs of complex poles, by frequency."""
+    """Return frequency and damping ratio of each pair of complex poles, in the order of the poles."""
     upper = poles[poles.imag > _ON_AXIS * np.abs(poles)]
     return [Oscillation(float(abs(s) / (2.0 * np.pi)), float(-s.real / abs(s)) + 0.0) for s in upper]
 
 
 def inputs_of_mode(data: xr.Dataset, mode: str) -> list[str]:
-    """Inputs that a mode has."""
+    """Return the names of the inputs of a mode."""
     own = np.isfinite(data["B"].sel(mode=mode).values).any(axis=0)
     return [str(name) for name in data["input"].values[own]]
 
 
 def motors_of_mode(data: xr.Dataset, mode: str) -> list[str]:
-    """Motors that a mode has."""
+    """Return the names of the motors among the inputs of a mode."""
     motors = json.loads(data.attrs["motor_joints"])
     return [name for name in inputs_of_mode(data, mode) if name in motors]
 
 
 def about(data: xr.Dataset) -> str:
-    """What the linear models are about, in words."""
+    """Return the operating point of the linear models in words."""
     return SOURCES[data.attrs["about"]].format(time=data.attrs["time"])
 
 
 @checked_arguments()
 def linear_summary(data: xr.Dataset) -> dict[str, Any]:
-    """Linear models in plain values, for JSON.
+    """Return the summary of linear models as plain values for JSON.
 
     Parameters
     ----------
     data : xarray.Dataset
-        From `linear_dataset`.
+        Dataset made by `linear_dataset`.
+
+    Raises
+    ------
+    InputError
+        The dataset is of another kind.
     """
     check_kind(data, "linear")
     attrs = data.attrs
@@ -234,13 +245,13 @@ def _zero_summary(zeros: Complex) -> dict[str, Any]:
 
 
 def right_half_plane(values: Complex) -> Complex:
-    """Those of some poles or zeros that are in the right half plane."""
+    """Return the poles or zeros that are in the right half-plane."""
     values = _without_rounding(values)
     return values[values.real > _ON_AXIS * np.abs(values)]
 
 
 def phase_sentences(data: xr.Dataset) -> Iterator[str]:
-    """What zeros in the right half plane mean: a sentence for each map that is not of minimum phase."""
+    """Yield a sentence for each input-output map that is not minimum phase, on the bandwidth that its zeros allow."""
     for name in (str(each) for each in data["map"].values):
         said: dict[str, list[str]] = {}
         for mode in data["mode"].values.tolist():
@@ -255,7 +266,7 @@ def phase_sentences(data: xr.Dataset) -> Iterator[str]:
 
 
 def remarks(data: xr.Dataset) -> list[str]:
-    """What to know of the models: that a pose is no equilibrium, what zeros mean, that motion is frozen."""
+    """Return remarks on the models: a pose that is not in equilibrium, non-minimum phase, or motion frozen in time."""
     values = {str(mode): float(data["unbalanced"].sel(mode=mode)) for mode in data["mode"].values}
     largest = max(values, key=lambda mode: values[mode])
     out = []
@@ -272,7 +283,7 @@ def remarks(data: xr.Dataset) -> list[str]:
 
 
 def limiting_zero(zeros: Complex) -> float:
-    """Size of the lowest zero in the right half plane that is not beside the imaginary axis; zero for none."""
+    """Return the magnitude of the lowest zero in the right half-plane away from the imaginary axis, 0 without one."""
     zeros = _without_rounding(zeros)
     sizes = np.abs(zeros[zeros.real > _BESIDE_AXIS * np.abs(zeros)])
     return float(sizes.min()) if sizes.size else 0.0

@@ -1,4 +1,4 @@
-"""Motion of bodies, points, joints and motors in a run, at its samples."""
+"""Motion and loads of bodies, points, joints and motors at the samples of a run."""
 
 from __future__ import annotations
 
@@ -28,48 +28,50 @@ from paraflex.results.stress import SectionResult, section_result
 
 @dataclass(frozen=True, kw_only=True)
 class Links:
-    """Bodies, points, joints and motors at the k sample times that a run reached; NaN where a model has no value.
+    """Motion and loads at the k sample times that a run reached; NaN where a model has no value.
 
-    Bodies, joints and points are those of the mechanism in its order, whatever the model cut them into. Points are all
-    the named points of all bodies, body after body.
+    Bodies, joints and points are those of the mechanism in its order, even if the model divides bodies into parts.
+    Points are all named points of all bodies, body after body.
 
     Attributes
     ----------
     angle, rate, acceleration : (k, bodies) arrays
-        Of the body frames; in a model without them the tangent at a beam's first end [rad, rad/s, rad/s^2].
+        Angles of the body frames and their derivatives; in a model without body frames those of the tangent at a beam's
+        first end [rad, rad/s, rad/s^2].
     chord, chord_rate : (k, bodies) arrays
-        Of the line from a beam's first end to its last, which no choice of frame touches; of a modal body's first
-        point to its last, less its angle undeformed; a rigid body's angle [rad, rad/s].
+        Angle and rate of the line from a beam's first end to its last, which does not depend on the choice of frame; of
+        a modal body from its first point to its last, minus the angle undeformed; of a rigid body its angle [rad,
+        rad/s].
     tip : (k, bodies, 3) array
-        Axial, transverse displacement and slope of a beam's last end (a modal body's last point) from the tangent at
-        its first end [m, m, rad].
+        Axial and transverse displacement and slope of a beam's last end (a modal body's last point) relative to the
+        tangent at its first end [m, m, rad].
     points, point_velocity, point_acceleration : (k, points, 2) arrays
-        Positions [m].
+        Positions [m], velocities [m/s] and accelerations [m/s^2] of the points.
     joint_force : (k, joints, 2) array
-        All that a joint's first body does to its second: at the joint's point of that, in the ground frame [N].
+        Total force of a joint's first body on its second, at the joint's point of the second, in the ground frame [N].
     joint_moment : (k, joints) array
-        And about that point, positive anticlockwise [N m].
+        Total moment about that point, positive anticlockwise [N m].
     multiplier : (k, rows) array
-        Of the rows of the mechanism's system; NaN of those that the model does not have. Minus it acts on the second
-        body.
+        Multipliers of the constraint rows of the mechanism's system, NaN for rows that the model does not have; minus
+        the multiplier acts on the second body.
     motor_speed : (k, motors) array
         Rate of each motor's joint [rad/s], or speed along its axis [m/s].
     kinetic_energy, strain_energy, work : (k,) arrays
-        [J]
+        Energies, and work done on the mechanism [J].
     drawing : Drawing
         Deformed shapes of all bodies.
     joint_coordinate, joint_speed : (k, joints) arrays, optional
-        Angle of each joint [rad], or travel along its axis [m], and its rate; None of models that do not give them.
+        Angle of each joint [rad], or travel along its axis [m], and its rate; None for models without them.
     drive_torque, drive_speed : (k, drives) arrays, optional
         Torque [N m] or force [N] of each prescribed motion on its joint's second body, and the rate of that joint.
     load_errors : LoadErrors, optional
-        How far loads of joints and drives may be off by errors of integration; None where that is not known.
+        Bounds of the integration errors of joint and drive loads; None if unknown.
     frame_load : FrameLoad, optional
-        What the mechanism does to the ground.
+        Force and moment of the mechanism on the ground.
     sections : SectionResult, optional
-        Section forces of beams; None of models without shape functions, and where no beam is flexible.
+        Section forces of beams; None for models without shape functions, and without flexible beams.
     sensors : (k, sensors) array, optional
-        Readings of the mechanism's sensors, each in its unit; NaN of those that have no meaning in the model.
+        Readings of the mechanism's sensors, each in its unit; NaN for sensors without a meaning in the model.
     """
 
     angle: Array
@@ -100,16 +102,18 @@ class Links:
 
 
 def system_links(system: System, solution: Solution, torques: Array, samples: int) -> Links:
-    """Motion of the links in a run, as the mechanism was described: parts of what was cut are reported as one.
+    """Return motion and loads of the links in a run, as the mechanism was described: parts of a body are joined.
 
     Parameters
     ----------
     system : System
+        System that was integrated.
     solution : Solution
+        Solution of the run.
     torques : (samples or more, motors) array
-        Torque or force of every motor.
+        Torque [N m] or force [N] of every motor.
     samples : int
-        How many of the solution's to take.
+        Number of samples of the solution to use, from the first on.
     """
     q, v, a = (x[:samples] for x in (solution.q, solution.v, solution.a))
     mechanism = system.described
@@ -157,12 +161,12 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
 
 
 def stacked_motions(points: Sequence[PointMotion], samples: int) -> PointMotion:
-    """Motions of several points as three arrays (samples, points, 2)."""
+    """Stack the motions of several points to three arrays (samples, points, 2)."""
     return PointMotion(*(stacked([each[k] for each in points], samples, 2) for k in range(3)))
 
 
 def _by_name(values: Array, names: Sequence[str], wanted: Sequence[str]) -> Array:
-    """Columns (k, names) in the order of the mechanism as described; NaN of those that the system does not have."""
+    """Return columns (k, wanted) of values (k, names) in the order of `wanted`; NaN for names that are missing."""
     place = {name: k for k, name in enumerate(names)}
     out = np.full((len(values), len(wanted)), np.nan)
     for k, name in enumerate(wanted):
@@ -172,21 +176,21 @@ def _by_name(values: Array, names: Sequence[str], wanted: Sequence[str]) -> Arra
 
 
 def _ends(system: System, names: Sequence[str], q: Array, v: Array) -> list[PointMotion]:
-    """Motion of the first and last end of a beam, or of what it was cut into."""
+    """Return the motion of the first and last end of a beam, which may be divided into parts."""
     return [marker_motion(system, marker, q, v, np.zeros_like(q)) for marker in _end_markers(system, names)]
 
 
 def _end_markers(system: System, names: Sequence[str]) -> tuple[Marker, ...]:
-    """First and last end of a body, or of the parts it was cut into; none for a body without ends."""
+    """Return the markers of the first and last end of a body, which may be divided into parts; empty without ends."""
     if len(names) == 1:
         return end_markers(system.index[names[0]], system.body(names[0]))
     return system.marker(PointRef(names[0], FIRST_END)), system.marker(PointRef(names[-1], LAST_END))
 
 
 def _chord(system: System, names: Sequence[str], q: Array, v: Array) -> tuple[Array, Array]:
-    """Angle and rate of the line from a beam's first end to its last; a rigid body's own, or where both ends are one.
+    """Return angle and rate of the line from a beam's first end to its last, minus its angle in the undeformed body.
 
-    Less the line's angle in the undeformed body, which is zero of a beam.
+    That angle is zero for a beam. For a rigid body, or if both ends coincide, return those of the body frame.
     """
     angle, ends = system.body(names[0]).angle, _end_markers(system, names)
     x, y = ends[1].x0 - ends[0].x0 if ends else (0.0, 0.0)
@@ -195,14 +199,14 @@ def _chord(system: System, names: Sequence[str], q: Array, v: Array) -> tuple[Ar
     first, last = _ends(system, names, q, v)
     offset = np.arctan2(y, x)
     (x, y), (dx, dy) = (last.position - first.position).T, (last.velocity - first.velocity).T
-    # Within a half turn of the frame's angle.
+    # Choose the multiple of 2 pi within half a turn of the frame's angle.
     near = q[:, angle] + offset
     chord = near + (np.arctan2(y, x) - near + np.pi) % (2.0 * np.pi) - np.pi
     return chord - offset, (x * dy - y * dx) / (x**2 + y**2)
 
 
 def _tip(system: System, names: Sequence[str], q: Array) -> Array:
-    """Displacement and slope of a beam's last end in its frame; of a cut one from the tangent at its first end."""
+    """Return displacement and slope of a beam's last end relative to the tangent at its first end."""
     if len(names) == 1:
         return tip_deflection(system, names[0], q)
     first, last = _ends(system, names, q, np.zeros_like(q))

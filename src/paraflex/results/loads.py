@@ -1,4 +1,4 @@
-"""The largest loads of a run as plain numbers: stresses, motion of joints, efforts of motors and drives."""
+"""Largest loads of a run as plain numbers: stresses, joint motion and forces, efforts of motors and drives."""
 
 from __future__ import annotations
 
@@ -14,29 +14,30 @@ from paraflex.results.numbers import finite_or_none, largest, units_of_each
 from paraflex.units import STRESS, speed_text
 
 Figures = dict[str, float | str | None]
-# Of the rate of a joint that a torque or a force drives.
+# Unit of the rate of a joint, by the unit of the effort that drives it.
 _RATES = {"N m": "rad/s", "N": "m/s"}
-# Variables of beams, and those that have another name here.
+# Variables of beams, and the keys that differ from their names.
 OF_BEAMS = ("stress_max", "stress_place", "stress_time", "bending_stress_max", "axial_stress_max", "safety_factor")
 _NAMES = {"stress_place": "place", "stress_time": "time"}
 
 
 def load_figures(run: xr.Dataset) -> dict[str, Any]:
-    """Largest magnitudes of one run; None for what a model does not give, and no group that results do not hold.
+    """Return the largest magnitudes of loads of one run.
 
-    A run that failed has none: its largest loads may be those of the failure. Stresses of beams are taken to be as
-    uncertain as the forces.
+    Values that a model does not give are None, and groups that the results do not hold are missing. A run that failed
+    has no loads, as its largest ones may be artefacts of the failure. The relative error of stresses is taken to be the
+    larger one of the forces.
 
     Returns
     -------
     dict
         `beams.<body>` with stress_max, place, time, bending_stress_max, axial_stress_max [Pa, m, s] and safety_factor;
         `joints.<joint>` with least, most, their unit (rad or m), speed_max, force_max [N] and moment_max [N m];
-        `motors.<motor>` and `drives.<prescribed motion>` with torque_max, its unit and that of speed_max (None of both
-        kinds in results of earlier versions), speed_max, power_max [W] and energy [J]; `frame` with force_max and
-        moment_max of the mechanism on the ground. Of beams, joints and drives stress_error, force_error, moment_error
-        and torque_error say how far the loads may be off by errors of integration, where that is known. Times of the
-        largest values are torque_time, force_time, ... [s].
+        `motors.<motor>` and `drives.<prescribed motion>` with torque_max, torque_unit, speed_unit (None if results of
+        earlier versions mix torques and forces), speed_max, power_max [W] and energy [J]; `frame` with force_max and
+        moment_max of the mechanism on the ground. For beams, joints and drives, stress_error, force_error, moment_error
+        and torque_error are bounds of the integration errors, if known. Times of the largest values are torque_time,
+        force_time, ... [s].
     """
     out: dict[str, Any] = {}
     if "status" in run and run["status"].item() == "failed":
@@ -77,13 +78,13 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
 
 
 def sliding_joints(data: xr.Dataset) -> NDArray[np.bool_]:
-    """Which joints (joints,) have a travel [m] and no angle [rad]."""
+    """Return which joints (joints,) have a travel [m] instead of an angle [rad]."""
     known = np.isfinite(data["joint_direction"].transpose(..., "joint").values)
     return np.asarray(known.reshape(-1, known.shape[-1]).any(axis=0))
 
 
 def _most(name: str, run: xr.Dataset, variable: str, place: Mapping[str, str] | None = None) -> Figures:
-    """Largest magnitude of numbers or of vectors, and its time, none of a constant; its error where that is known."""
+    """Return the largest magnitude of numbers or vectors, its time (None for a constant), and its error if known."""
     values = run[variable].sel(place)
     sizes = values.reduce(np.linalg.norm, "axis") if "axis" in values.dims else abs(values)
     most = largest(sizes.values)
@@ -96,7 +97,7 @@ def _most(name: str, run: xr.Dataset, variable: str, place: Mapping[str, str] | 
 
 
 def _uncertain(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> float | None:
-    """By what part forces of joints or efforts of drives may be off, the larger of the two, of the largest of each."""
+    """Return the larger relative error of joint forces and drive efforts, each relative to its largest value."""
     parts = []
     for group, load in (("joints", "force"), ("drives", "torque")):
         most, error = (
@@ -108,13 +109,13 @@ def _uncertain(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> float | 
 
 
 def error_text(figures: Mapping[str, Any], load: str, factor: float = 1.0) -> str:
-    """How far a largest load may be off, to be put beside it, where that is more than a hundredth of it."""
+    """Return the error of a largest load as text, such as " ± 0.3", if it exceeds one per cent of the load, else ""."""
     most, error = figures[f"{load}_max"], figures.get(f"{load}_error")
     return f" ± {float(f'{factor * error:.1g}'):g}" if most and error is not None and error > RESOLVED * most else ""
 
 
 def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
-    """Unit of each torque or force; None where it is not known which of the two it is."""
+    """Return the unit of each torque or force; None if it is not known which of the two it is."""
     return [unit if unit in _RATES else None for unit in units_of_each(efforts, number)]
 
 
@@ -135,14 +136,14 @@ Ranked = list[tuple[float, str, str, Mapping[str, Any]]]
 
 
 def ranked(loads: Mapping[str, Mapping[str, Any]], group: str, key: str) -> Ranked:
-    """Value, run, member and its figures of all runs, the largest value first; None is left out.
+    """Return value, run, member and loads of the member for all runs, the largest value first, without None.
 
     Parameters
     ----------
     loads : mapping of str to mapping
-        `load_figures` by name of the run, which may be empty.
+        Results of `load_figures` by the name of the run, which may be empty.
     group, key : str
-        "beams" and "stress_max", "joints" and "force_max".
+        Group and key, such as "beams" and "stress_max", or "joints" and "force_max".
     """
     known = [
         (one[key], run, member, one)
@@ -154,7 +155,7 @@ def ranked(loads: Mapping[str, Mapping[str, Any]], group: str, key: str) -> Rank
 
 
 def joint_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
-    """A sentence on the largest joint force of all runs; empty where there is none."""
+    """Return a sentence on the largest joint force of all runs, empty if there is none."""
     known = ranked(loads, "joints", "force_max")
     if not known or not known[0][0]:
         return ""
@@ -164,12 +165,12 @@ def joint_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
-    """A sentence on the largest stress of all runs, with place, time and safety factor; empty where none is known.
+    """Return a sentence on the largest stress of all runs, with place, time and safety factor; empty if none is known.
 
     Parameters
     ----------
     loads : mapping of str to mapping
-        `load_figures` by name of the run, which may be empty.
+        Results of `load_figures` by the name of the run, which may be empty.
     """
     known = ranked(loads, "beams", "stress_max")
     if not known:
@@ -187,7 +188,7 @@ def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
-    """A sentence for each prescribed motion of a run: its largest torque, speed and power."""
+    """Return a sentence for each prescribed motion of a run, with its largest torque, speed and power."""
     whose = f"mode {mode}: " if mode else ""
     return [
         f"{whose}prescribed.{name}: {_EFFORTS[one['torque_unit']]} up to "

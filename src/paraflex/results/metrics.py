@@ -1,8 +1,8 @@
 """Metrics of runs, each defined once.
 
-A formula takes the traces of a run and those of the nominal run near it. Of a run that is its own nominal one it gives
-the metric; of one with a complex step its derivative, where a maximum or a sign is decided by the nominal run. So
-formulas are sums, products and roots alone.
+A formula takes the traces of a run and those of a nominal run. If both are the same run, its value is the metric. If
+the run has a complex step, its value carries the derivative: the nominal run decides where a maximum is and which sign
+a magnitude has, so that the formula consists of sums, products and roots only.
 """
 
 from __future__ import annotations
@@ -27,53 +27,57 @@ if TYPE_CHECKING:
 
 # Kinds of runs.
 PATH, MOTION, STATICS = "path", "motion", "statics"
-# Kinds of members, of which a metric has a number each: of equilibria named coordinates, and those with a stiffness.
+# Kinds of members with one value of a metric each; equilibria have named coordinates, and those with a stiffness.
 MOTOR, DRIVE, JOINT, COORDINATE, DIRECTION = "motor", "drive", "joint", "coordinate", "direction"
-# What an expression takes of a coordinate in all steps.
+# Functions of an expression, applied to a coordinate over all steps.
 _TAKEN = {"max": np.max, "min": np.min, "mean": np.mean, "last": lambda values: values[-1]}
 _EXPRESSION = re.compile(
     rf"(?P<taken>{'|'.join(_TAKEN)})\((?P<magnitude>abs\()?((?P<trace>travel|effort|stiffness|compliance)\.)?"
     r"(?P<member>[^()]+)\)(?(magnitude)\))"
 )
 _EXPRESSIONS = f"{', '.join(_TAKEN)}, abs, and travel (or nothing), effort, stiffness or compliance of a coordinate"
-# Names of a mechanism's members by these words, and of those that slide by `sliding`.
+# Names of a mechanism's members by their kind, and of those that slide by `sliding(kind)`.
 Members = Mapping[str, Sequence[str]]
-# Of the traces of a run and those of the nominal one. What only some traces have (`RunTraces`) is asked for as well.
+# Function of the traces of a run and of the nominal run. It may use attributes that only some traces have
+# (`RunTraces`).
 Formula = Callable[[Any, Any], Any]
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A metric of a run.
+    """Metric of a run.
 
     Attributes
     ----------
     name : str
+        Name, also of the variable in datasets.
     meaning, unit : str
+        Description and unit.
     formula : callable
-        From `Traces`; a metric of each motor, joint or other member gives one number each.
+        Function of two `Traces`, of the run and of the nominal run; returns an array with one value per member for
+        metrics of motors, joints or other members.
     label : str
-        What it is called in print; its name by default.
+        Printed name; by default the name.
     each : str
-        The kind of members, "motor" or another, of which it has a number each; empty for one of the whole run.
+        Kind of the members ("motor" or another) with one value each; empty for a metric of the whole run.
     smooth : bool
-        Whether the formula has derivatives.
+        Whether the formula is differentiable.
     kept : bool
-        Whether datasets hold it, as a variable of its name.
+        Whether datasets hold the metric as a variable.
     of_solver : bool
-        Whether it tells of the integration, and not of the design.
+        Whether the metric describes the integration rather than the design.
     whole : bool
-        Whether it is a count.
+        Whether the metric is an integer count.
     runs : tuple of str
-        Kinds of runs that have it: along a "path", of a mechanism's own "motion", "statics".
+        Kinds of runs that have the metric: along a "path", of a mechanism's own "motion", "statics".
     of_motors : bool
-        Whether it is zero without motors.
+        Whether the metric is zero without motors.
     kept_of : tuple of str, optional
-        Kinds of runs that it is kept of unless metrics are named; all that have it by default.
+        Kinds of runs for which the metric is kept unless metrics are named; by default all that have it.
     judged : bool
-        Whether less of it is better, so that designs may be chosen by it.
+        Whether a smaller value is better, so that designs can be selected by the metric.
     member : str
-        The one member that an expression is of.
+        Single member of an expression; empty for other metrics.
     """
 
     name: str
@@ -93,16 +97,16 @@ class Metric:
     member: str = ""
 
     def value(self, traces: Any) -> Any:
-        """The metric of a run; an array for a metric of each motor, drive or joint."""
+        """Return the metric of a run; an array for a metric of each motor, drive or joint."""
         return self.formula(traces, traces)
 
     def columns(self, members: Members) -> list[str]:
-        """Names of its columns: NAME, or NAME.MOTOR for each motor, and so for other members.
+        """Return the names of the metric's columns: NAME, or NAME.MEMBER for each motor or other member.
 
         Raises
         ------
         InputError
-            An expression of no such member.
+            The member of an expression does not exist.
         """
         if self.member:
             known(self.member, members.get(self.each, ()), "metrics", self.each)
@@ -110,17 +114,17 @@ class Metric:
         return [f"{self.name}.{member}" for member in members.get(self.each, ())] if self.each else [self.name]
 
     def is_kept_of(self, runs: str) -> bool:
-        """Whether it is kept of a kind of runs unless metrics are named."""
+        """Check whether the metric is kept for a kind of runs unless metrics are named."""
         return runs in (self.runs if self.kept_of is None else self.kept_of)
 
     def unit_of(self, column: str, members: Members) -> str:
-        """Unit of one of its columns: of a member that slides that of a length."""
+        """Return the unit of one of the metric's columns, for a sliding member that of the translational quantity."""
         slides = (self.member or column.partition(".")[2]) in members.get(sliding(self.each), ())
         return WHERE_IT_SLIDES.get(self.unit, self.unit) if slides else self.unit
 
 
 class _Metrics(dict[str, Metric]):
-    """Metrics by name; an expression is its own name."""
+    """Metrics by name; an expression is looked up by its text."""
 
     def __contains__(self, name: object) -> bool:
         return super().__contains__(name) or "(" in str(name)
@@ -145,33 +149,36 @@ class _Metrics(dict[str, Metric]):
 
 
 def metric_name(column: str) -> str:
-    """The metric of a column: NAME of NAME.MEMBER, an expression itself."""
+    """Return the metric of a column: NAME for NAME.MEMBER, the text itself for an expression."""
     return column if "(" in column else column.partition(".")[0]
 
 
 def sliding(each: str) -> str:
-    """The word in `Members` for those of a kind that slide."""
+    """Return the key in `Members` for the sliding members of a kind."""
     return f"sliding {each}"
 
 
 def metric_unit(column: str, members: Members) -> str:
-    """Unit of a column, of a mechanism with these members."""
+    """Return the unit of a column for a mechanism with these members."""
     return METRICS[metric_name(column)].unit_of(column, members)
 
 
 def _saturated_share(controllers: Sequence[ControllerRecord]) -> float:
-    """The share of samples at which a limit was met; 0 without controllers."""
+    """Return the fraction of samples at which a limit was active, 0 without controllers."""
     samples = sum(one.t.size for one in controllers)
     return sum(int(np.sum(one.limited)) for one in controllers) / samples if samples else 0.0
 
 
 def _as_it_is(formula: Callable[[Any], Any]) -> Formula:
-    """A formula without decisions."""
+    """Return a formula that does not depend on the nominal run."""
     return lambda run, _: formula(run)
 
 
 def _largest(trace: Callable[[Any], Trace]) -> Formula:
-    """The largest of an array, at the sample where the nominal run has it; NaN for none, or where one is NaN."""
+    """Return the formula of the largest entry of an array, at the index of the nominal run's.
+
+    Its value is NaN if the array is empty or has a NaN.
+    """
 
     def value(run: Any, nominal: Any) -> Any:
         at_nominal = trace(nominal)
@@ -181,7 +188,10 @@ def _largest(trace: Callable[[Any], Trace]) -> Formula:
 
 
 def _largest_magnitude(trace: Callable[[Any], Trace]) -> Formula:
-    """Like `_largest`, with the sign of the nominal run; 0 for none, and NaN only if all are."""
+    """Return the formula of the largest magnitude, with index and sign of the nominal run's.
+
+    Its value is 0 for an empty array, and NaN only if all entries are.
+    """
 
     def value(run: Any, nominal: Any) -> Any:
         at_nominal = trace(nominal)
@@ -194,7 +204,7 @@ def _largest_magnitude(trace: Callable[[Any], Trace]) -> Formula:
 
 
 def _largest_of_each(trace: Callable[[Any], Trace]) -> Formula:
-    """Like `_largest_magnitude`, of each column; NaN where there is no sample."""
+    """Return the formula of the largest magnitude of each column (see `_largest_magnitude`), NaN without samples."""
     magnitude = _largest_magnitude(lambda column: column)
 
     def value(run: Any, nominal: Any) -> Any:
@@ -207,7 +217,7 @@ def _largest_of_each(trace: Callable[[Any], Trace]) -> Formula:
 
 
 def _of_currents(formula: Callable[[Electrical], Any]) -> Formula:
-    """A number of each motor from currents and voltages; NaN where there is no sample."""
+    """Return the formula of a value per motor from currents and voltages, NaN without samples."""
 
     def value(run: Any, _: Any) -> Any:
         found = run.electrical
@@ -217,9 +227,10 @@ def _of_currents(formula: Callable[[Electrical], Any]) -> Formula:
 
 
 def _stress_where(used_up: Callable[[Any], Trace]) -> Formula:
-    """Largest magnitude of the stress in the section where the nominal run has most of something; NaN if it has none.
+    """Return the formula of the largest stress, divided by the quantity that `used_up` returns.
 
-    Of |N| / A + |M| c / I with the signs of the nominal run, over what `used_up` divides it by.
+    The stress is |N| / A + |M| c / I, with the signs of the nominal run, at the sample and section where the ratio of
+    the nominal run is largest. The value is NaN if no ratio is finite.
     """
 
     def value(run: Any, nominal: Any) -> Any:
@@ -254,7 +265,7 @@ def _safety_factor(run: Any, nominal: Any) -> Any:
 
 
 def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = False) -> Metric:
-    """A number of the solution of the same name."""
+    """Return the metric that is the solution's attribute of the same name."""
     formula = _as_it_is(lambda x: getattr(x.solution, name))
     return Metric(name, meaning, unit, formula, smooth=False, of_solver=True, whole=whole)
 
@@ -263,25 +274,25 @@ def _of_statics(
     name: str, meaning: str, unit: str, formula: Callable[[Any], Any], label: str = "", *, each: str = "",
     whole: bool = False, judged: bool = False,
 ) -> Metric:  # fmt: skip
-    """A metric of equilibria in steps, of which more may be as good as less."""
+    """Return a metric of static equilibria, by default one that does not rank designs."""
     return Metric(name, meaning, unit, _as_it_is(formula), label, each=each, smooth=False, whole=whole,
                   runs=(STATICS,), judged=judged)  # fmt: skip
 
 
 def _peaks(values: Trace) -> Trace:
-    """Largest magnitude of each column."""
+    """Return the largest magnitude of each column."""
     return np.max(np.abs(values), axis=0)
 
 
-# Kept of every run: numbers of a model that does not hold are not to be taken for others.
+# Metric kept for every run, so that results of an invalid model are not mistaken for valid ones.
 VALIDITY = "validity"
-# And of statics: those of equilibria that no mechanism stays in.
+# Metric kept for all statics in addition, as a mechanism does not stay in unstable equilibria.
 UNSTABLE = "unstable_steps"
 ALWAYS: dict[str, tuple[str, ...]] = {PATH: (VALIDITY,), MOTION: (VALIDITY,), STATICS: (VALIDITY, UNSTABLE)}
 _ANY = (PATH, MOTION, STATICS)
 _AWAY = "distance of the end-effector from its desired place"
 
-# In this order they are columns of tables.
+# Columns of tables have this order.
 _ALL = (
     Metric("tracking_rms_motion", f"root mean square {_AWAY} during the motion", "m",
            _as_it_is(lambda x: rms(x.distance[x.moving])), "RMS error in the motion", kept=True, runs=(PATH,)),
@@ -407,14 +418,14 @@ METRICS: Mapping[str, Metric] = _Metrics({metric.name: metric for metric in _ALL
 
 
 def metric_label(column: str, motor: Callable[[str], str] = str) -> str:
-    """Label of a column of a table: "RMS tracking error"; "peak torque of tau1" for a metric of one motor.
+    """Return the label of a table column: "RMS tracking error", or "peak torque of tau1" for a metric of one motor.
 
     Parameters
     ----------
     column : str
-        NAME or NAME.MEMBER; another name than those of `METRICS` stands for itself.
+        NAME or NAME.MEMBER; a name that is not in `METRICS` is its own label, with spaces for underscores.
     motor : callable
-        How the name of a motor, drive or joint is printed.
+        Function that formats the name of a motor, drive or joint; by default the name is printed as it is.
     """
     if "(" in column:
         return column

@@ -1,4 +1,4 @@
-"""The labelled dataset of a run without a path: coordinates, points, joint forces, energies."""
+"""Labelled dataset of a run without a path: coordinates, points, joint forces, energies."""
 
 from __future__ import annotations
 
@@ -47,26 +47,26 @@ def motion_dataset(
     parameters: dict[str, Any] | None = None,
     findings: Iterable[Finding] = (),
 ) -> xr.Dataset:
-    """A run without a path, labelled.
+    """Return the labelled dataset of a run without a path.
 
     Parameters
     ----------
     run : MotionRun
-        One that did not finish holds NaN after its last sample and says so in `status`; of one that an event stopped
-        the time ends with the event.
+        Run. One that did not finish has NaN after its last sample, which `status` reports; for one that an event
+        stopped, the time ends with the event.
     options : IntegrationOptions, optional
-        Kept as provenance; those of the run by default.
+        Integration options, stored as provenance; by default those of the run.
     parameters : dict, optional
-        Kept as provenance: the model as read, and what was asked for.
+        Model as read and requested options, stored as provenance.
     findings : iterable of Finding
-        Reasons to doubt the model, found before it ran; kept with those of its numbers and of the run.
+        Findings on the model from checks before the run, stored with those on its numbers and on the run.
 
     Returns
     -------
     xarray.Dataset
         Dimensions time, coordinate, body, point, joint, row, axis, motor, station, spring, end, section, drive, load,
-        sensor; of each controller NAME sample_NAME, input_NAME and output_NAME (see `results.controllers`); units and
-        signs in the attributes of every variable.
+        sensor; for each controller NAME also sample_NAME, input_NAME and output_NAME (see `results.controllers`). The
+        attributes of every variable give units and signs.
     """
     system, solution, mechanism = run.system, run.solution, run.system.described
     q, v = solution.q, solution.v
@@ -109,7 +109,15 @@ def motion_dataset(
 
 @checked_arguments()
 def motion_summary(data: xr.Dataset) -> dict[str, Any]:
-    """The run's results as plain numbers; `final` is its last sample, None if it reached none."""
+    """Return the results of a run without a path as plain numbers for JSON.
+
+    `final` holds the last sample that the run reached, with time None if it reached none.
+
+    Raises
+    ------
+    InputError
+        The dataset is of another kind.
+    """
     check_kind(data, "motion")
     reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
     last = data.isel(time=reached[-1] if reached.size else 0)

@@ -1,4 +1,4 @@
-"""Plain numbers of arrays, for JSON, tables and sentences."""
+"""Conversion of arrays to plain numbers for JSON, tables and sentences."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def finite_or_none(value: float) -> float | None:
-    """A number for JSON: None if it is not finite."""
+    """Return a number for JSON, None if it is not finite."""
     return float(value) if math.isfinite(value) else None
 
 
 def largest(values: Array) -> float | None:
-    """Largest finite magnitude; None if there is none."""
+    """Return the largest finite magnitude, None if there is none."""
     known = np.abs(values[np.isfinite(values)])
     return float(known.max()) if known.size else None
 
@@ -31,16 +31,16 @@ def single(values: Array) -> Array:
 
 
 def units_of_each(array: xr.DataArray, number: int) -> list[str]:
-    """Units of so many members of a variable: its own of all where it does not say them one by one."""
+    """Return the unit of each of `number` members of a variable: from `units_each`, else the common `units`."""
     each = str(array.attrs.get("units_each", "")).split(", ")
     return each if len(each) == number and each != [""] else [str(array.attrs.get("units", ""))] * number
 
 
 def by_label(values: xr.DataArray, dim: str) -> dict[str, float | None]:
-    """Numbers of an array by the labels of its dimension, for JSON."""
+    """Return the numbers of an array by the labels of its dimension for JSON, None for those that are not finite."""
     return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}
 
 
 def stacked(parts: Sequence[Any], samples: int, *rest: int) -> Any:
-    """Arrays (samples, ...) side by side along a second axis, of which there may be none."""
+    """Stack arrays (samples, ...) along a new second axis, which has length zero if there are none."""
     return np.stack(parts, axis=1) if parts else np.zeros((samples, 0, *rest))

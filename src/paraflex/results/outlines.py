@@ -1,4 +1,4 @@
-"""Stations of bodies for drawings, their motion, and their places on undeformed links."""
+"""Stations of bodies for drawings, their motion, and their positions on undeformed bodies."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from paraflex.mechanism import (
     RigidBody,
 )
 
-# Pieces a beam is drawn in, and the fewest between two of its points.
+# Number of pieces of a drawn beam, and the fewest between two of its points.
 _BEAM_PIECES, _FEWEST_PIECES = 16, 4
-# Points closer than this part of a body's size are drawn as one.
+# Points closer than this fraction of a body's size are drawn as one.
 _SAME = 1e-9
-# Two stations are always on their chord: a deflection takes one more.
+# Fewest stations that define a deflection: two are always on their chord.
 _LEAST_ON_LINE = 3
 # Pieces shorter than this fraction of a body's size have no defined direction.
 _SHORT_PIECE = 1e-6
@@ -33,15 +33,16 @@ _SHORT_PIECE = 1e-6
 
 @dataclass(frozen=True)
 class Outline:
-    """Stations of a body, in order along it.
+    """Stations of a body, in order along the body.
 
     Attributes
     ----------
     body : str
+        Name of the body.
     places : (s, 2) array
-        Its stations undeformed, in the body frame [m].
+        Positions of the stations in the undeformed body, in the body frame [m].
     points : mapping of str to int
-        Station of each named point.
+        Index of the station of each named point.
     """
 
     body: str
@@ -55,11 +56,12 @@ class Outline:
 
 
 def outline(body: Body) -> Outline:
-    """Stations of a body, which depend on its length and points and not on its mesh or segments.
+    """Return the stations of a body, which depend on its length and points but not on its mesh or segments.
 
-    Of a beam or bar so many along its centre line, named points among them. A rigid body's points in their order on a
-    line, or round their hull, closed, those inside it after that; with fewer than two of them, its centre of mass too.
-    A modal body's points.
+    A beam or bar has about 16 pieces along its centre line, with the named points among the stations. The stations of a
+    rigid body are its points: in order if they are on a line, else around their convex hull, closed, followed by the
+    points inside. With fewer than two distinct points the centre of mass is added. The stations of a modal body are its
+    points.
     """
     if isinstance(body, FlexibleBeam | AssumedModesBeam):
         x = _along(body.length, body.points)
@@ -85,15 +87,15 @@ def outline(body: Body) -> Outline:
 
 
 def outlines(mechanism: Mechanism) -> list[Outline]:
-    """Stations of all bodies of a mechanism, in its order."""
+    """Return the stations of all bodies of a mechanism, in its order."""
     return [outline(body) for body in mechanism.bodies]
 
 
 def chord_deflections(mechanism: Mechanism, shape: Array) -> Array:
-    """Largest deflection along each body from its chord (k, bodies) [m], from shapes (k, stations, 2).
+    """Return the largest deflection of each body from its chord (k, bodies) [m], from shapes (k, stations, 2).
 
-    Over the stations: see `across_chord`. NaN of a flexible body of which fewer than three places are known, as of a
-    modal body with two points.
+    The maximum is over the stations: see `across_chord`. It is NaN for a flexible body with fewer than three stations,
+    such as a modal body with two points.
     """
     found, first = [], 0
     for body, one in zip(mechanism.bodies, outlines(mechanism), strict=True):
@@ -109,9 +111,9 @@ def chord_deflections(mechanism: Mechanism, shape: Array) -> Array:
 
 
 def deflections(system: System, q: Array) -> Array:
-    """Deflections of the stations of all flexible bodies from their chords (k, stations) [m], real or complex.
+    """Return the signed deflections of the stations of all flexible bodies from their chords (k, stations) [m].
 
-    Signed: see `across_chord`. NaN as in `chord_deflections`.
+    They are real or complex like q; see `across_chord` for signs, `chord_deflections` for NaN.
     """
     parts = [np.zeros((len(q), 0))]
     for body, one in zip(system.described.bodies, outlines(system.described), strict=True):
@@ -122,9 +124,9 @@ def deflections(system: System, q: Array) -> Array:
 
 
 def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
-    """Places of the stations of a body for coordinates (k, n): (k, s, 2) [m], by its shape functions.
+    """Return the positions (k, s, 2) [m] of the stations of a body for coordinates q (k, n), from its shape functions.
 
-    Of second-order geometry with the shortening of the model: s(x) = x + N u - 1/2 e_x int_0^x (N2' u)^2 dx.
+    Second-order geometry includes the shortening of the model: s(x) = x + N u - 1/2 e_x int_0^x (N2' u)^2 dx.
     """
     parts = system.parts(drawn.body)
     if parts != (drawn.body,):
@@ -138,7 +140,7 @@ def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
 
 
 def _of_parts(system: System, names: Sequence[str], drawn: Outline, q: Array) -> Array:
-    """Places of the stations of a beam that was cut (k, s, 2), each on its part."""
+    """Return the positions (k, s, 2) of the stations of a beam divided into parts, each on its part."""
     x, starts = drawn.places[:, 0], [system.carrier(name)[1] for name in names]
     owners = np.searchsorted(starts, x + _SAME * drawn.size, side="right") - 1
     out = np.empty((q.shape[0], x.size, 2), dtype=q.dtype)
@@ -149,27 +151,28 @@ def _of_parts(system: System, names: Sequence[str], drawn: Outline, q: Array) ->
 
 @dataclass(frozen=True)
 class Hold:
-    """A point of a body at a joint: in the undeformed body and in the ground frame, each (k,) as x + i y [m]."""
+    """Point of a body at a joint: positions in the undeformed body and in the ground frame, (k,) as x + i y [m]."""
 
     rest: Complex
     place: Complex
 
 
 def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
-    """Stations (k, s, 2) of the undeformed body between the places that hold it [m].
+    """Return the stations (k, s, 2) of the undeformed body placed between the points that hold it [m].
 
-    Between two the undeformed body, turned and scaled so that both are where they are; beyond them turned as between.
-    Through three or more in line a natural cubic spline, without a kink at a joint in mid-span; drawings use it
-    where the rigid mechanism does not close. A body held at places that are not in line is fitted to them as a whole,
-    what is left shared out by distance; one held at a single place is turned as the material is there.
+    Between two holds, the undeformed body is rotated and scaled to match both; beyond them it is only rotated. Three or
+    more holds in line give a natural cubic spline, without a kink at a joint in mid-span; drawings use the spline if
+    the rigid mechanism does not close. A body with holds that are not in line is fitted to them by a similarity, and
+    the residuals are distributed by distance. A body with a single hold has the angle of the material there.
 
     Parameters
     ----------
     drawn : Outline
+        Stations of the body.
     holds : sequence of Hold
-        One or more; a body that nothing holds is held by its frame.
+        One or more holds; a body without joints is held by its frame.
     turn : (k,) array
-        Of the material at the first hold [rad].
+        Angle of the material at the first hold [rad].
     """
     z = drawn.places[:, 0] + 1j * drawn.places[:, 1]
     rest = np.stack([hold.rest for hold in holds], axis=1)
@@ -186,7 +189,7 @@ def stiff_shape(drawn: Outline, holds: Sequence[Hold], turn: Array) -> Array:
 
 
 def _between(z: Complex, rest: Complex, place: Complex, turn: Array, axis: complex, short: float) -> Complex:
-    """The similarity between two holds; beyond them a free end keeps its length."""
+    """Map places by the similarity defined by two holds; beyond them a free end keeps its length."""
     rest, place = _in_order(rest, place, axis)
     gap, step = np.diff(rest, axis=1)[:, 0], np.diff(place, axis=1)[:, 0]
     long = np.abs(gap) > short
@@ -198,10 +201,10 @@ def _between(z: Complex, rest: Complex, place: Complex, turn: Array, axis: compl
 
 
 def _spline(z: Complex, rest: Complex, place: Complex, axis: complex, short: float) -> Complex:
-    """The natural cubic spline through holds in line, continued straight and as long as the body beyond the last ones.
+    """Map places by the natural cubic spline through holds in line, with straight ends of unchanged length beyond them.
 
-    With second derivatives M and slopes s of the chords: h_i M_i + 2 (h_i + h_i+1) M_i+1 + h_i+1 M_i+2 =
-    6 (s_i+1 - s_i).
+    The second derivatives M at the knots follow from the chord slopes s and intervals h: h_i M_i + 2 (h_i + h_i+1)
+    M_i+1 + h_i+1 M_i+2 = 6 (s_i+1 - s_i).
     """
     rest, place = _in_order(rest, place, axis)
     x, knots = (z * np.conj(axis)).real, (rest * np.conj(axis)).real
@@ -234,13 +237,13 @@ def _spline(z: Complex, rest: Complex, place: Complex, axis: complex, short: flo
 
 
 def _in_order(rest: Complex, place: Complex, axis: complex) -> tuple[Complex, Complex]:
-    """Holds in their order along an axis."""
+    """Sort holds along an axis."""
     order = np.argsort((rest * np.conj(axis)).real, axis=1)
     return np.take_along_axis(rest, order, axis=1), np.take_along_axis(place, order, axis=1)
 
 
 def _fitted(z: Complex, rest: Complex, place: Complex) -> Complex:
-    """The similarity nearest to all holds, and its residuals, distributed by squares of distances."""
+    """Map places by the least-squares similarity of all holds, plus residuals weighted by inverse squared distance."""
     middle, centre = rest.mean(axis=1, keepdims=True), place.mean(axis=1, keepdims=True)
     arm = rest - middle
     ratio = np.sum(np.conj(arm) * (place - centre), axis=1, keepdims=True) / np.sum(
@@ -255,12 +258,12 @@ def _fitted(z: Complex, rest: Complex, place: Complex) -> Complex:
 
 
 def in_line(drawn: Outline) -> bool:
-    """Whether the stations of a body are on a line."""
+    """Check whether the stations of a body are on a line."""
     return _axis(drawn.places[:, 0] + 1j * drawn.places[:, 1], drawn.size) is not None
 
 
 def _axis(z: Complex, size: float) -> complex | None:
-    """Direction of the line through places; None if they are not on a line."""
+    """Return the direction of the line through places, None if they are not on a line."""
     far = z[np.argmax(np.abs(z - z[0]))] - z[0]
     if abs(far) == 0.0:
         return 1.0
@@ -270,14 +273,14 @@ def _axis(z: Complex, size: float) -> complex | None:
 
 
 def turned(position: Array, angle: Array, local: Array) -> Array:
-    """Places (k, s, 2) in a frame at positions (k, 2) and angles (k,), in the ground frame."""
+    """Transform places `local` (k, s, 2) from frames at positions (k, 2) with angles (k,) to the ground frame."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y = local[..., 0], local[..., 1]
     return position[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
 def _rows(system: System, body: BodyCoordinates, drawn: Outline) -> Array:
-    """Displacements of the stations per modal coordinate (s, 2, nf)."""
+    """Return the displacements of the stations per unit flexible coordinate (s, 2, nf)."""
     described = system.mechanism.body(drawn.body)
     if isinstance(described, FlexibleBeam) and body.mesh is not None:
         return body.mesh.shapes_at(drawn.places[:, 0])[0] @ body.integrals.D
@@ -289,8 +292,8 @@ def _rows(system: System, body: BodyCoordinates, drawn: Outline) -> Array:
 
 
 def _along(length: float, points: Mapping[str, float]) -> Array:
-    """Stations along a bar, its ends and points among them."""
-    # Places may have a complex step: their real parts decide.
+    """Return the abscissae of the stations along a bar, including its ends and points."""
+    # Places may have a complex step: decisions use their real parts.
     knots = [0.0]
     for x in sorted([*points.values(), length], key=np.real):
         if np.real(x - knots[-1]) > _SAME * np.real(length):
@@ -311,7 +314,7 @@ def _distinct(places: Array) -> Array:
 
 
 def figure_order(places: Array) -> NDArray[np.int64]:
-    """Order of places for drawing: along their line, or round their hull and back to the first, then the others."""
+    """Return the order of places for drawing: along their line, or around their closed hull, then those inside."""
     z = places[:, 0] + 1j * places[:, 1]
     if len(z) < 3:
         return np.arange(len(z))
@@ -324,7 +327,7 @@ def figure_order(places: Array) -> NDArray[np.int64]:
 
 
 def _hull(places: Array) -> list[int]:
-    """Corners of the convex hull of places, and the places on its sides, anticlockwise."""
+    """Return the indices of places on the convex hull, corners and sides, anticlockwise."""
     order = np.lexsort((places[:, 1], places[:, 0])).tolist()
     size = float(np.max(np.ptp(places, axis=0)))
 
@@ -340,6 +343,6 @@ def _hull(places: Array) -> list[int]:
 
 
 def _turn(places: Array, a: int, b: int, c: int) -> float:
-    """Twice the area of a triangle, positive if anticlockwise."""
+    """Return twice the area of a triangle, positive if anticlockwise."""
     (ux, uy), (vx, vy) = places[b] - places[a], places[c] - places[a]
     return float(ux * vy - uy * vx)

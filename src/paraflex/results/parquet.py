@@ -1,4 +1,4 @@
-"""Tables in Parquet files: sealed, with checksums of pages for other programs, and checked when they are read."""
+"""Tables in Parquet files, with a seal and page checksums for other programs; both are checked when a table is read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _AGAIN = "delete it and run the same command again"
 
 
 def write_parquet(table: pa.Table, path: Path, compression: str = "snappy", **options: Any) -> None:
-    """Write a table; see `whole_file` for the options and errors."""
+    """Write a table to a Parquet file; see `whole_file` for the options and errors."""
     with open_parquet(path, table.schema, compression, **options) as writer, uninterrupted():
         writer.write_table(table)
 
@@ -29,7 +29,7 @@ def write_parquet(table: pa.Table, path: Path, compression: str = "snappy", **op
 def open_parquet(
     path: Path, schema: pa.Schema, compression: str = "snappy", **options: Any
 ) -> Iterator[pq.ParquetWriter]:
-    """A file to write tables into; see `whole_file` for the options and errors."""
+    """Open a Parquet file to write tables into; see `whole_file` for the options and errors."""
     import pyarrow.parquet as pq
 
     with sealed_file(path, **options) as unfinished:
@@ -43,12 +43,12 @@ def open_parquet(
 
 
 def read_parquet(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
-    """A table, or some of its columns.
+    """Read a table, or some of its columns, from a Parquet file.
 
     Raises
     ------
     InputError
-        It is damaged, or cannot be read.
+        The file is damaged, or cannot be read.
     """
     import pyarrow.parquet as pq
 
@@ -60,7 +60,7 @@ def read_parquet(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
         table.validate(full=True)
         for field in table.schema:
             _ = [field.name, *(text.decode() for about in (field.metadata or {}).items() for text in about)]
-    # Of a damaged file without a seal the library raises whatever its bytes lead it to.
+    # The library may raise any exception for a damaged file without a seal.
     except Exception as error:
         raise damaged(file, "cut short, or not a readable table", _AGAIN) from error
     return table

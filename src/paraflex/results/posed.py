@@ -1,4 +1,4 @@
-"""The pose a mechanism starts from, to draw before anything runs."""
+"""Initial pose of a mechanism, drawn before a run."""
 
 from __future__ import annotations
 
@@ -20,39 +20,40 @@ from paraflex.mechanism import Mechanism, PointRef, Start
 from paraflex.results.acting import first_movements, first_movements_along
 from paraflex.results.drawing import drawing_data, system_drawing
 
-# Poses along a path, for rails as long as the travel, and places of the path that is drawn.
+# Number of poses along a path, which give the length of rails, and of points of the drawn path.
 _POSES, _PLACES = 81, 801
-# A gap of joints below this is none [m, rad].
+# Gap below which a joint counts as closed [m, rad].
 _CLOSED = 1e-9
 
 
 @dataclass(frozen=True)
 class Posed:
-    """A mechanism at the pose it starts from.
+    """Mechanism in its initial pose.
 
     Attributes
     ----------
     mechanism : Mechanism
+        Mechanism as described.
     assembly : str
-        Empty where the start gives all coordinates.
+        Name of the assembly; empty if the start gives all coordinates.
     data : xarray.Dataset
-        What is drawn, as a run: the start, and the rigid motion along the path where there is one.
+        Drawn variables as of a run: the start, and the rigid motion along the path if there is one.
     path : str
-        Name of the path it starts on; empty without.
+        Name of the path on which the mechanism starts; empty without a path.
     desired : (d, 2) array or None
-        The path's places [m].
+        Positions on the path [m].
     gaps : mapping of str to str
-        Joints, gears and prescribed motions that are open as drawn, and how far, with the unit; the widest first.
+        Gap with unit of each joint, gear and prescribed motion that is open as drawn, the widest first.
     problems : tuple of str
-        Why the loops do not close, and why the path cannot be followed.
+        Reasons why the loops do not close, or why the path cannot be followed.
     payload : (2,) array or None
-        Centre of mass of what the end-effector carries [m].
+        Centre of mass of the payload at the end-effector [m].
     angles : mapping of str to float
-        Of the frames of bodies [rad].
+        Angles of the body frames [rad].
     moves : mapping of str to int
-        Signs of the first movement of joints: of prescribed motions, and of motors along the path; 0 of one that stays.
+        Signs of the first movement of joints with prescribed motions, and with motors along the path; 0 if at rest.
     duration : float or None
-        How long the study lasts [s], where that is known.
+        Duration of the study [s], if known.
     """
 
     mechanism: Mechanism
@@ -68,7 +69,7 @@ class Posed:
     duration: float | None = None
 
     def place(self, ref: PointRef) -> Array:
-        """Place (2,) of a point [m]."""
+        """Return the position (2,) of a point [m]."""
         if ref.on_ground:
             return np.array(self.mechanism.ground[ref.point], dtype=float)
         station = int(self.data["point_station"].values[list(self.data["point"].values).index(str(ref))])
@@ -87,24 +88,25 @@ def posed(
     start: Start | None = None,
     duration: float | None = None,
 ) -> Posed:
-    """The pose that a run starts from; as given, with its open joints, where the loops do not close.
+    """Return the initial pose of a run; if the loops do not close, the pose as given with its open joints.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism as described.
     assembly : str, optional
-        The first by default.
+        Name of the assembly; the first by default.
     path : (str, Path), optional
-        Its name, and the path that the end-effector starts on.
+        Name of the path, and the path on which the end-effector starts.
     start : Start, optional
-        Of a run without a path.
+        Initial state of a run without a path.
     duration : float, optional
-        Of the study [s]; that of the path by default.
+        Duration of the study [s]; that of the path by default.
 
     Raises
     ------
     InputError
-        Nothing says where the bodies are, or an unknown assembly.
+        The assembly is unknown, or there is none and no valid start.
     """
     if duration is None and path is not None:
         duration = path[1].duration
@@ -116,7 +118,7 @@ def posed(
 
 
 def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path] | None = None) -> Posed:
-    """The pose of an assembly, at the start of a path where there is one."""
+    """Return the pose of an assembly, at the start of a path if there is one."""
     if not mechanism.assemblies:
         raise InputError(
             "no assembly: nothing says where the bodies are", field="assembly",
@@ -140,7 +142,7 @@ def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path
 
 
 def _started(mechanism: Mechanism, assembly: str | None, start: Start) -> Posed:
-    """The pose of a start; where it cannot be taken, that of the assembly."""
+    """Return the pose of a start; if it is invalid, that of the assembly with the problem noted."""
     system = standing_system(mechanism, start, assembly)
     chosen = mechanism.assembly(assembly) if mechanism.assemblies else None
     try:
@@ -172,7 +174,7 @@ def _of(
 
 
 def _payload(drawn: Posed) -> Array | None:
-    """Centre of mass of the payload: its offset is turned with the rigid body that carries it."""
+    """Return the centre of mass of the payload, whose offset is rotated with the rigid body that carries it."""
     carried, effector = drawn.mechanism.payload, drawn.mechanism.end_effector
     if carried is None or effector is None:
         return None
@@ -183,7 +185,7 @@ def _payload(drawn: Posed) -> Array | None:
 
 def _open(drawn: Posed, rigid: System, q: Array, problem: str) -> Posed:
     phi = rigid.constraints(moment_signals(rigid.mechanism, 0.0), 0.0, q)[0]
-    # The row that is off most has the unit.
+    # The unit of a joint's gap is that of its row with the largest residual.
     rows = [rigid.rows[k] for k in np.argsort(np.abs(phi))]
     units = {joint_of_row(row): row_unit(row) for row in rows}
     gaps = {name: f"{gap:.3g} {units[name]}" for name, gap in joint_gaps(rigid, phi).items() if gap > _CLOSED}

@@ -1,4 +1,4 @@
-"""A run link by link, in a form that every model of a mechanism can provide."""
+"""Record of a run link by link, in a form that every model of a mechanism can provide."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from paraflex.results.links import Links, system_links
 from paraflex.tracking import TrackingRun, TrackingTask
 from paraflex.validity import Validity
 
-# How a run went: names of the figures every record has.
+# Names of the figures on the course of a run, which every record has.
 RUN_FIGURES = (
     "status",
     "message",
@@ -39,31 +39,33 @@ BRAKE_ENERGY = "brake_energy"
 @given_as("a record", "what results.record makes of a run")
 @dataclass(frozen=True, kw_only=True)
 class Record(Links):
-    """One run of a task, link by link.
+    """Run of a task, link by link.
 
     Attributes
     ----------
     task : TrackingTask
+        Task of the mechanism as described.
     method : str
-        How it was integrated.
+        Name of the integration method.
     mode : str
         Name of the actuation mode.
     torque : (samples, motors) array
-        Applied by the motors, at every sample time of the task, or at the k reached where they were held [N m].
+        Torques applied by the motors [N m], or forces [N], at every sample time of the task, or only at the k reached
+        if brakes or controllers determined them.
     condition : (samples,) array
         Condition number of the actuation matrix.
     end_effector : PointMotion
-        Three (k, 2) arrays.
+        Position, velocity and acceleration of the end-effector, three (k, 2) arrays.
     figures : mapping
-        The numbers and words named in RUN_FIGURES.
+        Values of the figures named in RUN_FIGURES.
     validity : Validity, optional
-        How far it is within what its model can describe.
+        Validity of the model in this run; None if not defined.
     doubts : tuple of Finding
-        What of its results is not plausible.
+        Findings on implausible results.
     controllers : tuple of ControllerRecord
-        What each did, where torques were those of controllers.
+        Records of the sampled controllers; empty without controllers.
     options : IntegrationOptions, optional
-        By which it was integrated; None by another program.
+        Integration options; None for runs of another program.
     """
 
     task: TrackingTask
@@ -80,9 +82,9 @@ class Record(Links):
 
 
 def record(run: TrackingRun) -> Record:
-    """Record of a run; finite segments are reported as the links they were cut from."""
+    """Return the record of a run; finite segments are reported as the links they divide."""
     task, solution, torque = run.task, run.solution, run.applied
-    # The state at an event is a sample more than the task's times.
+    # The state at an event is one sample in addition to the task's times.
     k = solution.t.size - bool(solution.event)
     whole = task if task.whole is None else task.whole
     effector = task.mechanism.end_effector

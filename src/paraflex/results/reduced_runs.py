@@ -1,4 +1,4 @@
-"""Runs with few flexible coordinates beside the same runs with all of them: how far off they are, how much faster."""
+"""Comparison of runs with reduced bodies to the same runs with all flexible coordinates: errors and cost."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.numbers import finite_or_none
 
 if TYPE_CHECKING:
-    # It needs the kernels, which who reads results does without.
+    # The module imports the kernels, which are not needed to read results.
     from paraflex.reduction import Size
 
-# The variable by which such a dataset is known, and the prefix of numbers of the full runs.
+# Variable that identifies such a dataset, and prefix of the numbers of the full runs.
 DISTANCE, FULL = "reduction_distance", "full_"
-# Attributes with what is kept and, with the prefix, what there is.
+# Attributes with the sizes of the reduced system and, with the prefix, of the full system.
 COUNTS = ("flexible_coordinates", "states")
-# Numbers of full runs that are kept: tracking errors along a path, and what they cost.
+# Variables of full runs that are kept: tracking errors along a path, and the cost of the runs.
 _NUMBERS = (*HEADLINE.values(), "wall_time", "steps")
-# A distance beyond this part of what flexibility does in the full run is a finding.
+# A distance above this fraction of the full run's tracking error or largest deflection is a finding.
 _FAR = 0.1
 
 
 def beside_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> xr.Dataset:
-    """The dataset of reduced runs with what the full runs came to, errors against these, and findings on large ones.
+    """Return the dataset of reduced runs with numbers of the full runs, distances to them, and findings on large ones.
 
     Parameters
     ----------
     data, full : xarray.Dataset
-        Of the same runs, from `tracking_dataset` or `motion_dataset`; the second may lack modes.
+        Results of the reduced and the full runs, from `tracking_dataset` or `motion_dataset`; the latter may lack
+        modes.
     kept, whole : Size
-        Of the reduced and of the full system.
+        Sizes of the reduced and of the full system.
     """
-    # Along a path it is the end-effector that matters, else any named point.
+    # The distance is that of the end-effector along a path, else the largest of any named point.
     along = "end_effector" in data
     places, exact = (one["end_effector" if along else "point_position"] for one in (data, full))
     squares = ((places - exact.reindex_like(places)) ** 2).sum("axis", skipna=False)
@@ -57,7 +58,7 @@ def beside_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> 
 
 
 def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
-    """Runs that are far from the full ones."""
+    """Yield findings on runs that are far from the full ones."""
     along = "mode" in data.dims
     name = HEADLINE[ErrorSpan(data.attrs["error"])] if along else ""
     for mode in data["mode"].values if along else [""]:
@@ -75,7 +76,10 @@ def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
 
 
 def reduction_figures(data: xr.Dataset) -> dict[str, Any]:
-    """Of a run, by itself in a dataset: `reduction`, its error and the full run's numbers; empty if it has all."""
+    """Return `reduction` of the single run of a dataset, with its distance to the full run and numbers of the latter.
+
+    The dictionary is empty if the run has all flexible coordinates.
+    """
     if DISTANCE not in data:
         return {}
     numbers = {name: finite_or_none(data[name].item()) for name in data if str(name).startswith(FULL)}

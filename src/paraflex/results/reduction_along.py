@@ -1,4 +1,4 @@
-"""How far the basis of one pose holds along a path, and between how many poses it is interpolated."""
+"""Errors along a path of reduced models whose basis is that of one pose, or interpolated between several poses."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from paraflex.results.linear_data import HOLDINGS, motors_of
 from paraflex.results.numbers import finite_or_none
 
 OWN, ONE = "of each pose", "of one pose"
-# Static shapes of each pose beside vibrations of others, or both of others.
+# Static shapes: those of each pose ("renewed"), or those of the other poses ("carried"), like the vibration modes.
 STATIC = ("renewed", "carried")
-# Numbers of poses between which bases are interpolated: each halves the distances, until errors are as asked for.
+# Numbers of poses between which bases are interpolated: each halves the distances, until errors are below the limit.
 _COUNTS = (2, 3, 5, 9, 17, 33)
-# Coordinates of two poses that are one, in their units.
+# Largest difference of the coordinates of equal poses, in their units.
 _SAME = 1e-6
-# Frequencies of responses, from this part of the highest on, and lowest frequencies above zero that are compared.
+# Number of frequencies of responses, lowest one relative to the highest, and number of compared natural frequencies.
 _FREQUENCIES, _LOWEST, _COMPARED = 60, 1e-2, 2
 UNITS_ALONG = {
     "along_error": ("largest error of the responses up to the highest frequency, over the full model's gain", "1"),
@@ -35,7 +35,7 @@ UNITS_ALONG = {
 
 
 class _Errors(NamedTuple):
-    """Errors of reduced models along a path: of responses (mode, place), of frequencies (mode, place, holding)."""
+    """Errors of reduced models along a path: responses (mode, place) and frequencies (mode, place, holding)."""
 
     response: Array
     frequency: Array
@@ -44,19 +44,25 @@ class _Errors(NamedTuple):
 def along_variables(
     along: Sequence[PosesAlong], states: int | None, method: ReductionMethod, until: float, error: float
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables and coordinates of a dataset: errors along a path of reduced models with bases of several poses.
+    """Return variables and coordinates of a dataset: errors along a path of reduced models with bases of several poses.
 
     Parameters
     ----------
     along : sequence of PosesAlong
-        One for each mode, in the same poses.
+        Linear models along the path, one sequence for each mode, in the same poses.
     states : int, optional
-        Of the reduced models: see `reduce`.
+        Number of states of the reduced models: see `reduce`.
     method : ReductionMethod
+        Reduction method.
     until : float
         Highest frequency [Hz].
     error : float
-        Bases are interpolated between more poses until the largest error is not above.
+        Limit of the largest error, until which bases are interpolated between more poses.
+
+    Raises
+    ------
+    InputError
+        The modes have different poses.
     """
     places = along[0].places
     if any(not np.array_equal(one.places, places) for one in along):
@@ -65,7 +71,7 @@ def along_variables(
     own = _errors(paths, lambda path, _: path.own, True)
     nothing = _Errors(*(np.full_like(part, np.nan) for part in own))
     found, wanted = {OWN: [own, own]}, set(STATIC)
-    # Whether the last pose is the first.
+    # The path is closed if the last pose equals the first.
     first, last = (along[0].models[k].minimal for k in (0, -1))
     closed = bool(np.max(np.abs(last.point.q - first.point.q) / first.system.units) < _SAME)
     for name, take in _bases(places, closed=closed):
@@ -85,7 +91,10 @@ def along_variables(
 
 
 def _bases(places: Array, *, closed: bool) -> Iterator[tuple[str, Take]]:
-    """Names of bases, and what makes the reduced models of a path with them, static shapes renewed or not."""
+    """Yield names of bases, and functions that return the reduced models of a path with them.
+
+    The functions take the path and whether static shapes are renewed.
+    """
     yield ONE, lambda path, renewed: [reduce(model, basis=path.one, renewed=renewed) for model in path.along.models]
     for count in (each for each in _COUNTS[closed:] if 2 * each <= places.size + 1):
         chosen = np.round(np.linspace(0, places.size - 1, count)).astype(int)
@@ -102,7 +111,7 @@ def _bases(places: Array, *, closed: bool) -> Iterator[tuple[str, Take]]:
 
 
 class _Path:
-    """Full models of a mode along a path, reduced ones with bases of their own, and the one whose basis is carried."""
+    """Full models of a mode along a path, the models reduced in their own bases, and the one whose basis is carried."""
 
     def __init__(self, along: PosesAlong, states: int | None, method: ReductionMethod, until: float) -> None:
         self.along: PosesAlong = along
@@ -113,7 +122,7 @@ class _Path:
 
 
 class _Measured:
-    """A full model, by which reduced ones are measured: responses and frequencies."""
+    """Frequency responses and natural frequencies of a full model, the reference for reduced models."""
 
     def __init__(self, model: LinearModel, until: float) -> None:
         self.s: NDArray[np.complexfloating[Any, Any]] = (
@@ -124,7 +133,7 @@ class _Measured:
         self.frequencies: list[Array] = [model.frequencies, model.held_frequencies(self.motors)]
 
     def errors(self, few: ReducedModel) -> tuple[float, list[float]]:
-        """Largest errors of the response, and of frequencies with motors free and held."""
+        """Return the largest errors of the response, and of the frequencies with motors free and held."""
         error = np.max(output_errors(self.response, few.frequency_response(self.s)), initial=0.0)
         both = (few.frequencies, few.held_frequencies(self.motors))
         return float(error), [_relative(*pair) for pair in zip(both, self.frequencies, strict=True)]
@@ -134,20 +143,23 @@ Take = Callable[[_Path, bool], list[ReducedModel]]
 
 
 def _errors(paths: Sequence[_Path], take: Take, renewed: bool) -> _Errors:
-    """Errors of the reduced models that are taken of each path."""
+    """Return the errors of the reduced models that `take` returns for each path."""
     pairs = [[full.errors(few) for full, few in zip(path.full, take(path, renewed), strict=True)] for path in paths]
     return _Errors(np.array([[one[0] for one in row] for row in pairs]),
                    np.array([[one[1] for one in row] for row in pairs]))  # fmt: skip
 
 
 def output_errors(full: Complex, few: Complex) -> Array:
-    """Error of the gains to outputs (k, outputs) of responses (k, outputs, inputs), over those of the full model."""
+    """Return the relative error (k, outputs) of responses (k, outputs, inputs).
+
+    It is the norm of the error over the inputs, divided by that of the full model; zero where the latter is zero.
+    """
     size = np.linalg.norm(full, axis=2)
     return np.linalg.norm(few - full, axis=2) / np.where(size > 0.0, size, np.inf)
 
 
 def _relative(few: Array, full: Array) -> float:
-    """Largest relative error of the lowest frequencies above zero; NaN where the few states have too few."""
+    """Return the largest relative error of the lowest frequencies above zero, NaN if the reduced model has too few."""
     free = int(np.sum(full == 0.0))
     chosen = slice(free, free + _COMPARED)
     if few[chosen].size < full[chosen].size or not full[chosen].size:
@@ -156,7 +168,7 @@ def _relative(few: Array, full: Array) -> float:
 
 
 def along_summary(data: xr.Dataset, mode: str) -> dict[str, Any]:
-    """Errors along a path of reduced models of a mode as plain numbers: by static shapes and basis."""
+    """Return the errors along a path of reduced models of a mode as plain numbers, by static shapes and basis."""
     error = float(data.attrs["accuracy"])
 
     def of(run: xr.Dataset) -> dict[str, Any]:
@@ -176,7 +188,7 @@ def along_summary(data: xr.Dataset, mode: str) -> dict[str, Any]:
 class AlongRow(NamedTuple):
     """Errors along a path of the reduced models of a mode with bases of some poses.
 
-    `within` is the longest stretch of the path where responses are as accurate as was asked for.
+    `within` is the longest interval of the path in which the errors of the responses are below the limit.
     """
 
     mode: str
@@ -189,7 +201,7 @@ class AlongRow(NamedTuple):
 
 
 def along_rows(data: xr.Dataset) -> Iterator[AlongRow]:
-    """Rows of a table of all bases; none where no path was asked for."""
+    """Yield the rows of a table of all bases; none if no path was requested."""
     places = data["place"].values if "along_error" in data else np.zeros(0)
     for mode in map(str, data["mode"].values) if places.size else ():
         for static, runs in along_summary(data, mode).items():
@@ -209,7 +221,7 @@ def _stretch(at: tuple[float, float] | None, places: Array) -> str:
 
 
 def along_heads(data: xr.Dataset) -> tuple[str, str]:
-    """Title of that table, and the head of its last column."""
+    """Return the title of the table of `along_rows`, and the head of its last column."""
     attrs, unit = data.attrs, data.attrs["place_unit"]
     title = (
         f"Bases of other poses, {attrs['along_method']}: errors at {data.sizes['place']} poses along "
@@ -219,13 +231,13 @@ def along_heads(data: xr.Dataset) -> tuple[str, str]:
 
 
 def basis_name(static: str, name: str) -> str:
-    """What a line of a figure is called: which shapes are those of which poses."""
+    """Return the legend of a line in a figure: which shapes are those of which poses."""
     kept = "" if name == OWN else "vibrations " if static == STATIC[0] else "all shapes "
     return f"{kept}{name}"
 
 
 def within(errors: Array, places: Array, error: float) -> tuple[float, float] | None:
-    """From which place to which errors (k,) are not above one: the longest such stretch; None without any."""
+    """Return the ends of the longest interval of places where errors (k,) do not exceed a limit; None without one."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], errors <= error, [False]]).astype(int)))
     if not edges.size:
         return None

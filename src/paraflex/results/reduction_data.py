@@ -1,4 +1,4 @@
-"""The labelled dataset of reduced linear models: states needed, frequencies, gains and errors beside the full ones."""
+"""Labelled dataset of reduced linear models: states needed, frequencies, gains and errors relative to full models."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_v
 from paraflex.results.storage import origin
 
 FULL = "full"
-# Frequencies of responses, from this part of the highest on and somewhat beyond it.
+# Number of frequencies of responses, and lowest and highest one relative to `until`.
 _FREQUENCIES, _LOWEST, _BEYOND = 400, 1e-2, 2.5
-# Frequencies with motors free and held that are compared.
+# Number of natural frequencies, with motors free and held, that are compared.
 _COMPARED = 6
-# A smaller deviation is called none.
+# A smaller relative deviation is printed as zero.
 _ROUNDING = 1e-7
-# Most states for which the lowest frequency with motors held is told.
+# Largest number of states for which the lowest frequency with motors held is computed.
 _MOST = 48
 UNITS = {
     "states": ("fewest states within the error up to the highest frequency; NaN where more than 80 are needed", "1"),
@@ -56,35 +56,37 @@ def reduction_dataset(
     along: Sequence[PosesAlong] = (),
     parameters: dict[str, Any] | None = None,
 ) -> xr.Dataset:
-    """Reduced models of linear models of one mechanism, one for each actuation mode, beside the full ones.
+    """Return the labelled dataset of reduced linear models of one mechanism, compared with the full ones.
 
     Parameters
     ----------
     models : sequence of LinearModel
-        Each of another mode, with the same outputs.
+        Linear models of different actuation modes, with the same outputs.
     states : int, optional
-        Of the reduced models: see `reduce`.
+        Number of states of the reduced models: see `reduce`.
     methods : sequence of str
-        Of `reduce`.
+        Reduction methods: see `reduce`.
     until : float
         Highest frequency [Hz].
     error : float
-        For which states needed are counted.
+        Relative error for which the number of states needed is determined.
     along : sequence of PosesAlong
-        Of the same modes: how far the basis of one pose holds along the path.
+        Linear models along a path, of the same modes, to determine how far the basis of one pose is accurate; none by
+        default.
     parameters : dict, optional
-        Kept as provenance: what was asked for.
+        Requested options, stored as provenance.
 
     Returns
     -------
     xarray.Dataset
         Dimensions mode, reduction, variant ("full", then each reduction), output, holding (motors free or held), order,
-        frequency, kept (states); with `along` basis and place as well.
+        frequency, kept (states); with `along` also static, basis and place.
 
     Raises
     ------
     InputError
-        See `reduce` and `states_needed`.
+        The models have different outputs, or no method has a basis for other poses; see also `reduce` and
+        `states_needed`.
     """
     needed = states_needed(models, 2.0 * np.pi * until, error=error, methods=methods)
     names = [str(name) for name in needed["reduction"].values]
@@ -129,7 +131,7 @@ def reduction_dataset(
 
 
 def _carrying(names: Sequence[str]) -> ReductionMethod:
-    """The first method whose bases can be taken over by other poses."""
+    """Return the first method whose bases can be used in other poses."""
     for method in map(ReductionMethod, names):
         if method in CARRIED:
             return method
@@ -140,7 +142,10 @@ def _carrying(names: Sequence[str]) -> ReductionMethod:
 def _responses(
     models: Sequence[LinearModel], few: Sequence[Sequence[ReducedModel]], frequency: Array
 ) -> tuple[Array, Array]:
-    """Gains (mode, model, output, frequency) and errors (mode, reduction, output, frequency), a little damped."""
+    """Return gains (mode, model, output, frequency) and errors (mode, reduction, output, frequency).
+
+    Both are evaluated with the small damping ratio `DAMPING`.
+    """
     s = 2.0 * np.pi * frequency * (1j + DAMPING)
     gains, errors = [], []
     for model, reduced in zip(models, few, strict=True):
@@ -152,7 +157,7 @@ def _responses(
 
 
 def _frequencies(models: Sequence[LinearModel], few: Sequence[Sequence[ReducedModel]]) -> Array:
-    """Lowest frequencies above zero (mode, model, holding, order) [Hz]; NaN of balanced models."""
+    """Return the lowest frequencies above zero (mode, model, holding, order) [Hz], NaN for balanced models."""
     out = np.full((len(models), 1 + len(few[0]), len(HOLDINGS), _COMPARED), np.nan)
     for m, (model, reduced) in enumerate(zip(models, few, strict=True)):
         motors = motors_of(model)
@@ -166,7 +171,7 @@ def _frequencies(models: Sequence[LinearModel], few: Sequence[Sequence[ReducedMo
 
 
 def _held(models: Sequence[LinearModel], names: Sequence[str], counts: NDArray[np.int64]) -> Array:
-    """Lowest frequency above zero with motors held (mode, reduction, count) [Hz]; NaN without one."""
+    """Return the lowest frequency above zero with motors held (mode, reduction, count) [Hz], NaN without one."""
 
     def lowest(model: LinearModel, states: int, name: str) -> float:
         if name == ReductionMethod.BALANCED.value:
@@ -174,7 +179,7 @@ def _held(models: Sequence[LinearModel], names: Sequence[str], counts: NDArray[n
         try:
             found = reduce(model, states, method=name).held_frequencies(motors_of(model))
         except InputError:
-            # Fewer than the coordinates of motors.
+            # There are fewer states than the coordinates of motors need.
             return np.nan
         above = found[found > 0.0] / (2.0 * np.pi)
         return above[0] if above.size else np.nan
@@ -184,7 +189,13 @@ def _held(models: Sequence[LinearModel], names: Sequence[str], counts: NDArray[n
 
 @checked_arguments()
 def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
-    """Reduced models as plain numbers."""
+    """Return reduced models as plain numbers for JSON.
+
+    Raises
+    ------
+    InputError
+        The dataset is of another kind.
+    """
     check_kind(data, "reduction")
 
     def of(mode: str, name: str) -> dict[str, Any]:
@@ -222,7 +233,7 @@ def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
 
 
 def percent_off(value: float, exact: float) -> str:
-    """How far a number is off another one, in percent; rounding is none."""
+    """Format the relative deviation of a number from the exact one in per cent, "0 %" within rounding."""
     part = value / exact - 1.0
     return "0 %" if abs(part) < _ROUNDING else f"{100.0 * part:+{'.2g' if abs(part) < 1.0 else '.0f'}} %"
 

@@ -1,4 +1,4 @@
-"""Traces of a run for metrics, without making a dataset, which takes longer than all metrics."""
+"""Traces of a run for metrics, computed without a dataset, which would take longer than all metrics."""
 
 from __future__ import annotations
 
@@ -40,34 +40,34 @@ R = TypeVar("R", TrackingRun, MotionRun, Statics)
 
 
 class SolutionTraces(Generic[R]):
-    """Traces of what a run's solution gives, along a path or not, at its k samples; it may have a complex step."""
+    """Traces from the solution of a run, along a path or not, at its k samples; the run may have a complex step."""
 
     run: R
     torque: Trace
 
     @property
     def system(self) -> System:
-        """Of the run."""
+        """System of the run."""
         raise NotImplementedError
 
     @property
     def solution(self) -> Solution:
-        """Of the run."""
+        """Solution of the run."""
         return self.run.solution
 
     @property
     def validity(self) -> Validity | None:
-        """How far the run is within what its model can describe."""
+        """Validity of the model in the run; None if not defined."""
         return self.run.validity
 
     @cached_property
     def deflection(self) -> Trace:
-        """Deflections of the stations of all flexible bodies from their chords (k, stations) [m], signed."""
+        """Signed deflections of the stations of all flexible bodies from their chords (k, stations) [m]."""
         return deflections(self.system, self.solution.q)
 
     @cached_property
     def sections(self) -> SectionResult | None:
-        """Section forces of the beams; None where none is flexible."""
+        """Section forces of the beams; None if none is flexible."""
         solution = self.solution
         return section_result(self.system, solution.q, solution.v, solution.a, solution.multipliers)
 
@@ -78,7 +78,7 @@ class SolutionTraces(Generic[R]):
 
     @cached_property
     def drive_torque(self) -> Trace:
-        """Torque [N m] or force [N] of every prescribed motion (k, drives); NaN where not determined."""
+        """Torque [N m] or force [N] of every prescribed motion (k, drives); NaN if redundant constraints share it."""
         return np.where(self._undetermined.drive, np.nan, drive_torques(self.system, self.solution.multipliers))
 
     @cached_property
@@ -88,7 +88,11 @@ class SolutionTraces(Generic[R]):
 
     @cached_property
     def joint_force(self) -> Trace:
-        """Magnitude of the force in every joint (k, joints) [N]; zero near poles, NaN where not determined."""
+        """Magnitude of the force in every joint (k, joints) [N].
+
+        Multipliers near singular positions, where they have a pole, are taken as zero. The force is NaN if redundant
+        constraints share it.
+        """
         system, solution = self.system, self.solution
         multipliers = np.where(np.isnan(solution.multipliers), 0.0, solution.multipliers)
         forces = [
@@ -100,7 +104,7 @@ class SolutionTraces(Generic[R]):
 
     @cached_property
     def load_errors(self) -> LoadErrors:
-        """How far forces of joints and drives may be off by errors of integration; NaN where that is not known."""
+        """Bounds of the integration errors of joint and drive loads; NaN if unknown."""
         errors = self.solution.multiplier_errors
         joints = [joint.name for joint in self.system.described.joints]
         return load_errors(self.system, joints, np.full(self.system.m, np.nan) if errors is None else errors)
@@ -112,7 +116,7 @@ class SolutionTraces(Generic[R]):
 
     @property
     def controllers(self) -> tuple[ControllerRecord, ...]:
-        """What controllers did; none where there were none."""
+        """Records of the controllers; empty without controllers."""
         return self.run.controllers if isinstance(self.run, ControlledTracking | ControlledMotion) else ()
 
     @cached_property
@@ -121,7 +125,7 @@ class SolutionTraces(Generic[R]):
         return undetermined_loads(self.system, names, self.solution.q.real, self.solution.acting)
 
     def _of_joints(self, names: list[str]) -> Trace:
-        """Rates of joints by name (k, joints)."""
+        """Return the rates (k, joints) of joints by name."""
         solution = self.solution
         rates = [joint_coordinate(self.system, name, solution.q, solution.v).rate for name in names]
         return stacked(rates, len(solution.q))
@@ -134,14 +138,14 @@ class RunTraces(Traces, SolutionTraces[TrackingRun]):
     Attributes
     ----------
     run : TrackingRun
-        It may have a complex step.
+        Run, which may have a complex step.
     """
 
     run: TrackingRun
 
     @property
     def system(self) -> System:
-        """See `SolutionTraces`."""
+        """System of the run."""
         return self.run.task.system
 
     @property
@@ -156,12 +160,12 @@ class RunTraces(Traces, SolutionTraces[TrackingRun]):
 
     @property
     def desired(self) -> Trace:
-        """Desired places of the end-effector (k, 2) [m]."""
+        """Desired positions of the end-effector (k, 2) [m]."""
         return self.run.task.motion.desired.position[: len(self.t)]
 
     @cached_property
     def internal_torque(self) -> Trace:
-        """Part of the torques (samples, motors) that only strains links [N m], or [N] of motors that slide."""
+        """Part of the torques (samples, motors) that only strains links [N m], for sliding motors [N]."""
         return internal_torques(self.run.task, self.run.mode, self.torque)
 
 
@@ -172,10 +176,11 @@ class MotionTraces(SolutionTraces[MotionRun]):
     Attributes
     ----------
     t : (k,) array
-        [s]
+        Sample times [s].
     torque : (k, motors) array
-        [N m], or [N] of motors that slide.
+        Motor torques [N m], for sliding motors forces [N].
     run : MotionRun
+        Run, which may have a complex step.
     """
 
     t: Trace
@@ -184,7 +189,7 @@ class MotionTraces(SolutionTraces[MotionRun]):
 
     @property
     def system(self) -> System:
-        """See `SolutionTraces`."""
+        """System of the run."""
         return self.run.system
 
     @property
@@ -200,18 +205,19 @@ class StaticsTraces(SolutionTraces[Statics]):
     Attributes
     ----------
     run : Statics
+        Branch of equilibria.
     """
 
     run: Statics
 
     @property
     def system(self) -> System:
-        """With the rows of what holds, moves and loads it; see `SolutionTraces`."""
+        """System with the additional constraint rows of held, moved and loaded coordinates."""
         return self.run.equations.extended
 
     @property
     def torque(self) -> Trace:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Zero: torques of motors are forces at coordinates."""
+        """Zeros (k, motors): in statics motor torques are efforts at named coordinates."""
         return np.zeros((len(self.run.equilibria), len(self.system.described.motors)))
 
     @cached_property
@@ -226,23 +232,23 @@ class StaticsTraces(SolutionTraces[Statics]):
 
     @cached_property
     def stiffness(self) -> Trace:
-        """Stiffness (k, directions) of coordinates that it is asked of [N/m, N m/rad]."""
+        """Stiffness (k, directions) of the coordinates for which it was requested [N/m, N m/rad]."""
         return self._columns(self.run.stiffness, self.run.directions)
 
     @property
     def compliance(self) -> Trace:
-        """Compliance (k, directions) [m/N, rad/(N m)]; infinite where none resists: of equilibria past buckling."""
+        """Compliance (k, directions) [m/N, rad/(N m)]; infinite without stiffness and for unstable equilibria."""
         with np.errstate(divide="ignore"):
             return np.where((self.stiffness <= 0.0) | ~self.run.stable[:, None], np.inf, 1.0 / self.stiffness)
 
     @property
     def frequency(self) -> Trace:
-        """Lowest natural frequency (k,) [Hz]; NaN where nothing can move."""
+        """Lowest natural frequency (k,) [Hz]; NaN if the mechanism cannot move."""
         return self._lowest(self.run.frequencies)
 
     @property
     def free_frequency(self) -> Trace:
-        """The same (k,) with what is moved let go [Hz]."""
+        """Lowest natural frequency (k,) with the moved coordinates released [Hz]."""
         return self._lowest(self.run.free_frequencies)
 
     @staticmethod
@@ -251,17 +257,17 @@ class StaticsTraces(SolutionTraces[Statics]):
 
     @property
     def buckling_factor(self) -> float:
-        """The least as seen from the start; NaN where there is none."""
+        """Lowest buckling factor as seen from the start; NaN if there is none."""
         return float(self.run.buckling[0, 0]) if self.run.buckling.size else float("nan")
 
     @property
     def limit_load(self) -> float:
-        """Fraction of what is given at the first limit point; NaN where there is none."""
+        """Fraction of the given loads and travels at the first limit point; NaN if there is none."""
         return float(next(iter(self.run.fraction[self.run.limit]), np.nan))
 
     @property
     def unstable_steps(self) -> int:
-        """How many steps are unstable; limit points are no steps."""
+        """Number of unstable steps (limit points are not counted)."""
         return int(np.sum(~self.run.stable & ~self.run.limit))
 
     def _columns(self, quantity: Callable[[str], Trace], of: Sequence[Coordinate]) -> Trace:
@@ -275,14 +281,14 @@ def run_traces(run: MotionRun) -> MotionTraces: ...
 @overload
 def run_traces(run: Statics) -> StaticsTraces: ...
 def run_traces(run: TrackingRun | MotionRun | Statics) -> RunTraces | MotionTraces | StaticsTraces:
-    """Traces of a run, at the samples it reached."""
+    """Return the traces of a run at the samples that it reached."""
     if isinstance(run, Statics):
         return StaticsTraces(run)
     solution = run.solution
     if isinstance(run, MotionRun):
         return MotionTraces(solution.t, run.applied, run)
     task = run.task
-    # The state at an event is a sample more than the task's times.
+    # The state at an event is one sample in addition to the task's times.
     k = solution.t.size - bool(solution.event)
     effector = task.mechanism.end_effector
     assert effector is not None

@@ -1,4 +1,4 @@
-"""Readings of sensors in datasets: their units, the largest, and those that are of one kind of quantity."""
+"""Readings of sensors in datasets: units, largest values, and groups of equal unit."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _MICRO = 1e6
 
 
 class SensorGroup(NamedTuple):
-    """Readings of one unit.
+    """Sensor readings of one unit.
 
     Attributes
     ----------
     quantity, unit : str
-        "strain" and "µm/m".
+        Physical quantity and printed unit, such as "strain" and "µm/m".
     readings : xarray.DataArray
-        (..., time, sensor), those that are known, in this unit.
+        Readings (..., time, sensor) in this unit, without sensors that have none.
     """
 
     quantity: str
@@ -40,12 +40,12 @@ class SensorGroup(NamedTuple):
 
 
 def sensor_units(data: xr.Dataset) -> list[str]:
-    """SI unit of each sensor of results; none of results without sensors."""
+    """Return the SI unit of each sensor; empty for results without sensors."""
     return units_of_each(data[READING], data.sizes[SENSOR]) if READING in data else []
 
 
 def sensor_groups(data: xr.Dataset) -> list[SensorGroup]:
-    """Readings by their units, without sensors that a model has no readings of."""
+    """Group readings by their units, without sensors that have no readings in the model."""
     units, found = sensor_units(data), []
     for unit in dict.fromkeys(units):
         readings = data[READING].isel({SENSOR: [k for k, one in enumerate(units) if one == unit]})
@@ -59,7 +59,7 @@ def sensor_groups(data: xr.Dataset) -> list[SensorGroup]:
 
 
 def sensor_figures(run: xr.Dataset) -> dict[str, dict[str, dict[str, float | str | None]]]:
-    """`sensors` with the largest magnitude of each and its unit; empty where results have none."""
+    """Return `sensors` with the largest magnitude of each and its unit; empty for results without sensors."""
     units = sensor_units(run)
     figures = {
         str(name): {"largest": largest(run[READING].sel({SENSOR: name}).values), "unit": unit}

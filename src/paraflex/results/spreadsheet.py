@@ -1,4 +1,4 @@
-"""Text for tables that spreadsheets open: nothing in it is taken for a formula, nor moves a terminal's cursor."""
+"""Escaping of text in tables for spreadsheets: no cell acts as a formula or as a control sequence of a terminal."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from paraflex.errors import printable
 if TYPE_CHECKING:
     import pyarrow as pa
 
-# How a formula begins; signs alone are the name of an actuation mode.
+# Beginning of a formula; a text of signs alone is the name of an actuation mode.
 _FORMULA = re.compile(r"[=@\t\r]|[+-](?![+-]*$)")
 
 
 def spreadsheet_text(text: str) -> str:
-    """A text as a cell shows it: before what would be a formula stands an apostrophe."""
+    """Return a text as a cell value, with an apostrophe before a text that would be a formula."""
     return ("'" if _FORMULA.match(text) else "") + printable(text).replace("\n", " ")
 
 
 def spreadsheet_table(table: pa.Table) -> pa.Table:
-    """A table whose texts and names of columns are so; the same where they are already."""
+    """Return a table whose texts and column names are converted by `spreadsheet_text` where necessary."""
     import pyarrow as pa
 
     for k, field in enumerate(table.schema):

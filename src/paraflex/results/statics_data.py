@@ -1,4 +1,4 @@
-"""The labelled dataset of static equilibria: steps with coordinates, forces, stiffness, buckling, deformed shapes."""
+"""Labelled dataset of static equilibria: steps with coordinates, forces, stiffness, buckling, deformed shapes."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from paraflex.results.storage import origin
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
 
-# Frequencies kept of each step.
+# Number of frequencies kept for each step.
 _FREQUENCIES = 8
-# Coordinates are displaced by this part of a buckling shape to find how drawn points move.
+# Fraction of a buckling shape by which coordinates are displaced for the difference quotient of drawn points.
 _SMALL = 1e-4
-# Of what only moves, nothing is kept.
+# Variables of moving mechanisms, which are dropped.
 _OF_MOTION = (
     "angular_velocity", "angular_acceleration", "chord_velocity", "point_velocity", "point_acceleration", "motor_speed",
     "joint_speed", "drive_speed", "kinetic_energy", "work", "drive_power", "drive_energy", "input_power",
@@ -51,7 +51,7 @@ UNITS = {
     "buckling_shape": ("displacement of drawn points as it buckles, the largest is 1", "1"),
     "stress_step": ("step at which a beam's stress is largest", "1"),
 }
-# Units of named coordinates, of lengths and of angles.
+# Units of quantities of named coordinates: for lengths, and for angles.
 NAMED_UNITS = {
     "place": ("m", "rad"), "travel": ("m", "rad"), "effort": ("N", "N m"), "stiffness": ("N/m", "N m/rad"),
     "compliance": ("m/N", "rad/(N m)"),
@@ -70,25 +70,26 @@ _COMMENTS = {
 def statics_dataset(
     found: Statics, *, parameters: dict[str, Any] | None = None, findings: Iterable[Finding] = ()
 ) -> xr.Dataset:
-    """Static equilibria, labelled.
+    """Return the labelled dataset of static equilibria.
 
     Parameters
     ----------
     found : Statics
+        Branch of equilibria.
     parameters : dict, optional
-        Kept as provenance: the model as read, and what was asked for.
+        Model as read and requested options, stored as provenance.
     findings : iterable of Finding
-        Reasons to doubt the model; kept with those of its numbers and of the equilibria.
+        Findings on the model, stored with those on its numbers and on the equilibria.
 
     Returns
     -------
     xarray.Dataset
         Dimensions step, named (coordinates by name), frequency_number, buckling_number, and those of a run: body,
-        point, joint, row, axis, station, section and others. Units and signs in the attributes of every variable; those
-        of each named coordinate in `unit` and `effort_unit`.
+        point, joint, row, axis, station, section and others. The attributes of every variable give units and signs;
+        `unit` and `effort_unit` give the units of each named coordinate.
     """
     system, mechanism = found.system, found.system.described
-    # Joints with all that holds, moves or loads them, reported of the mechanism as described.
+    # The extended system has the rows that hold, move or load joints, so that joint loads include their efforts.
     torques = np.zeros((len(found.equilibria), len(mechanism.motors)))
     links = system_links(found.equations.extended, found.solution, torques, len(torques))
     values = link_variables(links, mechanism)
@@ -117,7 +118,7 @@ def statics_dataset(
 
 
 def _of_steps(found: Statics) -> dict[str, Any]:
-    """Variables of the equilibria that no run has."""
+    """Return the variables that only equilibria have."""
     traces, along = StaticsTraces(found), (("step", "named"),)
     stiffness, compliance = np.full((2, *traces.travel.shape), np.nan)
     asked = [found.coordinates.index(one) for one in found.directions]
@@ -142,14 +143,14 @@ def _of_steps(found: Statics) -> dict[str, Any]:
 
 
 def _hertz(frequencies: np.ndarray, found: Statics) -> np.ndarray:
-    """The lowest frequencies (k, f) [Hz], f as many as there are with what is moved let go."""
+    """Return the lowest frequencies (k, f) [Hz]; f is the number with moved coordinates released, at most 8."""
     out = np.full((len(frequencies), min(found.free_frequencies.shape[1], _FREQUENCIES)), np.nan)
     out[:, : frequencies.shape[1]] = frequencies[:, : out.shape[1]] / (2.0 * np.pi)
     return out
 
 
 def _given_travel(found: Statics) -> dict[str, Any]:
-    """Travel of the first coordinate that is moved or loaded, over which others are drawn."""
+    """Return the travel of the first coordinate that is moved or loaded, the abscissa of figures."""
     given = found.equations.given
     for one in (*given.moved, *given.loads):
         attrs = {"long_name": f"travel of {one.name}", "units": one.unit, "coordinate": one.name}
@@ -158,7 +159,7 @@ def _given_travel(found: Statics) -> dict[str, Any]:
 
 
 def _buckling_shapes(found: Statics) -> dict[str, Any]:
-    """Displacements of drawn points as the mechanism buckles, the largest is one; none where it does not."""
+    """Return the buckling shapes as displacements of drawn points, the largest of which is one; empty without any."""
     shapes = np.array([one.buckling.shapes.T for one in found.equilibria])
     steps, count, n = shapes.shape
     moved = np.repeat(found.q, count, axis=0) + _SMALL * shapes.reshape(-1, n)
@@ -174,7 +175,7 @@ def _buckling_shapes(found: Statics) -> dict[str, Any]:
 
 
 def _motors(found: Statics) -> dict[str, Any]:
-    """Torques of motors at held, moved and loaded joints, those that share a joint alike."""
+    """Return the torques of motors at held, moved and loaded joints; motors at one joint have equal torques."""
     mechanism, names = found.system.mechanism, {one.name for one in found.coordinates}
     if not mechanism.motors:
         return {}
@@ -202,13 +203,13 @@ def _names(found: Statics) -> dict[str, Any]:
 
 
 def step_kinds(data: xr.Dataset) -> list[str]:
-    """In words, whether each step is "stable", "unstable" or a "limit point"."""
+    """Return for each step whether it is "stable", "unstable" or a "limit point"."""
     limit, stable = data["limit_point"].values, data["stable"].values
     return ["limit point" if at else "stable" if holds else "unstable" for at, holds in zip(limit, stable, strict=True)]
 
 
 class BranchParts(NamedTuple):
-    """Masks (steps,) of a branch as it is drawn: a curve of stable steps, one of unstable ones, and limit points."""
+    """Masks (steps,) for drawing a branch: a curve of stable steps, one of unstable steps, and limit points."""
 
     stable: NDArray[np.bool_]
     unstable: NDArray[np.bool_]
@@ -216,10 +217,10 @@ class BranchParts(NamedTuple):
 
 
 def branch_parts(data: xr.Dataset) -> BranchParts:
-    """Which steps belong to the curve of stable equilibria, which to that of unstable ones, and limit points.
+    """Return which steps belong to the curve of stable equilibria, which to that of unstable ones, and limit points.
 
-    The curves meet at limit points; where there is none between a stable step and an unstable one, the second curve
-    begins at the stable step.
+    The curves meet at limit points. Without a limit point between a stable and an unstable step, the curve of unstable
+    equilibria begins at the stable step.
     """
     kinds = np.array(step_kinds(data))
     stable, unstable, limit = (kinds == kind for kind in ("stable", "unstable", "limit point"))
@@ -230,7 +231,10 @@ def branch_parts(data: xr.Dataset) -> BranchParts:
 
 
 def seen_buckling(data: xr.Dataset) -> tuple[int, list[int]] | None:
-    """The last stable equilibrium with a buckling shape, else the first, and which shapes it has; None without any."""
+    """Return the last stable step with a buckling factor (else the first step with one), and the numbers of its shapes.
+
+    Return None without buckling shapes.
+    """
     if "buckling_shape" not in data:
         return None
     known = np.isfinite(data["buckling_factor"].values)
@@ -243,13 +247,19 @@ def seen_buckling(data: xr.Dataset) -> tuple[int, list[int]] | None:
 
 
 def as_samples(data: xr.Dataset) -> xr.Dataset:
-    """Equilibria as samples of a run, their numbers in place of times [s]."""
+    """Return equilibria as samples of a run, with step numbers in place of times [s]."""
     return data.rename(step="time").assign_coords(time=np.arange(float(data.sizes["step"])))
 
 
 @checked_arguments()
 def statics_summary(data: xr.Dataset) -> dict[str, Any]:
-    """The equilibria as plain numbers: of every named coordinate at the last step, stability, buckling, stresses."""
+    """Return equilibria as plain numbers for JSON: named coordinates at the last step, stability, buckling, stresses.
+
+    Raises
+    ------
+    InputError
+        The dataset is of another kind.
+    """
     check_kind(data, "statics")
     last = data.isel(step=-1)
     factors = data["buckling_factor"].values.ravel()

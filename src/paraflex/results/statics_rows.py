@@ -1,4 +1,4 @@
-"""Equilibria as rows of texts, for tables of the command and of the page."""
+"""Equilibria as rows of text, for the tables of the command line and of report pages."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from paraflex.arrays import Array
 from paraflex.results.statics_data import NAMED_UNITS, step_kinds
 from paraflex.units import DisplayUnit
 
-# Rows of the table of steps, and coordinates in it; statics.nc has all.
+# Largest numbers of rows and of coordinates in the table of steps; statics.nc has all.
 _ROWS, _COLUMNS = 24, 2
 _SHOWN = {"m": DisplayUnit("mm", 1e3), "N/m": DisplayUnit("N/mm", 1e-3), "m/N": DisplayUnit("mm/N", 1e3)}
 GIVEN = ("moved", "loaded")
-# A stress that is none [Pa].
+# Stress up to which a beam counts as unstressed [Pa].
 _NO_STRESS = 1.0
-# Stiffnesses that differ by more are drawn on a logarithmic axis.
+# Ratio of stiffnesses above which they are drawn on a logarithmic axis.
 _SPREAD = 30.0
-# Factors of buckling that differ by less are the same.
+# Relative difference below which buckling factors are equal.
 _SAME = 0.01
-# Quantities of a coordinate, and the word of each in a table.
+# Quantities of a coordinate in the tables.
 _LAST = ("travel", "effort", "stiffness", "compliance")
 
 
 class StepTable(NamedTuple):
-    """Steps as texts: heads and units of columns, rows each with its kind first, and how many steps there are."""
+    """Table of steps as text: heads and units of columns, rows that begin with the kind of step, number of steps."""
 
     heads: list[tuple[str, str]]
     rows: list[list[str]]
@@ -36,12 +36,12 @@ class StepTable(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Heading of the table, which tells whether rows are left out."""
+        """Heading of the table, with the numbers of rows and steps if rows are left out."""
         return "Steps" if len(self.rows) == self.steps else f"Steps ({len(self.rows)} of {self.steps})"
 
 
 def step_table(data: xr.Dataset) -> StepTable:
-    """A row for each step, of many for some; of the coordinates that are moved or loaded the first."""
+    """Return the table of steps, thinned out if there are many, with the first coordinates that are moved or loaded."""
     heads, columns = [("given", "")], [[f"{x:.4g}" for x in data["fraction"].values]]
     for k in given_coordinates(data)[:_COLUMNS]:
         one = data.isel(named=k)
@@ -62,14 +62,14 @@ def step_table(data: xr.Dataset) -> StepTable:
 
 
 def lowest_frequencies(data: xr.Dataset) -> dict[str, str]:
-    """Variables of natural frequencies and what tells them apart: "held" and "free" where something is moved."""
+    """Return variables of natural frequencies and labels: "held" and "free" if a coordinate is moved, else "lowest"."""
     words = {"natural_frequency": "held", "free_frequency": "free"}
     words = words if (data["role"] == "moved").any() else {"natural_frequency": "lowest"}
     return {name: word for name, word in words.items() if name in data and np.isfinite(data[name].values[:, :1]).any()}
 
 
 def last_rows(data: xr.Dataset) -> Iterator[list[str]]:
-    """Every named coordinate at the last step: its name, what is given of it, travel, effort, stiffness, compliance."""
+    """Yield a row for every named coordinate at the last step: name, role, travel, effort, stiffness, compliance."""
     last = data.isel(step=-1)
     for name in last["named"].values:
         one = last.sel(named=name)
@@ -77,9 +77,9 @@ def last_rows(data: xr.Dataset) -> Iterator[list[str]]:
 
 
 def buckling_words(data: xr.Dataset) -> str:
-    """At which fraction it buckles, as seen from the start and from the last step; empty if nothing is known of it.
+    """Return a text on the buckling factors as seen from the start and from the last step; empty if none is known.
 
-    A factor of travel alone is given only if the travel reaches it: a travel has no margin as a load has.
+    Without loads, a factor of the travel is reported only if the travel reaches it: a travel has no safety margin.
     """
     factors = data["buckling_factor"].values
     loaded = bool((data["role"] == "loaded").any())
@@ -95,44 +95,44 @@ def buckling_words(data: xr.Dataset) -> str:
 
 
 def no_buckling(data: xr.Dataset) -> str:
-    """Why no factor of buckling is known at the start, in words; empty if one is, or nothing buckles."""
+    """Return the reason why no buckling factor is known at the start; empty if one is known, or nothing buckles."""
     reason = str(data["buckling_note"].values[0]) if "buckling_note" in data else ""
     return f"no factor of buckling: {reason}" if reason and (data["role"] == "loaded").any() else ""
 
 
 def is_stressed(data: xr.Dataset) -> bool:
-    """Whether beams have stresses that are more than rounding."""
+    """Check whether beams have stresses above rounding."""
     return "stress_max" in data and float(np.nanmax(data["stress_max"].values, initial=0.0)) > _NO_STRESS
 
 
 def given_coordinates(data: xr.Dataset) -> list[int]:
-    """Numbers of the coordinates that are moved or loaded."""
+    """Return the indices of the coordinates that are moved or loaded."""
     return [k for k, role in enumerate(data["role"].values) if role in GIVEN]
 
 
 def is_wide(values: Array) -> bool:
-    """Whether stiffnesses are so different that an axis should be logarithmic."""
+    """Check whether stiffnesses differ so much that their axis should be logarithmic."""
     known = values[np.isfinite(values)]
     return bool(known.size and known.min() > 0.0 and known.max() > _SPREAD * known.min())
 
 
 def unit_of(one: xr.Dataset, quantity: str) -> str:
-    """SI unit of a quantity of a named coordinate."""
+    """Return the SI unit of a quantity of a named coordinate."""
     return NAMED_UNITS[quantity][one["unit"].item() == "rad"]
 
 
 def shown_unit(unit: str) -> DisplayUnit:
-    """The unit in which a table has it."""
+    """Return the unit in which tables print a quantity of an SI unit."""
     return _SHOWN.get(unit, DisplayUnit(unit, 1.0))
 
 
 def quantity_word(one: xr.Dataset, quantity: str) -> str:
-    """Heading of a column."""
+    """Return the heading of a quantity's column."""
     return quantity if quantity != "effort" else "force" if one["unit"].item() == "m" else "torque"
 
 
 def four_digits(value: float) -> str:
-    """Four digits, or all of a number below a million; rounding of what is none is zero."""
+    """Format a number to four digits, or all integer digits below a million; "rigid" if infinite, 0 within rounding."""
     if math.isinf(value):
         return "rigid"
     return f"{value:.0f}" if 1e4 <= abs(value) < 1e6 else f"{0.0 if abs(value) < 1e-12 else value:.4g}"

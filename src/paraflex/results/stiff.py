@@ -1,8 +1,9 @@
-"""The pose of a mechanism's bodies, all rigid, that is nearest to a bent one: what magnified drawings bend from.
+"""Pose of the rigid mechanism nearest to a deformed one, the base of drawings with magnified deflections.
 
-A beam held at three or more places in line bends between them as a curve through these places, so its base has to be
-straight, and the bodies that hold it have to move with it. The end-effector then strays from its place by its elastic
-deviation, magnified; so this is only for beams that something slides along, whose curve changes with the place.
+A beam held at three or more places in line deforms to a curve through these places. Its base has to be straight, and
+the bodies that hold the beam have to move with the base. The drawn end-effector is then off its position by the
+magnified elastic deviation. This base is therefore used only if a joint slides along such a beam, whose curve changes
+with the position of the joint.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from paraflex.results.outlines import Outline
 Frames = dict[str, tuple[Array, Array]]
 
 _MOST_STEPS = 8
-# Gap of joints that is none: far below the rounding of stored places [sizes of the mechanism, rad].
+# Gap below which joints are closed, far below the rounding of stored positions [sizes of the mechanism, rad].
 _CLOSED = 1e-10
-# Dependent rows: fraction of the mean diagonal entry that is added to all.
+# Fraction of the mean diagonal entry that is added to all diagonal entries, for dependent rows.
 _DAMPING = 1e-11
-# Moment of inertia of a body that is drawn as a point, as if it were this part of the mechanism's size.
+# Radius of gyration added to each body, for bodies drawn as a point, as a fraction of the mechanism's size.
 _POINT = 0.01
 
 
@@ -41,19 +42,22 @@ def rigid_frames(
     angle: Callable[[str], Array],
     driven: Mapping[str, Array],
 ) -> Frames | None:
-    """Frames of the rigid mechanism nearest to shapes, by squares of distances of stations; None if it does not close.
+    """Return the body frames of the rigid mechanism nearest to shapes, in the least squares of station distances.
+
+    Return None if the rigid mechanism does not close.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism as described.
     drawn : sequence of Outline
-        Of all bodies, in order.
+        Stations of all bodies, in order.
     shapes : mapping of str to (k, s, 2) array
-        [m]
+        Positions of the stations of the deformed bodies [m].
     angle : callable
-        Of a body's frame (k,), within half a turn [rad].
+        Function that returns the angle (k,) of a body's frame, correct within half a turn [rad].
     driven : mapping of str to (k,) array
-        Coordinates of joints that are held as they are [rad, m]; left free if the mechanism does not close with them.
+        Coordinates of joints that keep their values [rad, m]; they are free if the mechanism does not close with them.
     """
     try:
         system = build_system(mechanism.rigid())
@@ -73,7 +77,7 @@ def rigid_frames(
 
 
 def _fitted_frame(one: Outline, shape: Array, angle: Array) -> tuple[Array, Array]:
-    """The frame in which the undeformed stations are nearest to a shape (k, s, 2)."""
+    """Return position and angle of the frame in which the undeformed stations are nearest to a shape (k, s, 2)."""
     z, middle = one.places @ [1.0, 1j], np.mean(one.places @ [1.0, 1j])
     places = shape @ [1.0, 1j]
     centre = places.mean(axis=1)
@@ -84,7 +88,10 @@ def _fitted_frame(one: Outline, shape: Array, angle: Array) -> tuple[Array, Arra
 
 
 def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[str, Array]) -> Array | None:
-    """Newton's iteration at all instants at once, from coordinates (k, n), each step the least change of stations."""
+    """Close the joints by Newton's iteration at all instants at once, from coordinates q (k, n).
+
+    Each step is the one of least displacement of the stations. Return None without convergence.
+    """
     rows = (system.packed.rows["kind"] == CONSTRAINT) & (system.packed.rows["signal"] < 0)
     units = np.concatenate([
         system.row_units[rows], [system.size if system.mechanism.joint(name).slides else 1.0 for name in driven],
@@ -111,7 +118,7 @@ def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[
 
 
 def _rows(system: System, q: Array, chosen: NDArray[np.bool_], driven: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Gaps (k, m) of joints and of the driven coordinates, and their derivatives (k, m, n)."""
+    """Return the residuals (k, m) of joints and of driven coordinates, and their Jacobian (k, m, n)."""
     phi, jacobian = np.zeros((len(q), system.m)), np.zeros((len(q), system.m, system.n))
     signals, scratch = no_signals(system.packed), make_scratch(system.packed)
     rate, still = np.zeros(system.m), q[0] * 0.0
@@ -126,7 +133,7 @@ def _rows(system: System, q: Array, chosen: NDArray[np.bool_], driven: Mapping[s
 
 
 def _inverse_metric(system: System, drawn: Sequence[Outline], q: Array) -> Array:
-    """Inverse (k, n, n) of the mean square displacement of each body's stations as a form of its coordinates."""
+    """Return the inverse (k, n, n) of the metric of coordinates: mean square displacements of each body's stations."""
     metric = np.zeros((len(q), system.n, system.n))
     for one in drawn:
         body = system.body(one.body)

@@ -1,4 +1,4 @@
-"""Results on disk: netCDF with a versioned schema, written whole or not at all, and read again."""
+"""Storage of results on disk: netCDF files with a versioned schema, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -19,53 +19,61 @@ from paraflex.results.following import metric_variables
 from paraflex.seals import NETCDF, PARQUET, check_regular, check_seal, damaged, unreadable
 from paraflex.writing import sealed_file
 
-# Version of what datasets hold; those from 1 on stay readable. 2: shapes, and what else drawings are made from. 3:
-# errors during the motion and after it, vibration about the drift, deflections from the chord; joint forces are whole
-# (before, of joints that slide their normal part), joint moments, multipliers of all runs.
+# Version of the contents of datasets; all versions are readable. 2: shapes and other variables of drawings. 3: errors
+# during the motion and after it, vibration about the drift, deflections from the chord, total joint forces (before,
+# only the normal part for sliding joints), joint moments, multipliers of all runs.
 SCHEMA = 3
 _FOLLOWING = 3
-# What commands call the file in their folder, and where a sweep keeps its runs.
+# Names of the file that commands write into their folder, and folder of the runs of a sweep.
 FILES = ("results.nc", "verify.nc", "linear.nc", "statics.nc", "reduced.nc", "laws.nc")
 _TRAJECTORIES = "trajectories"
 _MOST_NAMED = 3
-# Smaller arrays are written as they are: what describes the compression takes more than it gains [bytes].
+# Smaller arrays are not compressed: the description of the compression takes more space than it saves [bytes].
 _LARGE = 16384
-# Written at once where the reason is looked for why a file cannot be [bytes].
+# Size of the pieces of a test write, which determines why a file cannot be written [bytes].
 _PIECE = 1 << 20
-# First bytes of what netCDF files are: HDF5, or the classic formats.
+# First bytes of netCDF files: HDF5, or the classic formats.
 _NETCDF = (NETCDF, b"CDF\x01", b"CDF\x02", b"CDF\x05")
 _AGAIN = "copy it again, or delete it and run the same command again"
 
 
 def origin(parameters: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Attributes of a dataset that tell what was asked for and what wrote it."""
+    """Return the provenance attributes of a dataset: requested parameters, version of paraflex, schema."""
     asked = json.dumps(parameters or {}, sort_keys=True)
     return {"parameters": asked, "paraflex_version": version("paraflex"), "schema": SCHEMA}
 
 
 @checked_arguments()
 def save_results(data: xr.Dataset, path: str | Path) -> None:
-    """Write a dataset as netCDF, compressed; the file appears whole or not at all.
+    """Write a dataset as a compressed netCDF file, completely or not at all.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Results.
+    path : str or Path
+        File to write, in an existing folder.
 
     Raises
     ------
     OutputError
-        The folder cannot be written.
+        The file cannot be written.
     """
     write_results(data, Path(path), parents=False)
 
 
 def write_results(data: xr.Dataset, path: Path, **options: Any) -> None:
-    """Write a dataset as netCDF; see `whole_file` for the options and errors. Ctrl-C waits for the end.
+    """Write a dataset as netCDF; see `whole_file` for the options and errors. Ctrl-C is deferred to the end.
 
-    Its library takes locks in Python: one that an exception leaves taken lets all who read or write after it wait.
+    The netCDF library acquires locks in Python code. A lock left acquired by an exception would block all later reads
+    and writes.
     """
     with sealed_file(path, **options) as unfinished, uninterrupted():
         _write_netcdf(data, unfinished)
 
 
 def _write_netcdf(data: xr.Dataset, file: Path) -> None:
-    # Large arrays are compressed: bytes of like weight together, at the least effort.
+    # Large arrays are compressed at the lowest level, with bytes of equal significance grouped.
     encoding = {
         str(name): {"zlib": True, "complevel": 1, "shuffle": True}
         for name, values in data.data_vars.items()
@@ -74,7 +82,7 @@ def _write_netcdf(data: xr.Dataset, file: Path) -> None:
     try:
         data.to_netcdf(file, engine="netcdf4", encoding=encoding)
     except (OSError, RuntimeError) as error:
-        # The library does not say why, or says something else: writing as much without it does.
+        # The library does not report the reason reliably; writing as many bytes without it raises the actual error.
         with file.open("wb") as plain:
             for _ in range(1 + data.nbytes // _PIECE):
                 plain.write(bytes(_PIECE))
@@ -83,19 +91,20 @@ def _write_netcdf(data: xr.Dataset, file: Path) -> None:
 
 @checked_arguments()
 def open_results(path: str | Path) -> xr.Dataset:
-    """The dataset that a command or `save_results` wrote, read into memory.
+    """Read a dataset that a command or `save_results` wrote into memory.
 
     Parameters
     ----------
     path : str or Path
-        The folder of a run or verification, or a file. Files of earlier versions of the schema stay readable; what
-        they do not tell (shapes in schema 1) is missing, tracking errors and vibration are those of today's formulas.
+        Folder of a run or verification, or a file. Files of earlier versions of the schema are readable; variables that
+        they do not have (shapes in schema 1) are missing, and tracking errors and vibration are computed anew with the
+        current formulas.
 
     Raises
     ------
     InputError
-        Nothing there, a folder without results or of a sweep, a file that is damaged, of something else, or of a
-        later version.
+        The path does not exist, is a folder without results or of a sweep, or is a file that is damaged, of another
+        program, or of a later version.
     """
     file = results_file(path)
     return _checked(_read(file), file)
@@ -103,18 +112,18 @@ def open_results(path: str | Path) -> xr.Dataset:
 
 @checked_arguments()
 def load_results(path: str | Path) -> xr.Dataset:
-    """Read a dataset that `save_results` wrote: the same as `open_results`."""
+    """Read a dataset that `save_results` wrote; equivalent to `open_results`."""
     return open_results(path)
 
 
 @checked_arguments()
 def results_file(path: str | Path) -> Path:
-    """The netCDF file that a folder of results or a file name means.
+    """Return the netCDF file in a folder of results, or the file itself.
 
     Raises
     ------
     InputError
-        See `open_results`.
+        The path does not exist, or is a folder without results or of a study of many runs.
     """
     path = Path(path)
     if not path.exists():
@@ -162,7 +171,7 @@ def _read(file: Path) -> xr.Dataset:
     try:
         with uninterrupted():
             return xr.load_dataset(file, engine="netcdf4")
-    # Of a damaged file without a seal the libraries raise whatever its bytes lead them to.
+    # The libraries may raise any exception for a damaged file without a seal.
     except Exception as error:
         raise damaged(file, "cut short, or not a readable netCDF file", _AGAIN) from error
 

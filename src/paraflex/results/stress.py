@@ -1,4 +1,4 @@
-"""Section forces, stresses and safety factors of beams in datasets, and the largest of a run."""
+"""Section forces, stresses and safety factors of beams in datasets, and the largest stresses of a run."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from paraflex.dynamics.sections import SectionLoads, Sections, sections_of
 from paraflex.results.loads import OF_BEAMS
 from paraflex.results.numbers import largest, single
 
-# Dimensions besides time, and values at the samples reached.
+# Dimensions besides time, and values at the samples reached, by name of the variable.
 Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]
-# The dimensions of stations along beams and of joints that slide along them, and the variable that every run with
-# section forces has.
+# Dimensions of stations along beams and of joints that slide along them, and the variable that every run with section
+# forces has.
 SECTION, CONTACT, MOMENT = "section", "contact", "section_moment"
 UNITS = {
     "section_moment": ("bending moment of a beam's section", "N m"),
@@ -43,7 +43,7 @@ UNITS = {
     "axial_stress_max": ("largest magnitude of a beam's axial stress", "Pa"),
     "safety_factor": ("least strength over stress of a beam", "1"),
 }
-# Variables of contacts and the fields of `SectionLoads` that they are.
+# Variables of contacts, and the fields of `SectionLoads` that hold their values.
 _OF_CONTACTS = {name: name for name in ("moment", "force", "area", "modulus", "strength")} | {"place": "x"}
 COMMENTS = {
     "section_moment": "E I w'' of the shape functions, with what the force of a joint that slides along adds; "
@@ -55,14 +55,14 @@ COMMENTS = {
 
 @dataclass(frozen=True)
 class SectionResult:
-    """Section forces of a run at its k samples."""
+    """Sections of the beams of a run, and section forces at its k samples."""
 
     sections: Sections
     loads: SectionLoads
 
 
 def section_result(system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionResult | None:
-    """Section forces for coordinates (k, n), their derivatives and multipliers; None where no beam is flexible."""
+    """Return section forces for coordinates q (k, n), derivatives and multipliers; None without flexible beams."""
     sections = sections_of(system)
     if sections is None:
         return None
@@ -70,14 +70,14 @@ def section_result(system: System, q: Array, v: Array, a: Array, multipliers: Ar
     owners, starts = zip(*(system.carrier(name) for name in sections.bodies), strict=True)
     if owners == sections.bodies:
         return SectionResult(sections, loads)
-    # Places of parts of a beam count from the first end of the whole.
+    # Places on parts of a beam are measured from the first end of the whole beam.
     x = loads.x.copy()
     x[:, : len(starts)] += starts
     return SectionResult(replace(sections, bodies=owners, x=sections.x + starts), loads._replace(x=x))
 
 
 def section_variables(found: SectionResult, bodies: list[str]) -> Variables:
-    """Variables over time, those of many stations in single precision."""
+    """Return the variables over time: section forces in single precision, stresses, and forces under contacts."""
     stress, number = found.loads.stress, len(found.sections.bodies)
     along = np.full((len(stress), len(bodies)), np.nan)
     for b, body in enumerate(bodies):
@@ -98,7 +98,7 @@ def section_variables(found: SectionResult, bodies: list[str]) -> Variables:
 
 
 def section_coordinates(sections: Sections) -> dict[str, Any]:
-    """What stations are, as coordinates of a dataset."""
+    """Return the coordinates of a dataset that describe sections and contacts."""
     return {
         "section_body": (SECTION, list(sections.bodies)),
         "section_place": (SECTION, sections.x),
@@ -118,7 +118,7 @@ class Stresses(NamedTuple):
     Attributes
     ----------
     bending, axial : (..., time, section) arrays
-        In the outermost fibre, and in the mean of the section [Pa]; with signs.
+        Signed bending stress in the outermost fibre, and mean axial stress of the section [Pa].
     place, strength : (..., time, section) arrays
         Distance of each section from the beam's first end [m], and strength of its material [Pa].
     owners : (section,) array of str
@@ -133,12 +133,12 @@ class Stresses(NamedTuple):
 
     @property
     def whole(self) -> Array:
-        """Largest magnitude in the section; of bending alone where there is no axial force [Pa]."""
+        """Largest magnitude in the section [Pa]; that of bending alone if the axial force is unknown."""
         return np.abs(np.nan_to_num(self.axial)) + np.abs(self.bending)
 
 
 def stresses_of(data: xr.Dataset, dim: str = SECTION) -> Stresses:
-    """Stresses of a dataset (..., time, section) in the sections of one kind, at stations or under contacts."""
+    """Return the stresses (..., time, section) of a dataset in one kind of sections, at stations or under contacts."""
     moment = data[f"{dim}_moment"].transpose(..., "time", dim)
 
     def values(name: str) -> Array:
@@ -149,7 +149,7 @@ def stresses_of(data: xr.Dataset, dim: str = SECTION) -> Stresses:
 
 
 def _everywhere(data: xr.Dataset) -> Stresses:
-    """Stresses at all stations and under all contacts."""
+    """Return the stresses at all stations and under all contacts."""
     found = stresses_of(data)
     if "contact_moment" not in data:
         return found
@@ -158,7 +158,7 @@ def _everywhere(data: xr.Dataset) -> Stresses:
 
 
 def largest_stresses(data: xr.Dataset) -> xr.Dataset:
-    """The largest stresses of every beam of every run, with place and time, and safety factors; NaN where unknown."""
+    """Return the largest stresses of every beam and run, with place, time and safety factor; NaN if unknown."""
     found = _everywhere(data)
     all_stresses = found.whole
     outer = [dim for dim in data["section_moment"].dims if dim not in ("time", SECTION)]
@@ -172,7 +172,7 @@ def largest_stresses(data: xr.Dataset) -> xr.Dataset:
                 each[run][:, own] for each in (found.bending, found.axial, found.place, found.strength)
             )
             whole, where = all_stresses[run][:, own], (*run, b)
-            # None, where nothing is known, becomes NaN.
+            # None, for beams without known stresses, becomes NaN.
             out["bending_stress_max"][where] = largest(bending)
             out["axial_stress_max"][where] = largest(axial)
             if not np.isfinite(whole).any():

@@ -1,4 +1,4 @@
-"""Results of a study as plain numbers: the content of `summary.json`."""
+"""Results of a study as plain numbers: the contents of `summary.json`."""
 
 from __future__ import annotations
 
@@ -33,26 +33,31 @@ _FIGURES = (
 
 @checked_arguments()
 def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str, Any]:
-    """Results of every mode, parameters and version.
+    """Return the results of every mode with parameters and version as plain values for JSON.
 
     Parameters
     ----------
     data : xarray.Dataset
-        From `tracking_dataset`.
+        Dataset made by `tracking_dataset`.
     failed : dict, optional
-        Modes that could not be run at all, each with its reason.
+        Reason of the failure for each mode that could not be run at all.
 
     Returns
     -------
     dict
-        `modes.<mode>` with tracking errors during the motion, after it and over all, vibration and drift, peak_torque
-        and rms_torque per motor, end_effector_final, the solver's figures, validity (None of rigid bodies), `loads`
-        (see `loads.load_figures`) and, where the mechanism has sensors, `sensors` (see `sensors.sensor_figures`), where
-        its bodies are reduced, `reduction` (see `reduced_runs.reduction_figures`), where controllers acted,
-        `controllers` and internal_torque_max [N m] (see `controllers.controller_figures`);
-        `error`, which of the errors ranks the modes; `verdict`, with the level and all findings; `after`, what the
-        motors do after the path; `part`, how much of the path a run did that was too short for all of it, else None;
-        `parameters`; `version`. A figure not reached is None.
+        `modes.<mode>` with tracking errors during the motion, after it and over the whole run, vibration and drift,
+        peak_torque and rms_torque per motor, end_effector_final, the solver's figures, validity (None for rigid bodies)
+        and `loads` (see `loads.load_figures`); also `sensors` if the mechanism has sensors (see
+        `sensors.sensor_figures`), `reduction` if its bodies are reduced (see `reduced_runs.reduction_figures`), and
+        `controllers` and internal_torque_max [N m] with controllers (see `controllers.controller_figures`).
+        `tolerance` [m] of the integration; `error`, the time span of the error that ranks the modes; `verdict`, with
+        level and all findings; `after`, the state of the motors after the path; `part`, the part of the path covered by
+        runs that ended before it, else None; `parameters`; `version`. Values that a run did not reach are None.
+
+    Raises
+    ------
+    InputError
+        The dataset is of another kind.
     """
     check_kind(data, "tracking")
     modes, part = {}, part_run(data)
@@ -63,7 +68,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
             numbers["message"] = str(run["message"].item())
         if numbers["status"] == "stopped":
             numbers |= {"event": str(run["event"].item()), "event_time": run["event_time"].item()}
-        # Results of earlier versions lack some.
+        # Results of earlier versions lack some figures.
         numbers |= {key: finite_or_none(run[key].item()) for key in _FIGURES if key in run}
         traces = data_traces(run)
         if "deflection" in run:

@@ -1,4 +1,4 @@
-"""Traces of a run at its samples, from which metrics are computed."""
+"""Time series (traces) of a run at its samples, from which metrics are computed."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from numpy.typing import NDArray
 
 from paraflex.results.formulas import during_motion, length
 
-# Of a run: real. Of one near it: with a complex step.
+# Real for a run, complex for a run with a complex step.
 Trace = NDArray[Any]
 
 
 @dataclass(frozen=True)
 class Traces:
-    """Time series of a run at its k samples that every model of a mechanism has.
+    """Time series of a run along a path at its k samples, which every model of a mechanism has.
 
     Attributes
     ----------
     t : (k,) array
-        [s]
+        Sample times [s].
     motion_end : float
-        Of the motion along the path [s].
+        End of the motion along the path [s].
     position : (k, 2) array
-        Of the end-effector [m].
+        Position of the end-effector [m].
     distance : (k,) array
-        Of the end-effector from its desired place [m].
+        Distance of the end-effector from its desired position [m].
     torque : (samples, motors) array
-        [N m], or [N] of motors that slide; at the samples where it is known.
+        Motor torques [N m], for sliding motors forces [N], at the samples where they are known.
     """
 
     t: Trace
@@ -42,12 +42,12 @@ class Traces:
 
     @cached_property
     def moving(self) -> NDArray[np.bool_]:
-        """The samples (k,) during the motion along the path; the others are after it."""
+        """Mask (k,) of the samples during the motion along the path; the others are after it."""
         return during_motion(self.t, self.motion_end)
 
     @property
     def after(self) -> tuple[Trace, Trace]:
-        """Times (j,) of the samples after the motion [s], and places of the end-effector at them (j, 2) [m]."""
+        """Times (j,) of the samples after the motion [s], and positions (j, 2) of the end-effector at them [m]."""
         return self.t[~self.moving], self.position[~self.moving]
 
 
@@ -58,7 +58,7 @@ class DataTraces(Traces):
     Attributes
     ----------
     data : xarray.Dataset
-        Of this run alone.
+        Results of this run alone.
     """
 
     data: xr.Dataset
@@ -70,7 +70,7 @@ class DataTraces(Traces):
 
     @property
     def desired(self) -> Trace:
-        """Desired places of the end-effector (k, 2) [m]."""
+        """Desired positions of the end-effector (k, 2) [m]."""
         return self.data["end_effector_desired"].transpose("time", "axis").values
 
     @property
@@ -80,11 +80,12 @@ class DataTraces(Traces):
 
 
 def data_traces(data: xr.Dataset, motion_end: float | None = None) -> DataTraces:
-    """Traces of the only run of a dataset; NaN at samples it did not reach.
+    """Return the traces of the single run of a dataset, with NaN at samples that it did not reach.
 
     Parameters
     ----------
     data : xarray.Dataset
+        Results of one run along a path.
     motion_end : float, optional
         End of the motion along the path [s]; that of the dataset by default.
     """

@@ -1,4 +1,4 @@
-"""Validity of runs in datasets and summaries."""
+"""Validity of models in datasets and summaries of runs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UNITS = {
 
 
 def validity_variables(runs: Sequence[Validity | None]) -> dict[str, np.ndarray]:
-    """Variables of a dataset, a number or text per run: NaN and "" if validity is not defined."""
+    """Return the validity variables of a dataset, one number or text per run: NaN or "" if validity is not defined."""
     out = {
         "validity": np.array([math.nan if one is None else one.ratio for one in runs]),
         "validity_verdict": np.array(["" if one is None else one.verdict for one in runs]),
@@ -40,9 +40,9 @@ def validity_variables(runs: Sequence[Validity | None]) -> dict[str, np.ndarray]
 
 
 def validity_summary(run: xr.Dataset) -> dict[str, Any] | None:
-    """Validity of one run of a dataset: worst indicator over its limit, verdict, all indicators.
+    """Return the validity of one run of a dataset: largest ratio of an indicator to its limit, verdict, all indicators.
 
-    None where there is nothing to say, as of rigid bodies and in files of earlier versions.
+    Return None if validity is not defined, as for rigid bodies and in files of earlier versions.
     """
     if "validity" not in run or not math.isfinite(run["validity"].item()):
         return None
@@ -57,9 +57,9 @@ def validity_summary(run: xr.Dataset) -> dict[str, Any] | None:
 
 
 def validity_line(verdicts: Mapping[str, Mapping[str, Any] | None]) -> str:
-    """A sentence that the models of all runs are valid, with the largest ratio; empty if one is not, or all are rigid.
+    """Return a sentence that the models of all runs are valid, with the verdict of the run nearest to its limit.
 
-    The name of a single run may be empty.
+    The sentence is empty if one model is not valid, or if all bodies are rigid. The name of a single run may be empty.
     """
     known = {name: one for name, one in verdicts.items() if one is not None}
     if not known or not all(one["holds"] for one in known.values()):

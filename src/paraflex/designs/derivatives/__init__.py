@@ -1,1 +1,1 @@
-"""Derivatives of the runs of a design by its parameters, from those of its system, motion and torques."""
+"""Derivatives of the runs of a design with respect to its parameters, from those of system, motion and torques."""

@@ -1,4 +1,4 @@
-"""Derivatives of the inputs of a run by one parameter: system, planned motion, torques, times."""
+"""Derivatives of the inputs of a run with respect to one parameter: system, planned motion, torques, times."""
 
 from __future__ import annotations
 
@@ -44,7 +44,11 @@ from paraflex.tracking import TrackingTask, path_knots
 
 
 class Described(NamedTuple):
-    """The inputs of a design's runs as its file gives them, from which all their numbers follow."""
+    """Inputs of a design's runs as its file describes them, which determine all other numbers.
+
+    They are the mechanism, the path, the end of the run [s], the orientation of the end-effector and Baumgarte's
+    coefficients alpha and beta [1/s].
+    """
 
     mechanism: Mechanism
     path: Any
@@ -55,7 +59,7 @@ class Described(NamedTuple):
 
 @dataclass(frozen=True)
 class KnownPath:
-    """A path known at some times only, with a complex step."""
+    """Path known at some times only, with a complex step."""
 
     motion: PathMotion
     angles: Numbers | None
@@ -63,15 +67,15 @@ class KnownPath:
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Its start and end: a path known at some times has no knots between them."""
+        """Start and end, as a path known at some times has no knots between them."""
         return (0.0, self.duration)
 
     def evaluate(self, t: Array) -> PathMotion:
-        """The motion at these times."""
+        """Return the motion at the known times; `t` is not used."""
         return self.motion
 
     def turning(self, t: Array) -> Numbers | None:
-        """Angle of the end-effector and its derivatives, if the path prescribes it."""
+        """Return the angle of the end-effector and its derivatives if the path prescribes it, else None."""
         return self.angles
 
 
@@ -82,14 +86,15 @@ class ModeChange:
     Attributes
     ----------
     direction : Direction
+        Derivatives of the numbers that determine the run.
     task : TrackingTask
-        With a complex step, as far as metrics look at it; the packed system is that of the design.
+        Task with a complex step in the parts that metrics use; the packed system is that of the design.
     torques : FeedForward
-        With a complex step.
+        Feed-forward torques with a complex step.
     condition : (k,) array
-        With a complex step.
+        Condition number of the actuation matrix with a complex step.
     error : float
-        The largest part of a derivative that differences leave.
+        Largest relative error of a derivative by differences.
     """
 
     direction: Direction
@@ -100,7 +105,7 @@ class ModeChange:
 
 
 def refuse_frames(mechanism: Mechanism) -> None:
-    """Refuse beams in several frames, whose parts have no derivatives."""
+    """Raise an InputError for beams in several frames, for whose parts derivatives are not implemented."""
     for body in mechanism.bodies:
         if isinstance(body, FlexibleBeam) and body.flexible and body.frames > 1:
             raise InputError(
@@ -110,23 +115,23 @@ def refuse_frames(mechanism: Mechanism) -> None:
 
 
 class Change:
-    """Derivatives of a design by one parameter, relative to its size.
+    """Derivatives of a design with respect to one parameter, relative to its size.
 
     Parameters
     ----------
     setting, task
-        As for `sweeps.run_task`.
+        Common settings of the study, and design and path; see `designs.run.run_task`.
     planned : TrackingTask
-        Of the design itself.
+        Planned motion of the design.
     k : int
-        Which parameter.
+        Index of the parameter.
     size : float
-        See `plans.size_of`.
+        Size of the parameter: see `plans.size_of`.
 
     Raises
     ------
     InputError
-        A parameter that has no derivative.
+        The design is not differentiable by the parameter.
     """
 
     stencil: Stencil
@@ -151,12 +156,12 @@ class Change:
         self.end: float = here.end
 
     def _near(self, setting: Setting, task: Task, k: int) -> tuple[Stencil, list[Described]]:
-        """Designs to both sides of this one, or to one side if the other is invalid."""
+        """Return a stencil and the designs at its points: on both sides, or on one side if the other is invalid."""
         trouble: ParaflexError | None = None
         for stencil in STENCILS:
             try:
                 near = [_described(setting, _moved(task, k, place * self.size)) for place in stencil.places]
-                # Invalid meshes are refused here.
+                # Building the systems raises errors for invalid meshes.
                 self.beside: list[System] = [build_system(each.mechanism) for each in (near[0], near[-1])]
                 return stencil, near
             except ParaflexError as error:
@@ -168,12 +173,12 @@ class Change:
 
     @cached_property
     def packed(self) -> Array:
-        """Derivative of the numbers of the packed system."""
+        """Derivatives of the numbers of the packed system."""
         return part(numbers_of(self.system.packed))
 
     @cached_property
     def rigid(self) -> System:
-        """The planned motion with a complex step."""
+        """Rigid system of the planned motion, with a complex step."""
         bodies = tuple(
             body if isinstance(body, RigidBody) else with_fields(body, flexible=False)
             for body in self.there.mechanism.bodies
@@ -183,7 +188,7 @@ class Change:
 
     @cached_property
     def sampled(self) -> _Planned:
-        """The planned motion at the sample times."""
+        """Planned motion at the sample times."""
         t = self.planned.motion.t
         return self.plan(self.planned.motion, self.planned.effort, t * (part(self.there.end) / self.end))
 
@@ -203,13 +208,13 @@ class Change:
         return knots
 
     def plan(self, motion: RigidMotion, effort: Effort, d_times: Array) -> _Planned:
-        """A planned motion at times that change."""
+        """Return a planned motion and its derivatives, at times with the derivatives `d_times`."""
         path = self.known_path(stepped(motion.t, d_times))
         change = motion_sensitivity(self.closure, motion, self._nearby(motion, d_times, path))
         return _Planned(self, motion, effort, path, stepped(motion.t, d_times), change)
 
     def known_path(self, times: Numbers) -> KnownPath:
-        """The path at times with a complex step."""
+        """Return the path at times with a complex step."""
         path, here = self.there.path, self.planned.path
         duration = self.planned.path.duration
         turning = getattr(here, "turning", None)
@@ -230,7 +235,7 @@ class Change:
         assert effector is not None
         packed, _ = with_marker(self.rigid, effector.point)
         numbers, change = numbers_of(closure.packed), part(numbers_of(packed))
-        # A closure of its own: an orientation may change too.
+        # The closure has the orientation of the design itself; the derivative of the orientation is added below.
         orientation = self.there.orientation
         target = closure.target(path, motion.t)
         if path.angles is None and "angle" in effector.coordinates:
@@ -250,7 +255,7 @@ class Change:
         return still_signals(mechanism, near.end)[0]
 
     def of_mode(self, nominal: Given) -> ModeChange:
-        """Derivatives of the inputs of the run of a mode."""
+        """Return the derivatives of the inputs of the run of a mode."""
         torques = self._torques(nominal.torques)
         signals, stops = self._signals(nominal, torques)
         sampled, problem = self.sampled, nominal.problem
@@ -276,7 +281,7 @@ class Change:
         return q, v
 
     def _torques(self, nominal: FeedForward) -> FeedForward:
-        """Torques with a complex step, at as many instants, which move in proportion between knots."""
+        """Return the torques with a complex step, at equally many instants, which move in proportion between knots."""
         d_times = np.interp(nominal.times, nominal.knots, part(self.knots))
         motion = self.planned.plan.follow(nominal.times)
         effort = required_effort(motion)
@@ -304,7 +309,7 @@ class Change:
         return replace(nominal, signals=signals, knots=stepped(knots, d_knots), times=stepped(nominal.times, d_times))
 
     def _signals(self, nominal: Given, torques: FeedForward) -> tuple[Difference, Array]:
-        """Derivatives of the signals, and of the stops."""
+        """Return the derivatives of the signals and of the stops."""
         problem, found, stops = nominal.problem, [], []
         d_knots, d_times = part(torques.knots), part(self.sampled.times)
         for place, near in zip(self.stencil.places, self.near, strict=True):
@@ -325,7 +330,7 @@ class Change:
 
 @dataclass(frozen=True)
 class _Planned:
-    """A planned motion at instants that change, and its derivatives; `times` with a complex step."""
+    """Planned motion and its derivatives, at instants `times` with a complex step."""
 
     owner: Change
     motion: RigidMotion
@@ -335,7 +340,7 @@ class _Planned:
     change: MotionChange
 
     def with_step(self) -> RigidMotion:
-        """The motion with a complex step; coordinates of the end-effector outside the task are desired as they are."""
+        """Return the motion with a complex step; end-effector coordinates outside the task are desired as they are."""
         changes = {name: stepped(getattr(self.motion, name), getattr(self.change, name)) for name in ("q", "v", "a")}
         return replace(self.motion, system=self.owner.rigid, path=self.path, t=self.times, **changes)
 
@@ -352,7 +357,7 @@ class _Planned:
         return part(required), part(transposed @ motor_rows(moved))
 
     def _forces(self) -> Numbers:
-        """Forces of inertia, weight and loads, with a complex step."""
+        """Return the forces of inertia, weight and loads with a complex step."""
         motion, change, here = self.motion, self.change, self.motion.system.packed
         numbers, d_numbers = numbers_of(here), part(numbers_of(self.owner.rigid.packed))
         acting, d_acting = self._loads()
@@ -368,7 +373,7 @@ class _Planned:
         return stepped(at(0.0), stencil.derivative([at(place) for place in stencil.places]).value)
 
     def _loads(self) -> tuple[Array, Array]:
-        """Loads in time (k, acting) and their derivative, at instants that move with the parameter."""
+        """Return time-dependent loads (k, acting) and their derivative, at instants that move with the parameter."""
         owner, t, d_times = self.owner, np.real(self.times), part(self.times)
         moved = [
             acting_loads(near.mechanism, np.maximum(t + place * d_times, 0.0))
@@ -377,9 +382,9 @@ class _Planned:
         return acting_loads(owner.planned.mechanism, t), owner.stencil.derivative(moved).value
 
     def torques(self, mode: ActuationMode) -> tuple[Array, Array]:
-        """Torques (k, motors) of minimum norm and their derivative.
+        """Return the minimum-norm torques (k, motors) and their derivative.
 
-        tau = B^T y, B B^T y = Q: d tau = B^+ (dQ - dB tau) + (1 - B^+ B) dB^T y.
+        With tau = B^T y and B B^T y = Q, d tau = B^+ (dQ - dB tau) + (1 - B^+ B) dB^T y.
         """
         d_required, d_matrix = self.d_effort
         active = self.effort.active(mode)
@@ -396,7 +401,7 @@ class _Planned:
 
 
 def _condition(values: Array, planned: _Planned, torques: FeedForward) -> Numbers:
-    """Condition numbers of the actuation matrix with a complex step: singular values change by u^T dB v."""
+    """Return condition numbers of the actuation matrix with a complex step; singular values change by u^T dB v."""
     active = planned.effort.active(torques.mode)
     if not active.any():
         return values
@@ -420,14 +425,14 @@ def _moved(task: Task, k: int, by: float) -> Task:
 
 
 def _sizes(signals: Signals) -> Array:
-    """What each number of signals is multiplied by in their values: a power of the length of its piece."""
-    # The last piece of a signal is none, and its coefficients are zero.
+    """Return the factor of each number of signals in their values: for a coefficient a power of its piece's length."""
+    # A signal has no piece after its last break, and the coefficients there are zero.
     lengths = np.abs(np.append(np.diff(signals.breaks), 0.0))
     powers = np.arange(signals.coefficients.shape[1])
     return numbers_of(signals._replace(breaks=np.ones(lengths.size), coefficients=lengths[:, None] ** powers))
 
 
 def _relative(difference: Difference, numbers: Array, sizes: Array) -> float:
-    """The largest error of differences relative to the largest number or derivative, each times its size."""
+    """Return the largest error of differences relative to the largest number or derivative, each times its size."""
     size = max(np.max(np.abs(sizes * difference.value), initial=0.0), np.max(np.abs(sizes * numbers), initial=0.0))
     return float(np.max(sizes * difference.error, initial=0.0) / size) if size > 0.0 else 0.0

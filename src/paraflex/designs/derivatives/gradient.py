@@ -1,4 +1,4 @@
-"""Derivatives of the metrics of a design's runs by its parameters."""
+"""Gradients of the metrics of a design's runs with respect to its parameters."""
 
 from __future__ import annotations
 
@@ -32,19 +32,22 @@ from paraflex.tracking import TrackingRun, simulate
 
 @dataclass(frozen=True)
 class ModeGradients:
-    """Metrics of one run and their derivatives.
+    """Metrics of one run and their gradients.
 
     Attributes
     ----------
     mode : str
+        Name of the actuation mode.
     values : dict of str to float
-        By column; also of metrics that have no derivatives.
+        Metrics by column, including those that are not differentiable.
     gradients : dict of str to (parameters,) array
+        Gradients with respect to the parameters by column.
     errors : dict of str to (parameters,) array
-        Estimates of what differences leave in `gradients`: those over numbers of the file and over signals.
+        Estimated errors of `gradients` from difference formulas, applied to numbers of the file and to signals.
     steps : int
+        Number of accepted steps.
     residual : float
-        See `RunDerivatives`.
+        Largest relative last correction of the stage equations; see `RunDerivatives`.
     """
 
     mode: str
@@ -58,32 +61,33 @@ class ModeGradients:
 def metric_gradients(
     setting: Setting, task: Task, *, sizes: Sequence[float | None] | None = None
 ) -> list[tuple[str, dict[str, float], dict[str, Array]]]:
-    """Metrics of a design's runs along a path and their derivatives by its parameters, mode by mode.
+    """Return the metrics of a design's runs along a path and their gradients, mode by mode.
 
     Parameters
     ----------
     setting, task
-        As for `sweeps.run_task`.
+        Common settings of the study, and design and path; see `designs.run.run_task`.
     sizes : sequence of float, optional
-        What steps of each parameter are parts of; its value where there is none.
+        Size of each parameter, to which difference steps are relative; the magnitude of its value by default.
 
     Returns
     -------
     list of (mode, values, gradients)
-        Gradients (parameters,) by column, in the order of `setting.names`; metrics that have none are left out.
+        Name of the mode, metrics by column, and gradients (parameters,) by column, in the order of `setting.names`;
+        metrics that are not differentiable have no gradient.
 
     Raises
     ------
     InputError
-        Parameters or options that have no derivatives, and numbers that cannot be.
+        A parameter or option is not differentiable, or the values are invalid.
     NumericalError
-        A run that cannot be made.
+        A run failed.
     """
     return [(each.mode, each.values, each.gradients) for each in mode_gradients(setting, task, sizes)]
 
 
 def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] | None = None) -> list[ModeGradients]:
-    """See `metric_gradients`."""
+    """Return metrics, gradients and their estimated errors, mode by mode; see `metric_gradients`."""
     check_has_path(setting)
     check_open_and_whole(setting.design(task.values)[0])
     planned, options = plan_task(setting, task)
@@ -127,7 +131,7 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Chan
 
 
 def _with_motion(run: TrackingRun, nominal: Given, motion: Motion) -> TrackingRun:
-    """The run with its steps solved to rounding."""
+    """Return the run with the motion whose steps are solved to rounding."""
     energy = energies(nominal.problem.system.packed, motion.q, motion.v, motion.multipliers)
     solution = replace(
         run.solution, q=motion.q, v=motion.v, a=motion.a, multipliers=motion.multipliers, kinetic_energy=energy[:, 0],
@@ -145,7 +149,7 @@ def _slopes(
     k: int,
     change: ModeChange,
 ) -> Array:
-    """Derivatives of the numbers of metrics by parameter k relative to its size: by a run with a complex step."""
+    """Return the derivatives of the metrics by parameter k, times its size, from a run with a complex step."""
     direction, along = change.direction, Motion(*(each[k] for each in found.derivatives))
     q, v, a, multipliers, work = (stepped(x, dx) for x, dx in zip(found.motion, along, strict=True))
     energy = _stepped_energies(nominal, found.motion, along, direction)
@@ -155,12 +159,12 @@ def _slopes(
     )  # fmt: skip
     moved = TrackingRun(change.task, change.torques, change.condition, solution, run.method)
     values = metric_values(run_traces(moved), here, smooth_metrics(setting.metrics))
-    # A metric without a value has no derivative either.
+    # The derivative of a metric that is NaN is NaN.
     return np.where(np.isnan(np.real(values)), np.nan, part(values))
 
 
 def _stepped_energies(nominal: Given, motion: Motion, along: Motion, direction: Direction) -> Array:
-    """`energies` with a complex step: products, sines and cosines, whose differences are exact to rounding."""
+    """Return `energies` with a complex step by differences, which are exact to rounding for products and sines."""
     packed, stencil = nominal.problem.system.packed, STENCILS[0]
     numbers = numbers_of(packed)
 

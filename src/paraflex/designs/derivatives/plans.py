@@ -1,4 +1,4 @@
-"""Inputs of a run, and the values of the parameters."""
+"""Inputs of a run, values and sizes of its parameters, and checks that derivatives exist."""
 
 from __future__ import annotations
 
@@ -21,22 +21,26 @@ from paraflex.integrators.run import Problem, make_problem
 from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.tracking import TrackingTask, path_stops
 
-# Numbers of an integration that a run's steps depend on, which stay as they are.
+# Integration options that determine the steps of a run; derivatives are for fixed steps.
 _STEP_OPTIONS = ("tolerance", "step")
 
 
 @dataclass(frozen=True)
 class Given:
-    """The inputs of a run of one mode.
+    """Inputs of the run of one mode.
 
     Attributes
     ----------
     task : TrackingTask
+        Planned motion.
     options : IntegrationOptions
+        Integration options.
     torques : FeedForward
+        Feed-forward torques.
     condition : (k,) array
-        Of the actuation matrix.
+        Condition number of the actuation matrix.
     problem : Problem
+        Initial-value problem.
     """
 
     task: TrackingTask
@@ -47,18 +51,19 @@ class Given:
 
 
 def nominal_values(setting: Setting, chosen: Collection[str] = ()) -> tuple[float, ...]:
-    """Values of the parameters in the mechanism's file, or in the study's [integration].
+    """Return the values of the parameters in the mechanism's file, or in the study's [integration] table.
 
     Parameters
     ----------
     setting : Setting
+        Common settings of the study.
     chosen : collection of str
-        Parameters that are given a value elsewhere: NaN here.
+        Names of parameters with a value from elsewhere, for which NaN is returned.
 
     Raises
     ------
     InputError
-        Several fields of one parameter hold different numbers.
+        Several fields of one parameter have different values.
     """
     return tuple(
         float("nan") if name in chosen else _nominal(setting, name, places)
@@ -67,12 +72,12 @@ def nominal_values(setting: Setting, chosen: Collection[str] = ()) -> tuple[floa
 
 
 def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> float:
-    """Size of parameter k, to which its steps are relative: by default its value.
+    """Return the size of parameter k, to which difference steps are relative: by default the magnitude of its value.
 
     Raises
     ------
     InputError
-        A parameter that has no derivative, or is zero where no size is given.
+        Runs are not differentiable by the parameter, or it is zero and no size is given.
     """
     name, value = setting.names[k], task.values[k]
     where = f"vary.{name}"
@@ -88,12 +93,12 @@ def size_of(setting: Setting, task: Task, k: int, size: float | None = None) -> 
 
 
 def check_has_path(setting: Setting) -> None:
-    """None if runs are along paths: how the start of another run changes with a parameter is not derived.
+    """Check that runs are along paths; the derivative of the start of other runs is not implemented.
 
     Raises
     ------
     InputError
-        The mechanism has no path.
+        The study has no path, or is of statics.
     """
     if not setting.has_path:
         why = "not of statics" if setting.statics else "which the mechanism does not have"
@@ -104,7 +109,7 @@ def check_has_path(setting: Setting) -> None:
 
 
 def check_open_and_whole(model: Model) -> None:
-    """Check that runs of a design have planned torques alone, and all flexible coordinates, not few chosen for each."""
+    """Check that runs of a design have only planned torques, unshaped and without controllers, and unreduced bodies."""
     if model.acting():
         raise InputError(
             "derivatives are of runs without controllers", field="study.controllers",
@@ -123,21 +128,21 @@ def check_open_and_whole(model: Model) -> None:
 
 
 def check_differentiable_study(setting: Setting, values: Sequence[float], columns: Collection[str]) -> None:
-    """Check that metrics of a design's runs have exact derivatives by all of its parameters.
+    """Check that metrics of a design's runs have exact derivatives with respect to all parameters.
 
     Parameters
     ----------
     setting : Setting
+        Common settings of the study.
     values : sequence of float
-        The design.
+        Values of the parameters of the design.
     columns : collection of str
-        Metrics, those per motor as NAME.MOTOR.
+        Metrics, those of each motor as NAME.MOTOR.
 
     Raises
     ------
     InputError
-        A mechanism without a path, a metric that counts or measures what the integration did, a method without
-        derivatives, or such a parameter.
+        The mechanism has no path, or a metric, the integration method or a parameter is not differentiable.
     """
     check_has_path(setting)
     check_smooth(tuple(metric_of(column).name for column in columns))
@@ -149,12 +154,12 @@ def check_differentiable_study(setting: Setting, values: Sequence[float], column
 
 
 def given(planned: TrackingTask, options: IntegrationOptions, mode: str) -> Given:
-    """Inputs of the run of a mode."""
+    """Return the inputs of the run of a mode."""
     return given_torques(planned, options, planned.torques(mode))
 
 
 def given_torques(planned: TrackingTask, options: IntegrationOptions, torques: FeedForward) -> Given:
-    """The torques of a mode as in `simulate`."""
+    """Return the inputs of a run with feed-forward torques, as in `simulate`."""
     times = planned.motion.t
     signals, knots = pack_signals(planned.mechanism, torques.signals, float(times[-1]))
     stops = np.sort(np.concatenate([path_stops(torques.knots, planned.mechanism), knots]))

@@ -1,4 +1,4 @@
-"""Differences of high order for functions that are smooth to rounding, with an estimate of their error."""
+"""Finite differences of high order for functions that are smooth to rounding, with an error estimate."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from paraflex.arrays import Array
 
-# Between places, as parts of a parameter's size. What is differentiated is smooth over many times as far: powers of a
-# number, sines and cosines.
+# Spacing of the points, relative to a parameter's size. The differentiated functions (powers, sines and cosines) are
+# smooth over many times this distance.
 _STENCIL_SPACING = 4e-3
 
 
 class Difference(NamedTuple):
-    """A derivative, and its difference from a formula two orders lower, which bounds its error."""
+    """Derivative, and its difference from a formula of lower order with two points fewer, an estimate of the error."""
 
     value: Array
     error: Array
@@ -29,9 +29,10 @@ class Stencil:
     Attributes
     ----------
     places : tuple of float
-        As parts of a parameter's size.
+        Displacements of the points, relative to a parameter's size.
     weights, coarse : (places,) arrays
-        For a derivative by the parameter as a part of its size; `coarse` leaves out the outermost places.
+        Weights for the derivative with respect to the parameter relative to its size; `coarse` omits the outermost two
+        points.
     """
 
     places: tuple[float, ...]
@@ -39,16 +40,16 @@ class Stencil:
     coarse: Array
 
     def derivative(self, values: list[Array]) -> Difference:
-        """Derivative from values at the points, arrays of one shape."""
+        """Return the derivative from values at the points, which are arrays of equal shape."""
         stack = np.stack(values)
-        # Differences from one of the values: constant parts cancel without rounding.
+        # One of the values is subtracted so that constant parts cancel without rounding.
         stack = stack - stack[0]
         fine, coarse = (np.asarray(np.tensordot(w, stack, axes=1), dtype=float) for w in (self.weights, self.coarse))
         return Difference(fine, np.abs(fine - coarse))
 
 
 def make_stencil(places: range | tuple[int, ...], spacing: float) -> Stencil:
-    """The stencil of points in units of a spacing; the coarser formula leaves out two of them."""
+    """Return the stencil of points in units of a spacing; the coarser formula omits the outermost two."""
     x = np.array(places, dtype=float)
     near = np.argsort(np.abs(x), kind="stable")[:-2]
     weights, coarse = np.zeros(x.size), np.zeros(x.size)
@@ -58,12 +59,15 @@ def make_stencil(places: range | tuple[int, ...], spacing: float) -> Stencil:
 
 
 def _weights(places: Array) -> Array:
-    """Weights of values at the points for the first derivative at zero, in units of the spacing: by Taylor's series."""
+    """Return the weights of values at the points for the first derivative at zero, in units of the spacing.
+
+    They follow from Taylor's series.
+    """
     taylor = np.array([places**power / factorial(power) for power in range(places.size)])
     return np.linalg.solve(taylor, np.eye(places.size)[1])
 
 
-# Centred on a value, and to either side of it only.
+# Central differences, and one-sided differences to either side.
 STENCILS = (
     make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _STENCIL_SPACING),
     make_stencil(range(9), _STENCIL_SPACING),

@@ -1,8 +1,8 @@
 """Complex steps: the model and settings of a design with i h times its derivative added to every number.
 
-Numbers of a mechanism are products and quotients of few of its file's, and expressions there: differences of eighth
-order over a hundredth leave nothing but rounding of them. Functions that are carried out with these complex numbers
-give i h times their own derivatives, without any loss of digits.
+Numbers of a mechanism are products and quotients of a few numbers and expressions in its file. Differences of eighth
+order over about a hundredth of their size are exact to rounding. Functions evaluated with these complex numbers have i
+h times their own derivatives as imaginary parts, without cancellation.
 """
 
 from __future__ import annotations
@@ -20,48 +20,50 @@ from paraflex.errors import InputError
 
 T = TypeVar("T")
 
-# Its square is negligible against one, and no power that occurs underflows.
+# Step h: its square is negligible against one, and no power that occurs underflows.
 COMPLEX_STEP = 1e-40
 
 
 @dataclass(frozen=True)
 class Stepped(Generic[T]):
-    """A description with a complex step, and the largest relative error of the derivatives by differences."""
+    """Description with a complex step, and the largest relative error of the derivatives by differences."""
 
     value: T
     error: float
 
 
 def part(values: Any) -> Array:
-    """The derivative in numbers with a complex step; zero for real ones."""
+    """Return the derivative of numbers with a complex step, zero for real ones."""
     return np.imag(values) / COMPLEX_STEP
 
 
 def stepped(values: Array, derivative: Array) -> Numbers:
-    """Numbers with a complex step along a derivative."""
+    """Return numbers with a complex step along a derivative."""
     return values + 1j * COMPLEX_STEP * derivative
 
 
 def another_layout(field: str = "vary") -> InputError:
-    """The error for a parameter with which descriptions change in more than numbers."""
+    """Return the error for a parameter that changes more than the numbers of a description."""
     problem = "the number of pieces or elements changes with it: no derivative"
     return InputError(problem, field=field, remedy="choose a slightly different value with --at")
 
 
 def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> Stepped[T]:
-    """A description with a complex step.
+    """Return a description with a complex step.
 
     Parameters
     ----------
     here : Any
-        Dataclasses, mappings, sequences, arrays and numbers; all else is kept.
+        Description of dataclasses, mappings, sequences, arrays and numbers; other objects are unchanged.
     near : sequence
-        The same of designs at the places of the stencil.
+        Descriptions of the designs at the points of the stencil.
+    stencil : Stencil
+        Difference formula.
 
     Raises
     ------
     InputError
-        Something else than numbers changes.
+        The descriptions differ in more than numbers.
     """
     walk = _Walk(stencil)
     value = walk.step(here, list(near))
@@ -69,7 +71,7 @@ def complex_step(here: T, near: Sequence[T], stencil: Stencil) -> Stepped[T]:
 
 
 class _Walk:
-    """Simultaneous traversal of a description and those near it."""
+    """Simultaneous traversal of a description and of those at the points of the stencil."""
 
     def __init__(self, stencil: Stencil) -> None:
         self.stencil, self.error = stencil, 0.0
