@@ -97,8 +97,8 @@ def rate_feedback_gains(
     period : float
         Sampling period [s].
     pairs : mapping of str to str or sequence of str, optional
-        Sensors whose rate each motor feeds back. By default, for a model of a mechanism, the nearest strain gauge on a
-        link at the motor's joint.
+        Sensors whose rate each motor feeds back. By default, for a model of a mechanism, the nearest `StrainGauge` on
+        a link at the motor's joint.
     delay : float
         Delay from a sample until its torques act [s].
     cutoff : float, optional
