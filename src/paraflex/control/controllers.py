@@ -56,6 +56,8 @@ class Plant:
 class Controller(Protocol):
     """Sampled controller: at t_k = k `period` it reads its sensors, and its torques act from t_k + `delay` on.
 
+    The state of a controller consists of all its attributes: a saved simulation holds copies of them.
+
     Attributes
     ----------
     period : float
@@ -67,8 +69,6 @@ class Controller(Protocol):
         empty, the encoders of its motors.
     outputs : tuple of str
         Names of motors; if empty, all motors of the mode.
-
-    The state of a controller consists of all its attributes: a saved simulation holds copies of them.
     """
 
     period: float
