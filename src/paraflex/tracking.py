@@ -280,7 +280,7 @@ class TrackingRun(Shown):
     def driven(self) -> Driven | None:
         """Path, largest torques and condition number, if torques drive the mechanism along the path; else None."""
         task, solution = self.task, self.solution
-        # The state at an event is a sample more than the task's times.
+        # The state at an event is one sample more than the times of the task.
         k = solution.t.size - bool(solution.event)
         effector = task.mechanism.end_effector
         if effector is None or not self.follows or not k:
@@ -487,7 +487,7 @@ def _drive_and_hold(
         solution = driven.followed_by(held, count, held.multipliers[:, own], braked.energy)
         holding = np.zeros((held.t.size, len(task.mechanism.motors)))
         holding[:, columns] = braked.holding(held.multipliers)
-        # The state at an event is a sample more than the task's times.
+        # The state at an event is one sample more than the times of the task.
         holding = np.concatenate([torques.evaluate(driven.t[:count]), holding[: held.t.size - bool(held.event)]])
         return TrackingRun(task, torques, condition, solution, title, holding=holding)
 

@@ -131,7 +131,7 @@ def check_mode(effort: Effort, mode: ActuationMode) -> None:
             "degrees of freedom",
             remedy="choose other motors, or add motors to the mode",
         )
-    # A square matrix that passes through a singularity between two instants shows it by the sign of its determinant.
+    # A square matrix that becomes singular between two instants changes the sign of its determinant.
     if count == tasks:
         sign = np.sign(np.linalg.det(effort.matrix[:, :, effort.active(mode)]))
         singular[1:] |= sign[1:] != sign[:-1]

@@ -173,7 +173,7 @@ class Simulation:
         self._integration.start()
         self._fresh = self.save()
 
-    # --- Step by step ---
+    # --- Stepping ---
 
     @property
     def time(self) -> float:
@@ -398,7 +398,7 @@ class Simulation:
             solution = replace(solution, status="interrupted", message=message)
         return self._made(solution)
 
-    # --- Within ---
+    # --- Internals ---
 
     def _made(self, solution: Solution) -> ControlledTracking | ControlledMotion:
         """Return the run with a solution."""
