@@ -1,13 +1,14 @@
-"""Kineto-elastodynamics (KED): the elastic response to a prescribed rigid motion, without influence on the motion.
+"""Kineto-elastodynamics (KED): elastic response to a prescribed rigid motion, without feedback on that motion.
 
 All coordinates xi = (dr, dphi, u) of all bodies are small displacements about the motion q_r(t) of the rigid mechanism.
-At every instant the mechanism is a structure, undeformed in its nominal pose, the joints of the active motors held:
+At every instant the mechanism is a structure, undeformed in its nominal pose, with the joints of the active motors
+held:
 
     M xi'' + K xi + C(t)^T mu = -(M q_r'' + h),    C(t) xi = 0,    C = [Phi_q(q_r); angle rows of the active motors]
 
-dr stands in the body frame, so M and K of a body are constant. Terms from the turning of the body frames while xi
-changes (Coriolis, gyroscopic, softening by rotation) are left out: that is the assumption of the instantaneous
-structure. Motor torques are replaced by the forces that hold the motors at their nominal angles.
+dr is expressed in the body frame, so that M and K of a body are constant. The instantaneous-structure assumption
+neglects the terms from the rotation of the body frames while xi changes (Coriolis, gyroscopic, softening by rotation).
+Motor torques are replaced by the forces that hold the motors at their nominal angles.
 
 Winfrey (1971), J. Eng. Ind. 93, 268-272; Erdman, Sandor and Oakberg (1972), J. Eng. Ind. 94, 1193-1205; Midha, Erdman
 and Frohrib (1978), Mech. Mach. Theory 13, 603-618; Turcic and Midha (1984), J. Dyn. Syst. Meas. Control 106, 243-248.
@@ -37,7 +38,7 @@ from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode, Geometry, grouped, with_actuators
 from paraflex.tracking import TrackingRun, TrackingTask
 
-# A sample spacing may be this much longer than a whole number of steps: rounding of the division.
+# Relative rounding error by which a sample spacing may exceed a whole number of steps.
 _ROUNDED_SPACING = 1e-9
 
 
@@ -50,48 +51,50 @@ def simulate_ked(
     spectral_radius: float = 0.8,
     on_progress: Callable[[float], None] | None = None,
 ) -> TrackingRun:
-    """Elastic response of a mechanism whose active motors follow the planned motion exactly.
+    """Compute the elastic response of a mechanism whose active motors follow the planned motion exactly.
 
     Parameters
     ----------
     task : TrackingTask
-        Second-order geometry is taken as linear: the model is linear in the displacements.
+        Task with the planned motion. Second-order geometry is replaced by linear geometry, as the model is linear in
+        the displacements.
     mode : str or ActuationMode
-        Its name, signs ("+-+-") or motor names ("tau1,tau5"): which motors are held; the others turn freely.
+        Mode whose motors are held, by its name, signs ("+-+-") or motor names ("tau1,tau5"); the other motors turn
+        freely.
     step : float
-        Longest step [s]; the time between two samples is divided evenly.
+        Largest step size [s]; the time between two samples is divided evenly.
     spectral_radius : float
-        Of the generalised-alpha method at infinite frequency, from 0 (annihilates) to 1 (no damping; constraint
-        forces then keep every disturbance).
+        Spectral radius of the generalised-alpha method at infinite frequency, from 0 (asymptotic annihilation) to 1 (no
+        numerical damping; constraint forces then keep every disturbance).
     on_progress : callable, optional
-        Told the time reached [s]. A KeyboardInterrupt, in it or elsewhere, ends the run with what is there, marked
-        "interrupted".
+        Function called with the time reached [s]. A KeyboardInterrupt, in it or elsewhere, ends the run, which is
+        returned as far as computed and marked "interrupted".
 
     Returns
     -------
     TrackingRun
-        It ends where a point comes to the end of the beam it slides along, if `SlidingJoint.at_end` says "stop". Its
-        `torques` are the feed-forward of the mode, which do not drive this model: `holding` are those that hold the
-        motors. Its task is of linear geometry.
-        In its solution q = q_r + xi with derivatives v and a; multipliers are those of the system's rows, of least norm
-        (rows scaled to one size) where rows are dependent; work and energy balance are NaN; the largest violations are
-        those of the nonlinear constraints at the samples, which tell how small the displacements are. Its wall time
-        is that of the whole call.
+        Run, which ends where a point reaches the end of the beam along which it slides, if `SlidingJoint.at_end` is
+        "stop". Its `torques` are the feed-forward torques of the mode, which do not drive this model; its `holding`
+        torques are those that hold the motors. Its task has linear geometry. In its solution q = q_r + xi with
+        derivatives v and a; the multipliers are those of the system's rows, of least norm (rows scaled to one size)
+        where rows are dependent; work and energy balance are NaN; the largest violations are those of the nonlinear
+        constraints at the samples, which indicate how small the displacements are. The wall time is that of the whole
+        call.
 
     Raises
     ------
     InputError
         Springs or dampers, a step that is not positive, a spectral radius outside [0, 1], or a point that starts off
-        the beam it slides along.
+        the beam along which it slides.
     ActuationError, SingularActuationError
         The mode cannot drive the mechanism along the path.
     IntegrationError
-        The rank of the constraints changes along the motion; it carries a TrackingRun with what was computed.
+        The rank of the constraints changes along the motion; the error carries a TrackingRun with the results so far.
     """
     began = time.perf_counter()
     _check(task, step)
     numbers = GeneralisedAlpha(spectral_radius=spectral_radius).numbers
-    # Finite segments that no spring joins are rigid links: they have no geometry, and names of their own.
+    # Finite segments without springs between them are rigid links: they have no geometry option, and their own names.
     if task.mechanism.geometry is not Geometry.LINEAR and task.whole is None:
         task = task.remodelled(task.mechanism.with_geometry(Geometry.LINEAR))
     torques, samples = task.torques(mode), task.motion.t
@@ -170,7 +173,7 @@ def _check(task: TrackingTask, step: float) -> None:
 
 @dataclass(frozen=True)
 class _NominalMotion:
-    """The rigid motion q, v, a (k, n) at times t in a system's coordinates, undeformed, with its forces and angles."""
+    """Rigid motion q, v, a (k, n) at times t in the coordinates of a system, undeformed."""
 
     system: System
     t: Array
@@ -187,10 +190,7 @@ class _NominalMotion:
         return self.q[:, [body.angle for body in self.system.bodies]]
 
     def structure(self, held: Sequence[str]) -> tuple[Array, Array]:
-        """Constraints C (k, rows, n), those of joints held by their motors last, and forces -(M q_r'' + h) (k, n).
-
-        Both in the body frames.
-        """
+        """Return constraints C (k, rows, n), held joints last, and forces -(M q_r'' + h) (k, n), in body frames."""
         forces, packed = np.zeros_like(self.q), self.system.packed
         acting = acting_loads(self.system.mechanism, self.t)
         motion_forces(packed, self.q, self.v, self.a, acting, forces, make_scratch(packed))
@@ -199,12 +199,12 @@ class _NominalMotion:
         return self.to_bodies(np.concatenate([joints, *motors], axis=1)), -self.to_bodies(forces)
 
     def to_bodies(self, values: Array) -> Array:
-        """Translational parts of vectors (k, n) or rows (k, m, n) turned from the ground frame to the body frames."""
+        """Rotate translational parts of vectors (k, n) or rows (k, m, n) from the ground frame to the body frames."""
         angles = self.angles if values.ndim == 2 else self.angles[:, None, :]
         return _turned(self.system, values, -angles)
 
     def displaced(self, xi: Array, dxi: Array, ddxi: Array) -> tuple[Array, Array, Array]:
-        """q_r + xi and its two derivatives; d = R dr turns with its frame, d' = R (dr' + w E dr)."""
+        """Return q_r + xi and its two derivatives; d = R dr rotates with its frame, d' = R (dr' + w E dr)."""
         rates, seconds = dxi.copy(), ddxi.copy()
         for body in self.system.bodies:
             r = body.position
@@ -217,7 +217,7 @@ class _NominalMotion:
 
 
 def _nominal(task: TrackingTask, times: Array) -> _NominalMotion:
-    """The rigid motion in the coordinates of the task's system."""
+    """Return the rigid motion in the coordinates of the task's system."""
     rigid = task.plan.follow(times)
     q, v, a = np.zeros((3, times.size, task.system.n))
     for body in task.system.bodies:
@@ -230,7 +230,7 @@ def _nominal(task: TrackingTask, times: Array) -> _NominalMotion:
 
 
 def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array:
-    """Torques (k, motors) of the held motors: C^T mu stands on the left of the equations, so they are -mu."""
+    """Return the torques (k, motors) of the held motors, -mu, as C^T mu is on the left-hand side of the equations."""
     torques = np.zeros((len(kept), len(system.mechanism.motors)))
     active = [k for k, motor in enumerate(system.mechanism.motors) if motor.name in mode.motors]
     for row, response in zip(torques, kept, strict=True):
@@ -239,7 +239,7 @@ def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array
 
 
 def _mass(body: BodyCoordinates) -> Array:
-    """Mass matrix of the undeformed body in its own frame (M_rr ... M_ff of the theory with R = 1, u = 0)."""
+    """Return the mass matrix of an undeformed body in its frame (M_rr ... M_ff of the theory with R = 1, u = 0)."""
     s = body.integrals
     M = np.eye(3 + body.nf)
     M[:2, :2] *= s.m
@@ -251,12 +251,12 @@ def _mass(body: BodyCoordinates) -> Array:
 
 
 def _quarter(x: Array) -> Array:
-    """E x for vectors (k, 2)."""
+    """Return E x for vectors (k, 2), a rotation by a quarter turn."""
     return np.column_stack([-x[:, 1], x[:, 0]])
 
 
 def _turned(system: System, values: Array, angles: Array) -> Array:
-    """Values (..., n) with the translational part of every body turned by its angle (..., bodies)."""
+    """Return values (..., n) with the translational part of every body rotated by its angle (..., bodies)."""
     x = np.array([body.offset for body in system.bodies])
     c, s = np.cos(angles), np.sin(angles)
     out = values.copy()
@@ -266,7 +266,7 @@ def _turned(system: System, values: Array, angles: Array) -> Array:
 
 
 def _until(stop: float, times: Array, responses: Iterable[Response]) -> Iterator[tuple[float, Response]]:
-    """Instants and responses, the last at `stop` between two of them."""
+    """Yield instants and responses, the last one interpolated at `stop`."""
     earlier, before = math.nan, None
     for t, response in zip(times.tolist(), responses, strict=False):
         if before is not None and t >= stop:
@@ -278,7 +278,7 @@ def _until(stop: float, times: Array, responses: Iterable[Response]) -> Iterator
 
 
 def _fields(task: TrackingTask, torques: FeedForward, t: Array, kept: list[Response]) -> dict[str, Any]:
-    """Fields of a Solution at the kept instants; violations are those of the nonlinear constraints."""
+    """Return the fields of a Solution at the kept instants; violations are those of the nonlinear constraints."""
     system = task.system
     xi, dxi, ddxi, mu = (np.array(values) for values in zip(*kept, strict=True))
     q, v, a = _nominal(task, t).displaced(xi, dxi, ddxi)

@@ -1,4 +1,4 @@
-"""A mechanism without a path, under loads, prescribed motions and given motor torques."""
+"""Runs of a mechanism without a path, under loads, prescribed motions and given motor torques."""
 
 from __future__ import annotations
 
@@ -36,34 +36,36 @@ from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
 from paraflex.validity import Validity, assess, doubtful_results, moved_far, warn, with_blame
 
-# Remedy of a balanced start that is not found.
+# Remedy for a balanced start that is not found.
 UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
-# Errors of a free motion are looked for with a tolerance so many times as large, which multiplies them by as much at
-# most. They are found above the second part of a radian and of the mechanism's size, or of what a coordinate moves by
-# where that is less, but not less than the third part of these.
+# Errors of a free motion are estimated by a run with the tolerance multiplied by the first number, which multiplies
+# them by at most as much. They are reported above the second number, relative to the range of each coordinate in
+# radians or sizes of the mechanism, where that range is clipped to between the third number and one.
 _COARSER, _GROWN, _SMALL = 100.0, 1e-3, 0.01
 
 
 @given_as("a run without a path", "the run that simulate_motion returns")
 @dataclass(frozen=True)
 class MotionRun(Shown):
-    """A run of a mechanism without a path.
+    """Run of a mechanism without a path.
 
     Attributes
     ----------
     system : System
+        Equations of motion of the mechanism.
     times : (k,) array
-        At which results are kept [s]; where an event ends the run, those until then and its own.
+        Times at which results are kept [s]; if an event ends the run, those until then and that of the event.
     torques : mapping of str to float or AngleLaw
-        Of each motor, constant or in time [N m].
+        Torque of each motor, constant or a function of time [N m].
     solution : Solution
+        Computed motion.
     """
 
     system: System
     times: Array
     torques: Mapping[str, InTime]
     solution: Solution
-    # Whether nothing but these acts on it.
+    # Whether no other torques act, as those of controllers would.
     open_loop: ClassVar[bool] = True
 
     @property
@@ -87,12 +89,12 @@ class MotionRun(Shown):
 
     @cached_property
     def electrical(self) -> Electrical:
-        """Currents and voltages of the motors, by the mechanism's actuators."""
+        """Currents and voltages of the motors, from the mechanism's actuators."""
         return electrical(self.system, self.system.described, self)
 
     @cached_property
     def doubts(self) -> tuple[Finding, ...]:
-        """Findings on events in the run, on implausible results and limits of amplifiers."""
+        """Findings on events in the run, on implausible results and on limits of amplifiers."""
         results = doubtful_results(self.system, self.solution)
         described = self.system.described
         amplifiers = electrical_findings(described, self.electrical) if described.actuators else ()
@@ -119,43 +121,50 @@ def simulate_motion(
     Parameters
     ----------
     mechanism : Mechanism or Model
-        A model stands for its mechanism, its [start], and the duration and torques of its [study]; nothing else is
-        taken from that.
+        Mechanism; or a model, of which the mechanism, the [start], and duration and torques of the [study] are used.
     duration : float, optional
-        [s]; by default that of the model's study.
+        Duration of the run [s]; that of the model's study by default.
     samples : int
-        Times at which results are kept, evenly spaced, both ends among them.
+        Number of sample times at which results are kept, evenly spaced, both ends included.
     torques : mapping of str to float or AngleLaw, optional
-        Torque of each motor by name [N m], constant or a law in time, which may jump; zero for the others. By default
-        those of the model's study.
+        Torques by motor [N m], constant or functions of time, which may jump; zero for the others. Those of the model's
+        study by default.
     start : State, Start or str, optional
-        Where it starts: the name of an assembly, at rest and undeformed; a `mechanism.Start` near the first assembly
-        (near another, see `dynamics.start_state`); or a `dynamics.consistent_state`. The first assembly by default.
+        Initial state: the name of an assembly, at rest and undeformed; a `mechanism.Start` near the first assembly (for
+        others see `dynamics.start_state`); or a `dynamics.consistent_state`. The first assembly by default.
     balanced : bool
-        Whether the pose is that of equilibrium, motors held, or of steady running as prescribed motions start; see
-        `dynamics.balanced_state`.
+        Whether the initial pose is the equilibrium with motors held, or that of steady running as prescribed motions
+        start; see `dynamics.balanced_state`.
     method : Method or str, optional
-        Of integration: that of the options by default; an object of `paraflex.methods` or a name in `paraflex.METHODS`.
+        Integration method, an object of `paraflex.methods` or a name in `paraflex.METHODS`; that of the options by
+        default.
     options : IntegrationOptions, optional
+        Integration options.
     on_progress : callable, optional
-        Called with the time reached [s].
+        Function called with the time reached [s].
     warning : bool
-        Whether a run that is doubtful issues warnings; its `validity` and `doubts` hold them either way.
+        Whether a doubtful run issues warnings; its `validity` and `doubts` contain the findings in any case.
+
+    Returns
+    -------
+    MotionRun
+        Run of the mechanism.
 
     Warns
     -----
     ValidityWarning, ResultWarning
-        The run is beyond what its model can describe, or its results are implausible; `validity` and `doubts` say why.
+        The run is outside the validity of its model, or its results are implausible; `validity` and `doubts` give the
+        reasons.
 
     Raises
     ------
     InputError
-        A duration or number of samples that makes no sense, an unknown motor, a law that does not cover the run, or
-        neither an assembly nor a start; a balanced start of given coordinates, or one that is not found.
+        A duration or number of samples out of range, an unknown motor, a torque that does not cover the run, or neither
+        an assembly nor a start; a balanced start with given coordinates, or one that is not found.
     AssemblyError
         The loops do not close.
     IntegrationError
-        The run could not be finished; it carries a MotionRun with what was computed.
+        The run could not be finished; the error carries a MotionRun with the results so far.
     """
     given, mechanism = mechanism, Mechanism.made_of(mechanism)
     options = choose(method, options)
@@ -192,12 +201,12 @@ def motion_start(
     balanced: bool,
     warning: bool = True,
 ) -> tuple[System, State, Array]:
-    """System, start and times (samples,) of a run without a path: see `simulate_motion` for the arguments.
+    """Return system, start and times (samples,) of a run without a path: see `simulate_motion` for the arguments.
 
     Raises
     ------
     InputError, AssemblyError
-        See there.
+        See `simulate_motion`.
     """
     if start is None and not isinstance(given, Mechanism):
         start = given.start
@@ -226,7 +235,7 @@ def _run(system: System, times: Array, torques: Mapping[str, InTime], solution: 
 
 
 def _signals(system: System, torques: Mapping[str, InTime], end: float) -> tuple[Signals, Array]:
-    """Torques and prescribed motions as signals, and the times between which they are smooth [s]."""
+    """Return torques and prescribed motions as signals, and the times between which they are smooth [s]."""
     motors, own = [], []
     for name, law in torques.items():
         if isinstance(law, AngleLaw):
@@ -240,7 +249,7 @@ def _signals(system: System, torques: Mapping[str, InTime], end: float) -> tuple
 
 
 def _grown_errors(run: MotionRun) -> Iterator[Finding]:
-    """Free motions of rigid bodies that make much of small errors: with a coarser tolerance they are elsewhere."""
+    """Yield a finding if small errors grow in a free motion of rigid bodies, as a run with a larger tolerance shows."""
     system, first, options = run.system, run.solution, run.solution.options
     if options is None or options.tolerance is None or options.step is not None or first.t.size < 2:
         return
@@ -255,7 +264,7 @@ def _grown_errors(run: MotionRun) -> Iterator[Finding]:
         second = error.partial
     ratio = _COARSER
     if options.controls_errors and not first.singular_positions:
-        # Other limits of steps may have left them nearly as they were; near singular positions they are kept.
+        # Other limits on the steps may have left them almost unchanged; near singular positions the full ratio is kept.
         saved = first.steps * second.t.size / (max(second.steps, 1) * first.t.size)
         ratio = min(ratio, saved**options.method.order)
     q = first.q[: second.t.size] / system.units
@@ -273,12 +282,14 @@ def _grown_errors(run: MotionRun) -> Iterator[Finding]:
 
 
 def state_at(system: System, start: Start | None, assembly: str | None, *, balanced: bool) -> State:
-    """The state at a start near an assembly, the first by default; without a start at rest, or moving with its drives.
+    """Return the initial state for a start near an assembly, the first by default.
+
+    Without a start the mechanism is at rest, or moves with its drives.
 
     Raises
     ------
     InputError
-        A balanced start of given coordinates, or one that is not found.
+        A balanced start with given coordinates, or one that is not found.
     AssemblyError
         The loops do not close.
     """

@@ -1,4 +1,4 @@
-"""The paper's study (Fig. 10): desired path, rigid joint motion, torques of a mode, flexible mechanism."""
+"""Study of the paper (Fig. 10): desired path, rigid joint motion, torques of a mode, run of the flexible mechanism."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_
 from paraflex.mechanism.laws import stops
 from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn, with_blame
 
-# Two times closer than this fraction of the run are one: a knot beside a sample would make a step of nothing.
+# Times closer than this fraction of the run are merged: a knot beside a sample would force a step of almost zero
+# length.
 _SAME_TIME = 1e-9
 
 
@@ -53,10 +54,10 @@ class Ending(Enum):
     """Action of the active motors after the path.
 
     FREE
-        Their feed-forward goes on: no torque where nothing pulls at the mechanism at rest, and what then is left of
-        vibration and error moves it on.
+        Feed-forward continues: there is no torque where the mechanism at rest needs none, and remaining vibration and
+        error move it on.
     HOLD
-        Brakes hold them at the angles, or travels, they have when the path ends.
+        Brakes hold the motors at the angles, or travels, that they have when the path ends.
     """
 
     FREE = "free"
@@ -66,25 +67,28 @@ class Ending(Enum):
 @given_as("a task", "the task that plan_tracking makes")
 @dataclass(frozen=True)
 class TrackingTask:
-    """A mechanism, a path, and the rigid motion along it: the common part of the runs of all modes.
+    """Mechanism, path, and rigid motion along it: the common part of the runs of all modes.
 
     Attributes
     ----------
     mechanism : Mechanism
+        Mechanism that is driven along the path.
     system : System
-        Of the mechanism, flexible where its bodies are.
+        Equations of motion of the mechanism, with its flexible bodies.
     path : Path
+        Desired path of the end-effector.
     motion : RigidMotion
-        At the sample times.
+        Rigid motion at the sample times.
     effort : Effort
-        Of that motion.
+        Required effort of that motion.
     plan : TorquePlan
+        Efforts on a fine grid, from which the torques of any mode follow.
     start : State
-        Undeformed, at the start of the path, moving as the path does.
+        Initial state: undeformed, at the start of the path and with its velocity.
     whole : TrackingTask or None
-        The task of the uncut mechanism, where this one is of its finite segments.
+        Task of the uncut mechanism, if this one is of its finite segments.
     after : Ending
-        What the active motors do after the path; a name is taken for it.
+        Action of the active motors after the path, or its name.
     """
 
     mechanism: Mechanism
@@ -102,32 +106,33 @@ class TrackingTask:
 
     @property
     def holds(self) -> bool:
-        """Whether brakes engage in its runs: they are requested, and the runs go on after the path."""
+        """Whether brakes engage in its runs: they are requested, and the runs continue after the path."""
         return self.after is Ending.HOLD and self.motion.t[-1] > self.path.duration * (1.0 + _SAME_TIME)
 
     @checked_arguments()
     def mode(self, mode: str | ActuationMode) -> ActuationMode:
-        """An actuation mode by name, signs or motor names."""
+        """Return an actuation mode by its name, signs or motor names."""
         return mode if isinstance(mode, ActuationMode) else parse_mode(self.mechanism, mode)
 
     @checked_arguments()
     def torques(self, mode: str | ActuationMode) -> FeedForward:
-        """Feed-forward torques of a mode: minimum norm, smooth in time."""
+        """Return the feed-forward torques of a mode, of minimum norm and smooth in time."""
         return self.plan.feed_forward(self.mode(mode))
 
     @checked_arguments()
     def driven(self, mode: str, torques: Array, condition: Array, actual: Array | None = None) -> Driven:
-        """Data of a run driven by torques or forces (k, motors) of a mode, at the first samples of the task.
+        """Return the data of a run driven by torques or forces (k, motors) of a mode, at the first samples of the task.
 
         Parameters
         ----------
         mode : str
+            Name of the mode.
         torques : (k, motors) array
-            [N m, N]
+            Torques or forces of the motors [N m, N].
         condition : (k,) array
-            Of the actuation matrix.
+            Condition number of the actuation matrix.
         actual : (k, 2) array, optional
-            Of the end-effector [m]; where it is to be by default.
+            Actual positions of the end-effector [m]; the desired ones by default.
         """
         mechanism, desired = self.mechanism, self.motion.desired
         names = [motor.name for motor in mechanism.motors]
@@ -144,29 +149,29 @@ class TrackingTask:
 
     @checked_arguments()
     def remodelled(self, mechanism: Mechanism) -> TrackingTask:
-        """The same motion and torques for another model of the same bodies: rigid ones, another mesh or geometry.
+        """Return the task, motion and torques unchanged, for another model of the bodies: rigid, other mesh, geometry.
 
         Parameters
         ----------
         mechanism : Mechanism
-            As `Mechanism.rigid`, `with_beams`, `with_geometry` or `refined` return it.
+            Mechanism as returned by `Mechanism.rigid`, `with_beams`, `with_geometry` or `refined`.
         """
         system = build_system(mechanism)
         return replace(self, mechanism=mechanism, system=system, start=_start(system, self.motion))
 
     @checked_arguments()
     def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
-        """The same task for the virtual prototype of finite segments, driven by the same torques.
+        """Return the task for the virtual prototype of finite segments, driven by the same torques.
 
         Parameters
         ----------
         segments : int or mapping of str to int
-            See `mechanism.finite_segments`.
+            Numbers of segments: see `mechanism.finite_segments`.
 
         Raises
         ------
         InputError
-            See there; or the task is of finite segments already.
+            See `mechanism.finite_segments`; or the task is one of finite segments already.
         """
         if self.whole is not None:
             raise InputError("cut into segments already", field="segments", remedy="cut the task it was made from")
@@ -174,10 +179,11 @@ class TrackingTask:
 
     @checked_arguments()
     def balanced(self, mode: str | ActuationMode) -> TrackingTask:
-        """The same task with a balanced start, at the path's initial position and velocity of a mode's motors.
+        """Return the task with a balanced start, at the path's initial position and velocity of a mode's motors.
 
-        Under weight or loads links sag before they move; started undeformed they would ring about that. On a path that
-        starts in motion inertia forces of that motion deflect them as well: see `dynamics.balanced_state`.
+        Under weight or loads links sag before they move; started undeformed, they would vibrate about that deflection.
+        On a path that starts in motion, inertia forces of that motion deflect them as well: see
+        `dynamics.balanced_state`.
 
         Raises
         ------
@@ -205,19 +211,22 @@ class TrackingTask:
 @given_as("a run along a path", "a run that simulate returns")
 @dataclass(frozen=True)
 class TrackingRun(Shown):
-    """A run of one mode of a task.
+    """Run of one mode of a task.
 
     Attributes
     ----------
     task : TrackingTask
+        Task of the run.
     torques : FeedForward
+        Feed-forward torques of the mode.
     condition : (k,) array
         Condition number of the actuation matrix at the sample times.
     solution : Solution
+        Computed motion.
     method : str
-        How it was integrated.
+        Title of the integration method.
     holding : (k, motors) array, optional
-        Torques at the samples of a run in which motors were held, on a motion or by brakes, at all of them [N m].
+        Torques at all samples of a run in which motors were held, on a motion or by brakes [N m]; None for other runs.
     """
 
     task: TrackingTask
@@ -229,17 +238,17 @@ class TrackingRun(Shown):
 
     @property
     def mode(self) -> ActuationMode:
-        """The actuation mode."""
+        """Actuation mode."""
         return self.torques.mode
 
     @property
     def applied(self) -> Array:
-        """Torques of all motors at the task's sample times, or at the k reached ones if brakes held them [N m]."""
+        """Torques of all motors at the task's sample times, or at the k ones reached if motors were held [N m]."""
         return self.torques.evaluate(self.task.motion.t) if self.holding is None else self.holding
 
     @property
     def follows(self) -> bool:
-        """Whether torques drive it along the path."""
+        """Whether torques drive the mechanism along the path."""
         return self.holding is None or self.task.holds
 
     @cached_property
@@ -253,7 +262,7 @@ class TrackingRun(Shown):
         """Findings on events in the run, and on results that are implausible for the mechanism."""
         whole = self.task.whole or self.task
         found = doubtful_results(self.task.system, self.solution, self.driven, whole.mechanism)
-        # How many samples are enough is another number in each mode.
+        # The sufficient number of samples differs from mode to mode.
         of_run = (
             replace(one, place=f"mode {self.mode.name}") if one.place == SAMPLES else one
             for one in self.solution.findings
@@ -264,14 +273,14 @@ class TrackingRun(Shown):
 
     @cached_property
     def electrical(self) -> Electrical:
-        """Currents and voltages of the motors, by the mechanism's actuators."""
+        """Currents and voltages of the motors, from the mechanism's actuators."""
         return electrical(self.task.system, (self.task.whole or self.task).mechanism, self)
 
     @cached_property
     def driven(self) -> Driven | None:
-        """Path, largest torques and condition number, where torques drive the mechanism along the path."""
+        """Path, largest torques and condition number, if torques drive the mechanism along the path; else None."""
         task, solution = self.task, self.solution
-        # The state at an event is a sample more than the task's times.
+        # The state at an event is one sample more than the times of the task.
         k = solution.t.size - bool(solution.event)
         effector = task.mechanism.end_effector
         if effector is None or not self.follows or not k:
@@ -302,27 +311,32 @@ def plan_tracking(
     Parameters
     ----------
     mechanism : Mechanism or Model
-        A model stands for its mechanism; nothing is taken from its [study].
+        Mechanism, or a model that contains it; the model's [study] is ignored.
     path : Path or str
-        A path, or with a model the name of one of its paths.
+        Path, or for a model the name of one of its paths.
     duration : float, optional
-        Of the run, dwell included [s]; the path's own by default.
+        Duration of the run, dwell included [s]; the path's own by default.
     samples : int
-        Times at which results are kept, evenly spaced, both ends among them.
+        Number of sample times at which results are kept, evenly spaced, both ends included.
     assembly : str, optional
-        Which way the mechanism is put together; the first by default.
+        Name of the assembly (assembly mode) of the mechanism; the first by default.
     orientation : float
-        Angle of the end-effector where it is a task coordinate and the path does not say it [rad].
+        Angle of the end-effector where it is a task coordinate and the path does not define it [rad].
     after : Ending or str
-        What the active motors do after the path: "free" or "hold".
+        Action of the active motors after the path: "free" or "hold".
     warning : bool
-        Whether a `ModelWarning` names points that the path takes off their beams, where `SlidingJoint.at_end` says
+        Whether a `ModelWarning` names points that the path moves off their beams, where `SlidingJoint.at_end` is
         "warn".
+
+    Returns
+    -------
+    TrackingTask
+        Task for the runs of all modes.
 
     Raises
     ------
     InputError, AssemblyError, UnreachablePathError
-        See `kinematics.follow_path`; a path that takes a sliding point off its beam, where `at_end` says "error".
+        See `kinematics.follow_path`; a path that moves a sliding point off its beam, where `at_end` is "error".
     """
     mechanism, path = _planned(mechanism, path)
     mechanism = standing(mechanism, assembly)
@@ -364,30 +378,34 @@ def simulate(
     Parameters
     ----------
     task : TrackingTask
+        Task to be run.
     mode : str or ActuationMode
-        Its name, signs ("+-+-") or motor names ("tau1,tau5").
+        Mode, by its name, signs ("+-+-") or motor names ("tau1,tau5").
     method : Method or str, optional
-        Of integration: that of the options by default; an object of `paraflex.methods` or a name in `paraflex.METHODS`.
+        Integration method, an object of `paraflex.methods` or a name in `paraflex.METHODS`; that of the options by
+        default.
     options : IntegrationOptions, optional
+        Integration options.
     after : Ending or str, optional
-        What the active motors do after the path, "free" or "hold": as the task says by default. Held, the joints of the
-        active motors are locked where they are when the path ends: see `dynamics.brake`.
+        Action of the active motors after the path, "free" or "hold"; that of the task by default. With "hold" the
+        joints of the active motors are locked at their positions when the path ends: see `dynamics.brake`.
     on_progress : callable, optional
-        Called with the time reached [s].
+        Function called with the time reached [s].
     warning : bool
-        Whether a run beyond what its model can describe issues a `ValidityWarning`, and one of implausible results a
-        `ResultWarning`; its `validity` and `doubts` hold them either way.
+        Whether a run outside the validity of its model issues a `ValidityWarning`, and one with implausible results a
+        `ResultWarning`; its `validity` and `doubts` contain the findings in any case.
 
     Returns
     -------
     TrackingRun
+        Run of the mode.
 
     Raises
     ------
     ActuationError, SingularActuationError
         The mode cannot drive the mechanism along the path.
     IntegrationError
-        The run could not be finished; it carries a TrackingRun with what was computed.
+        The run could not be finished; the error carries a TrackingRun with the results so far.
     """
     if after is not None:
         task = replace(task, after=after)
@@ -411,7 +429,7 @@ def simulate(
 
 
 def _planned(given: Mechanism | ModelWithPaths, path: Path | str) -> tuple[Mechanism, Path]:
-    """The mechanism, and the path, which may be given by its name in a model."""
+    """Return the mechanism and the path, which may be given by its name in a model."""
     mechanism = Mechanism.made_of(given)
     if not isinstance(path, str):
         return mechanism, path
@@ -449,7 +467,7 @@ def _drive_and_hold(
     options: IntegrationOptions,
     on_progress: Callable[[float], None] | None,
 ) -> TrackingRun:
-    """Drive along the path, then with the joints of the active motors locked."""
+    """Drive along the path, then continue with the joints of the active motors locked."""
     times, end = task.motion.t, task.path.duration
     count = int(np.searchsorted(times, end * (1.0 + _SAME_TIME), side="right"))
     until = times[:count]
@@ -469,7 +487,7 @@ def _drive_and_hold(
         solution = driven.followed_by(held, count, held.multipliers[:, own], braked.energy)
         holding = np.zeros((held.t.size, len(task.mechanism.motors)))
         holding[:, columns] = braked.holding(held.multipliers)
-        # The state at an event is a sample more than the task's times.
+        # The state at an event is one sample more than the times of the task.
         holding = np.concatenate([torques.evaluate(driven.t[:count]), holding[: held.t.size - bool(held.event)]])
         return TrackingRun(task, torques, condition, solution, title, holding=holding)
 
@@ -485,20 +503,20 @@ def _drive_and_hold(
 
 
 def _start(system: System, motion: RigidMotion) -> State:
-    """The state at the start of a rigid motion, undeformed."""
+    """Return the initial state of a rigid motion, undeformed."""
     q, v, _ = undeformed_at(system, motion, 0)
     return State(float(motion.t[0]), q, v)
 
 
 def undeformed_at(system: System, motion: RigidMotion, sample: int) -> tuple[Array, Array, Array]:
-    """Coordinates (n,) and their derivatives at a sample of a rigid motion, bodies undeformed."""
+    """Return coordinates (n,) and their two derivatives at a sample of a rigid motion, bodies undeformed."""
     return undeformed_motion(system, motion.system, motion.q[sample], motion.v[sample], motion.a[sample])
 
 
 def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Array:
-    """Times of a run between which the motion along a path is smooth, start and end included [s].
+    """Return the times of a run between which the motion along a path is smooth, start and end included [s].
 
-    With a mechanism those between which its loads are smooth as well.
+    With a mechanism, the times between which its loads are smooth are included as well.
     """
     knots = np.unique(np.concatenate([[0.0, end], [knot for knot in path.knots if 0.0 < knot < end]]))
     knots = knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]
@@ -506,12 +524,12 @@ def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Ar
     given = np.unique(
         [knot for law in laws for knot in law.knots if _SAME_TIME * end < knot < end * (1.0 - _SAME_TIME)]
     )
-    # Of two that are one, that of the load is kept: steps end there.
+    # Where two knots coincide, that of the load is kept, as steps end there.
     apart = np.abs(knots[:, None] - given) > _SAME_TIME * end
     return np.unique(np.concatenate([knots[apart.all(axis=1)], given]))
 
 
 def path_stops(knots: Array, mechanism: Mechanism) -> Array:
-    """Those of the knots of planned torques at which steps end: not all rows of a long table of a load."""
+    """Return the knots of planned torques at which steps must end, omitting most rows of long load tables."""
     laws = [law for load in mechanism.loads for law in load.laws]
     return knots[~np.isin(knots, [knot for law in laws for knot in set(law.knots) - set(stops(law))])]

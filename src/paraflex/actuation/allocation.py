@@ -1,8 +1,8 @@
 """Inverse dynamics of the rigid model: efforts in the null space of the constraints, torques of minimum norm.
 
-With Z the basis of admissible motions in task coordinates (Phi_q Z = 0), the motors' torques tau must satisfy
-B tau = Q, where Q = Z^T (M a + h) is the required effort and B = Z^T S_motor the actuation matrix. Of all torques of
-the active motors that do, the one of least Euclidean norm is taken.
+With Z the basis of admissible motions in task coordinates (Phi_q Z = 0), the motors' torques tau must satisfy B tau =
+Q, where Q = Z^T (M a + h) is the required effort and B = Z^T S_motor the actuation matrix. Among the torques of the
+active motors that do, those of least Euclidean norm are chosen.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ SINGULAR_RATIO = 1e-6
 
 @dataclass(frozen=True)
 class Effort:
-    """The required effort of a rigid motion, and the actuation matrix.
+    """Required effort of a rigid motion, and its actuation matrix.
 
     Attributes
     ----------
     motion : RigidMotion
+        Rigid motion at k instants.
     required : (k, tasks) array
         Q, generalised effort per task coordinate [N; N m for an angle].
     matrix : (k, tasks, motors) array
@@ -43,18 +44,19 @@ class Effort:
     matrix: Array
 
     def active(self, mode: ActuationMode) -> NDArray[np.bool_]:
-        """The motors that a mode drives (motors,)."""
+        """Whether a mode drives each motor (motors,)."""
         return np.array([motor.name in mode.motors for motor in self.motion.mechanism.motors], dtype=bool)
 
 
 def required_effort(motion: RigidMotion, *, before: bool = False) -> Effort:
-    """Effort and actuation matrix of a rigid motion, under gravity, loads, springs, dampers and friction.
+    """Compute effort and actuation matrix of a rigid motion, under gravity, loads, springs, dampers and friction.
 
     Parameters
     ----------
     motion : RigidMotion
+        Rigid motion at k instants.
     before : bool
-        With loads as they are just before each instant, where they may jump.
+        Whether loads that jump at an instant have their values just before it.
     """
     system = motion.system
     forces, acting = apart(motion.q.shape), acting_loads(motion.mechanism, motion.t, before=before)
@@ -65,13 +67,13 @@ def required_effort(motion: RigidMotion, *, before: bool = False) -> Effort:
 
 
 def motor_rows(motion: RigidMotion) -> Array:
-    """Derivatives (k, n, motors) of the motors' joint coordinates by all coordinates."""
+    """Return the derivatives (k, n, motors) of the motors' joint coordinates by all coordinates."""
     rows = [joint_coordinate(motion.system, motor.joint, motion.q).rows for motor in motion.system.mechanism.motors]
     return np.stack(rows, axis=2) if rows else np.zeros((*motion.q.shape, 0))
 
 
 def add_springs_and_dampers(motion: RigidMotion, forces: Array) -> None:
-    """Add the forces against springs, dampers, back-EMF and friction at joints to forces (k, n)."""
+    """Add to forces (k, n) those needed against springs, dampers, back-EMF and friction at joints."""
     for spring in motion.mechanism.springs:
         value, _, rows = joint_coordinate(motion.system, spring.joint, motion.q)
         forces += (spring.stiffness * (value - spring.rest))[:, None] * rows
@@ -84,7 +86,7 @@ def add_springs_and_dampers(motion: RigidMotion, forces: Array) -> None:
 
 
 def actuation_condition(effort: Effort, mode: ActuationMode) -> Array:
-    """Condition number (k,) of the actuation matrix of a mode's motors; infinite where it loses rank."""
+    """Return the condition number (k,) of the actuation matrix of a mode's motors; infinite where it loses rank."""
     values = _singular_values(effort, mode)
     with np.errstate(divide="ignore"):
         return np.where(values[:, -1] > 0.0, values[:, 0] / values[:, -1], np.inf)
@@ -95,14 +97,14 @@ PAST_SINGULAR = "move the path, or add motors to the mode"
 
 
 def allocate(effort: Effort, mode: ActuationMode) -> Array:
-    """Torques (k, motors) of minimum norm over a mode's motors, zero for the passive ones [N m].
+    """Compute torques (k, motors) of minimum norm over a mode's motors, zero for the passive ones [N m].
 
     Raises
     ------
     ActuationError
         The mode has too few motors, or its motors cannot drive the mechanism anywhere on the path.
     SingularActuationError
-        The path meets a Type II singularity of the mode: it names time and position.
+        The path meets a Type II singularity of the mode, at the time and position that the error names.
     """
     check_mode(effort, mode)
     active = effort.active(mode)
@@ -129,7 +131,7 @@ def check_mode(effort: Effort, mode: ActuationMode) -> None:
             "degrees of freedom",
             remedy="choose other motors, or add motors to the mode",
         )
-    # A square matrix that passes through a singularity between two instants shows it by the sign of its determinant.
+    # A square matrix that becomes singular between two instants changes the sign of its determinant.
     if count == tasks:
         sign = np.sign(np.linalg.det(effort.matrix[:, :, effort.active(mode)]))
         singular[1:] |= sign[1:] != sign[:-1]

@@ -1,4 +1,4 @@
-"""Currents and voltages of motors in a run, by the actuators that they are."""
+"""Currents and voltages of motors in a run, from the parameters of their actuators."""
 
 from __future__ import annotations
 
@@ -14,32 +14,34 @@ from paraflex.dynamics import System, joint_coordinate
 from paraflex.findings import Finding
 from paraflex.mechanism import ActuationMode, Actuator, Mechanism, actuators_by_motor
 
-# Beyond a limit by less than this part is what speed and lag change between two instants of a controller.
+# Limits exceeded by less than this fraction are not reported: speed and lag change that much between a controller's
+# samples.
 _BEYOND = 0.1
-# Torques of back-EMF that come late by L/R, as a part of the largest torque, that matter.
+# Change of the back-EMF torque within L/R above which its neglected delay is reported, as a fraction of the largest
+# torque.
 _LATE = 0.01
 
 
 @dataclass(frozen=True)
 class Electrical:
-    """Currents and voltages of all motors in a run; NaN of a motor whose actuator does not tell them.
+    """Currents and voltages of all motors in a run; NaN for a motor whose actuator does not define them.
 
     Attributes
     ----------
     motors : tuple of str
-        All of the mechanism.
+        All motors of the mechanism.
     t : (k,) array
-        [s]
+        Sample times [s].
     torque : (k, motors) array
-        At the joints, n k_t i: back-EMF is taken off where the amplifier imposes the voltage [N m, N].
+        Torque at the joint, n k_t i; back-EMF is subtracted where the amplifier imposes the voltage [N m, N].
     rate : (k, motors) array
-        Of the joints [rad/s, m/s].
+        Rate of the joint [rad/s, m/s].
     current : (k, motors) array
-        i [A].
+        Current i [A].
     voltage : (k, motors) array
-        u; under a current loop R i + n k_e w + L i', where currents that jump have no i' [V].
+        Voltage u; under a current loop R i + n k_e w + L i', where jumps of the current contribute no i' [V].
     resistance : (motors,) array
-        R [ohm].
+        Resistance R of the windings [ohm].
     """
 
     motors: tuple[str, ...]
@@ -57,36 +59,37 @@ class Electrical:
 
     @property
     def copper_loss(self) -> Array:
-        """Heat of the windings R i^2 (k, motors) [W]."""
+        """Copper loss R i^2 (k, motors) [W]."""
         return self.resistance * self.current**2
 
     @property
     def energy(self) -> Array:
-        """What the amplifiers gave (motors,), from the samples [J]."""
+        """Energy from the amplifiers (motors,), integrated over the samples [J]."""
         return scipy.integrate.trapezoid(self.power, self.t, axis=0)
 
     @property
     def copper_energy(self) -> Array:
-        """Heat of the windings (motors,), from the samples [J]."""
+        """Heat of the windings (motors,), integrated over the samples [J]."""
         return scipy.integrate.trapezoid(self.copper_loss, self.t, axis=0)
 
     @property
     def rms_current(self) -> Array:
-        """Root mean square of the currents in time (motors,), to be compared with the continuous one [A]."""
+        """Root mean square of the currents over time (motors,), to be compared with the continuous current [A]."""
         square = scipy.integrate.trapezoid(self.current**2, self.t, axis=0)
         return np.sqrt(square / (self.t[-1] - self.t[0])) if self.t.size > 1 else np.abs(self.current[0])
 
 
 def electrical(system: System, mechanism: Mechanism, run: Any) -> Electrical:
-    """Currents and voltages in a run.
+    """Compute the currents and voltages in a run.
 
     Parameters
     ----------
     system : System
+        Equations of motion of the run.
     mechanism : Mechanism
-        As described, with actuators.
+        Mechanism as described, with actuators.
     run : TrackingRun or MotionRun
-        Its torques `applied`, and those `commanded` where they are others.
+        Run with torques `applied`, and `commanded` if these differ.
     """
     applied = run.applied
     k = min(len(applied), run.solution.t.size)
@@ -107,7 +110,7 @@ def electrical(system: System, mechanism: Mechanism, run: Any) -> Electrical:
 
 
 def _of_motor(actuator: Actuator | None, applied: Array, commanded: Array, rate: Array) -> tuple[Any, Any, Any]:
-    """Torque, current and voltage (k,) of a motor from torques as they act and as they were given."""
+    """Return torque, current and voltage (k,) of a motor from its acting and its commanded torques."""
     if actuator is None or actuator.torque_per_current is None or actuator.voltage_per_rate is None:
         return applied, np.nan, np.nan
     torque = applied - actuator.damping * rate
@@ -124,7 +127,7 @@ def _of_motor(actuator: Actuator | None, applied: Array, commanded: Array, rate:
 def electrical_findings(
     mechanism: Mechanism, found: Electrical, mode: ActuationMode | None = None
 ) -> Iterator[Finding]:
-    """Limits of amplifiers that a run goes beyond, passive motors that brake, and back-EMF that acts too early."""
+    """Yield findings on exceeded amplifier limits, passive motors that brake, and back-EMF that acts too early."""
     for k, motor in enumerate(found.motors):
         actuator = actuators_by_motor(mechanism).get(motor)
         if actuator is not None and mode is not None and motor not in mode.motors and actuator.damping:
@@ -153,7 +156,7 @@ def _beyond(actuator: Actuator, motor: str, current: Array, voltage: Array) -> I
 
 
 def _late(actuator: Actuator, motor: str, found: Electrical, k: int) -> Iterator[Finding]:
-    """Back-EMF acts at once, as damping; through an inductance it comes late by about L/R."""
+    """Yield a finding if the delay of back-EMF by L/R matters, as the model's back-EMF damps without delay."""
     if not (actuator.imposes_voltage and actuator.inductance) or found.t.size < 3:
         return
     late = actuator.damping * actuator.electrical_time * float(np.max(np.abs(np.gradient(found.rate[:, k], found.t))))

@@ -1,4 +1,4 @@
-"""Torques as smooth functions of time: splines between the path's knots, fine enough to be exact to the tolerance."""
+"""Torques as smooth functions of time: splines between the path's knots, exact to the tolerance."""
 
 from __future__ import annotations
 
@@ -18,31 +18,32 @@ from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode
 
 _DEGREE = 5
-# The spline's largest error, as a fraction of the peak torque of the run.
+# Largest error of the spline, as a fraction of the peak torque of the run.
 _SPLINE_ERROR = 1e-8
-# Least factor by which half the interval reduces the error: 2^6 for smooth torques.
+# Least factor by which halving the interval reduces the error; it is 2^6 for smooth torques.
 _ERROR_FALL = 32.0
-# Points of a smooth interval to begin with, at least, and seconds between them at most.
+# Initial grid: least number of points of a smooth interval, and largest spacing [s].
 _FEWEST_POINTS, _LONGEST_SPACING = 12, 2e-3
 _REFINEMENTS = 6
-# Delayed breaks nearer than this part of the run are one.
+# Delayed breaks closer than this fraction of the run are merged.
 _SAME_TIME = 1e-12
 _IN_TIME = ("t", "q", "v", "a", "basis")
 
 
 @dataclass(frozen=True)
 class FeedForward:
-    """The torques of a mode as functions of time.
+    """Torque profiles of a mode.
 
     Attributes
     ----------
     mode : ActuationMode
+        Mode whose motors give the torques.
     signals : tuple of InputSignals
-        One a motor, zero for passive ones [N m].
+        Signal of each motor, zero for passive ones [N m].
     knots : (j,) array
         Times between which the torques are smooth [s].
     times : (k,) array
-        Through whose torques the splines go, the knots among them [s].
+        Interpolation times of the splines, knots included [s].
     """
 
     mode: ActuationMode
@@ -51,7 +52,7 @@ class FeedForward:
     times: Array
 
     def evaluate(self, t: Array) -> Array:
-        """Torques (k, motors) at times t [N m]."""
+        """Return the torques (k, motors) at times t [N m]."""
         columns = []
         for signal in self.signals:
             piece = np.clip(np.searchsorted(signal.breaks, t, side="right") - 1, 0, len(signal.coefficients) - 1)
@@ -60,12 +61,12 @@ class FeedForward:
         return np.column_stack(columns)
 
     def shaped(self, delays: Array, weights: Array) -> FeedForward:
-        """The sum of these torques at earlier times, each with its weight; before the first instant its torque holds.
+        """Return the weighted sum of delayed copies of these torques; before the first instant its torque holds.
 
         Parameters
         ----------
         delays, weights : (i,) arrays
-            Delays from zero [s]; the torques end when they did, whatever is left of those delayed.
+            Delays from zero [s], and weights. The torques keep their end time, at which delayed copies are cut off.
         """
         return FeedForward(
             self.mode,
@@ -76,7 +77,7 @@ class FeedForward:
 
 
 def _delayed(times: Array, delays: Array) -> Array:
-    """Times (k,) with each delay added, in order; those that are one to rounding once, and none after the last."""
+    """Return times (k,) with each delay added, sorted, merged where equal to rounding, and cut off at the last time."""
     end = times[-1]
     every = np.unique(np.minimum(times[:, None] + delays, end))
     apart = np.diff(every, prepend=-np.inf) > _SAME_TIME * (end - times[0])
@@ -84,7 +85,7 @@ def _delayed(times: Array, delays: Array) -> Array:
 
 
 def _shaped(signal: InputSignals, delays: Array, weights: Array) -> InputSignals:
-    """The sum of delayed copies of a piecewise polynomial, exact: pieces between all delayed breaks."""
+    """Return the sum of delayed copies of a piecewise polynomial, exactly: with pieces between all delayed breaks."""
     breaks = _delayed(signal.breaks, delays)
     middle, coefficients = 0.5 * (breaks[1:] + breaks[:-1]), np.zeros((breaks.size - 1, _DEGREE + 1))
     for delay, weight in zip(delays, weights, strict=True):
@@ -98,7 +99,7 @@ def _shaped(signal: InputSignals, delays: Array, weights: Array) -> InputSignals
 
 
 def about(coefficients: Array, places: Array) -> Array:
-    """Coefficients (k, 6) of polynomials about other places (k,): Horner's scheme, repeated."""
+    """Return the coefficients (k, 6) of polynomials about other origins (k,), by repeated Horner's scheme."""
     out = coefficients.T.copy()
     for order in range(_DEGREE):
         for power in range(_DEGREE - 1, order - 1, -1):
@@ -113,16 +114,16 @@ class TorquePlan:
     Attributes
     ----------
     fine : Effort
-        Every other instant of it is one of a coarse grid, whose spline is checked against those between; then the
-        fine grid is the spline's own.
+        Effort on the grid of the splines. Every other instant of it belongs to a coarse grid, whose spline is checked
+        against the instants between.
     knots : (j,) array
         Times between which the motion is smooth [s].
     follow : callable
-        Gives the rigid motion at any times, to refine.
+        Function that returns the rigid motion at any times, for refinement.
     jumping : Effort or None
-        Just before each knot, where loads change in time; else it is that at the knot.
+        Effort just before each knot where loads change in time; None if it is continuous.
     finer : list of Effort
-        Found when a mode asked for them: kept, for the others will too.
+        Efforts on refined grids, computed when a mode needs them and kept for the other modes.
     """
 
     fine: Effort
@@ -132,7 +133,7 @@ class TorquePlan:
     finer: list[Effort] = field(default_factory=list, repr=False, compare=False)
 
     def feed_forward(self, mode: ActuationMode) -> FeedForward:
-        """Torques of a mode, minimum norm, as smooth functions of time.
+        """Compute the torques of a mode, of minimum norm, as smooth functions of time.
 
         Raises
         ------
@@ -159,26 +160,26 @@ class TorquePlan:
         )
 
     def _effort(self, refined: int) -> Effort:
-        """Effort on the fine grid with every interval halved a number of times."""
+        """Return the effort on the fine grid with every interval halved a number of times."""
         efforts = [self.fine, *self.finer]
         while len(efforts) <= refined:
             t = efforts[-1].motion.t
             between = required_effort(self.follow(0.5 * (t[1:] + t[:-1])))
             efforts.append(_interleaved(efforts[-1], between))
-        # Modes in other threads may compute the same; either result may be kept.
+        # Another thread may compute the same for its mode; either result may be kept.
         self.finer[:] = max(self.finer, efforts[1:], key=len)
         return efforts[refined]
 
 
 def plan_torques(follow: Callable[[Array], RigidMotion], knots: Array) -> TorquePlan:
-    """Efforts of a rigid motion on grids for `TorquePlan.feed_forward`.
+    """Compute the efforts of a rigid motion on grids for `TorquePlan.feed_forward`.
 
     Parameters
     ----------
     follow : callable
-        Gives the rigid motion at times (k,).
+        Function that returns the rigid motion at times (k,).
     knots : (j,) array
-        Times between which the motion is smooth, its start and end among them [s].
+        Times between which the motion is smooth, start and end included [s].
     """
     intervals = [
         np.linspace(a, b, max(_FEWEST_POINTS, int(np.ceil((b - a) / _LONGEST_SPACING)) + 1)) for a, b in pairwise(knots)
@@ -189,7 +190,7 @@ def plan_torques(follow: Callable[[Array], RigidMotion], knots: Array) -> Torque
 
 
 def _before(motion: RigidMotion, knots: Array) -> Effort | None:
-    """The effort just before each knot of a motion, where loads change in time."""
+    """Return the effort just before each knot of a motion whose loads change in time; else None."""
     if not any(load.laws for load in motion.mechanism.loads):
         return None
     at = np.searchsorted(motion.t, knots)
@@ -197,14 +198,14 @@ def _before(motion: RigidMotion, knots: Array) -> Effort | None:
 
 
 def _alternating(a: Array, b: Array) -> Array:
-    """Rows of one array (k + 1, ...) and of another (k, ...) between them."""
+    """Return an array (k + 1, ...) interleaved with the rows of another (k, ...)."""
     out = np.empty((len(a) + len(b), *a.shape[1:]))
     out[::2], out[1::2] = a, b
     return out
 
 
 def _interleaved(effort: Effort, between: Effort) -> Effort:
-    """Efforts at the instants and between them, in order of time."""
+    """Return an effort interleaved with that at the instants between, in order of time."""
     parts = {name: _alternating(getattr(effort.motion, name), getattr(between.motion, name)) for name in _IN_TIME}
     return Effort(
         replace(effort.motion, **parts),
@@ -214,16 +215,18 @@ def _interleaved(effort: Effort, between: Effort) -> Effort:
 
 
 def splines(t: Array, values: Array, knots: Array, before: Array | None = None) -> list[InputSignals]:
-    """A quintic spline of each column between neighbouring knots, joined.
+    """Return quintic splines of the columns between neighbouring knots, joined to one signal per column.
 
     Parameters
     ----------
     t : (k,) array
-        Knots among them [s].
+        Times, knots included [s].
     values : (k, columns) array
+        Values at these times.
     knots : (j,) array
+        Times at which the splines are joined [s].
     before : (j, columns) array, optional
-        Values just before each knot, where they may jump.
+        Values just before each knot, where they may jump; continuous by default.
     """
     breaks, coefficients = [], []
     edges = np.searchsorted(t, knots)

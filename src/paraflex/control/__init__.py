@@ -1,6 +1,6 @@
-"""Simulations one can step, sampled controllers, and laws for them.
+"""Simulation in steps, sampled controllers, and control laws.
 
-Names are imported when they are first used: model files with controllers are read without what runs them.
+Names are imported on first use, so that model files with controllers are read without the modules that run them.
 """
 
 import lazy_loader

@@ -11,18 +11,18 @@ from paraflex.arrays import Array
 from paraflex.dynamics import InputSignals, System, joint_coordinate, piecewise_quintic
 from paraflex.mechanism import Actuator, Mechanism, actuators_by_motor
 
-# Largest error of the quintic pieces of an exponential, as a part of the change of the torque, and where they end: what
-# is then left is as small. Of an interval h, in time constants, the error is h^6/46080 of what is left at its start.
+# Largest error of the quintic pieces of an exponential, as a fraction of the change of the torque. The pieces end where
+# the remainder is as small. On an interval h, in time constants, the error is h^6/46080 of the remainder at its start.
 _PIECE_ERROR = 1e-10
 _RELAXED = -np.log(_PIECE_ERROR)
 
 
-# Spacing of times that no run comes to [s].
+# Spacing of unused times, beyond the end of any run [s].
 _NEVER = 1e12
 
 
 def _breaks() -> Array:
-    """Breaks of the pieces, in time constants: longer ones the less is left."""
+    """Return the breaks of the pieces, in time constants; pieces grow longer as the exponential decays."""
     breaks = [0.0]
     while breaks[-1] < _RELAXED:
         breaks.append(breaks[-1] + (46080.0 * _PIECE_ERROR) ** (1.0 / 6.0) * np.exp(breaks[-1] / 6.0))
@@ -30,14 +30,19 @@ def _breaks() -> Array:
 
 
 _BREAKS = _breaks()
-# Coefficients of exp(-x) in these pieces, and of nothing after them.
+# Coefficients of exp(-x) in these pieces, and zero after them.
 _LEFT = np.vstack([
     piecewise_quintic(_BREAKS, np.exp(-_BREAKS), -np.exp(-_BREAKS), np.exp(-_BREAKS)).coefficients, np.zeros((1, 6)),
 ])  # fmt: skip
 
 
 class Amplifiers:
-    """What the amplifiers of a mechanism do to torques, motor by motor; nothing to those without an actuator.
+    """Amplifiers of a mechanism: limits and lags of torques by motor; motors without an actuator have neither.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Mechanism with its actuators.
 
     Attributes
     ----------
@@ -58,14 +63,14 @@ class Amplifiers:
         self.limited: np.ndarray = np.isfinite(self._voltage) | np.isfinite(self._current)
 
     def rates(self, system: System, q: Array, v: Array) -> Array:
-        """Rates of the joints of all motors (motors,) at coordinates and velocities (n,) [rad/s, m/s]."""
+        """Return the joint rates of all motors (motors,) at coordinates and velocities (n,) [rad/s, m/s]."""
         return np.array([joint_coordinate(system, name, q[None], v[None]).rate[0] for name in self._joints])
 
     def limits(self, rates: Array) -> tuple[Array, Array]:
-        """Lowest and highest commands (motors,) at rates of the joints [N m, N].
+        """Return the lowest and highest commands (motors,) at given joint rates [N m, N].
 
-        Of u = R i + n k_e w the voltage within the amplifier's limit, and so the current. The command of a voltage is
-        the torque n k_t u/R that it would give at rest.
+        The voltage u = R i + n k_e w and the current i stay within the amplifier's limits. Where the amplifier imposes
+        the voltage, the command is the torque n k_t u/R that the voltage would give at rest.
         """
         per_current, resistance = self._per_current, self._resistance
         back = self._per_rate * rates
@@ -80,7 +85,7 @@ class Amplifiers:
 
 
 def _numbers(actuator: Actuator | None) -> tuple[float, float, float, float, float]:
-    """N k_t, n k_e, R and the limits of voltage and current; of what is not known such that it limits nothing."""
+    """Return n k_t, n k_e, R and the limits of voltage and current, with values that limit nothing for unknown ones."""
     if actuator is None or actuator.torque_per_current is None or actuator.voltage_per_rate is None:
         return 1.0, 0.0, 1.0, inf, inf
     voltage, current = (inf if one is None else one for one in (actuator.voltage_limit, actuator.current_limit))
@@ -89,9 +94,9 @@ def _numbers(actuator: Actuator | None) -> tuple[float, float, float, float, flo
 
 
 def largest_commands(mechanism: Mechanism, motors: tuple[str, ...]) -> Array:
-    """Largest torques (motors,) that amplifiers take as commands, whatever the speed; infinite without a limit.
+    """Return the largest commands (motors,) of amplifiers at any speed [N m, N]; infinite without a limit.
 
-    n k_t I under a current loop, n k_t U/R of a voltage.
+    They are n k_t I under a current loop, n k_t U/R where the amplifier imposes the voltage.
     """
     found, largest = actuators_by_motor(mechanism), []
     for actuator in map(found.get, motors):
@@ -102,22 +107,23 @@ def largest_commands(mechanism: Mechanism, motors: tuple[str, ...]) -> Array:
 
 
 def relaxing(base: InputSignals, t: float, begin: float, target: float, lag: float) -> InputSignals:
-    """A signal plus a torque that relaxes exponentially from one value to another, from a time on.
+    """Add to a signal a torque that relaxes exponentially from one value to another.
 
     Parameters
     ----------
     base : InputSignals
+        Signal to which the torque is added.
     t : float
-        From when on the sum is wanted, before the end of the signal [s].
+        Time at which the torque begins and from which on the sum is returned, before the end of the signal [s].
     begin, target : float
-        [N m, N]
+        Initial and final value of the torque [N m, N].
     lag : float
         Time constant [s].
 
     Returns
     -------
     InputSignals
-        Exact but for 1e-10 of the change.
+        Sum, exact to 1e-10 of the change.
     """
     own, end = t + lag * _BREAKS, base.breaks[-1]
     first, last = np.searchsorted(base.breaks, (t, min(own[-1], end)), side="right")
@@ -135,7 +141,15 @@ def relaxing(base: InputSignals, t: float, begin: float, target: float, lag: flo
 
 
 def with_room(signal: InputSignals, pieces: int | None = None) -> InputSignals:
-    """A signal with more pieces, which no time comes to: so many as `relaxing` needs for it, or a number in all."""
+    """Return a signal padded with unused pieces, beyond the times of any run.
+
+    Parameters
+    ----------
+    signal : InputSignals
+        Signal to be padded.
+    pieces : int, optional
+        Total number of pieces; by default as many are added as `relaxing` needs.
+    """
     more = _BREAKS.size + 2 if pieces is None else pieces - len(signal.coefficients)
     breaks = np.concatenate([signal.breaks[:-1], _NEVER * np.arange(1.0, more + 2.0)])
     return InputSignals(breaks, np.vstack([signal.coefficients, np.zeros((more, signal.coefficients.shape[1]))]))

@@ -1,6 +1,7 @@
-"""What stands between a mechanism and a control law in a real controller, in this order.
+"""Signal chain between a mechanism and a control law, as in a real controller.
 
-Sample, quantise, filter, law, saturate, limit the rate, delay, hold: the last two are of the loop that runs it.
+The order is: sample, quantise, filter, law, saturate, limit the rate, delay, hold. The delay and the hold belong to the
+loop that runs the controller.
 """
 
 from __future__ import annotations
@@ -33,16 +34,16 @@ Limit = float | tuple[float, float]
 
 
 class ChainSample(NamedTuple):
-    """One sample of a controller with its chain.
+    """Signals of one sample of a controller with its chain.
 
     Attributes
     ----------
     readings : (inputs,) array
-        Quantised and filtered: what the law is given, before references are taken off.
+        Readings after quantisation and filters, before references are subtracted.
     wanted : (outputs,) array
-        Torques of the law.
+        Torques that the law returns.
     given : (outputs,) array
-        Those within the limits, which act after the delay.
+        Torques after saturation and rate limiting, which act after the delay.
     """
 
     readings: Array
@@ -51,51 +52,51 @@ class ChainSample(NamedTuple):
 
 
 class SampledController:
-    """A control law with what a real controller has around it: a `Controller`.
+    """Control law with the signal chain of a real controller: a `Controller`.
 
-    At every sample its sensors are read, the readings quantised and filtered, references taken off; then come the law,
-    limits of the torques and of their rates.
+    At every sample its sensors are read, the readings are quantised and filtered, and references are subtracted. Then
+    the law is evaluated, and the torques and their rates are limited.
 
     Parameters
     ----------
     law : object
-        A discrete model of python-control or SciPy, from readings to torques, a state space or a transfer function; a
-        function of (k, t, y), with y (inputs,) the readings of sample k at time t, that returns torques (outputs,); or
-        an object with such a method `step`. It may have `start(plant)`, which is called first, `limited(torques)`,
-        which is told the torques within the limits, any of the attributes below, `whole_torque` if no planned torque is
-        to act besides, and `absolute` if it takes readings without a reference.
+        Control law: a discrete model of python-control or SciPy from readings to torques, as state space or transfer
+        function; a function of (k, t, y), with y (inputs,) the readings of sample k at time t, that returns torques
+        (outputs,); or an object with such a method `step`. The object may have `start(plant)`, which is called first,
+        `limited(torques)`, which receives the torques after limits, any of the attributes below, `whole_torque` if no
+        planned torque may act as well, and `absolute` if it takes readings without a reference.
     period : float, optional
-        Of sampling [s].
+        Sampling period [s]; the law's own by default.
     delay : float
-        From a sample until its torques act [s].
+        Delay from a sample until its torques act [s]; the law's own by default, else zero.
     inputs : sequence of str, optional
         Sensors. By default the law's own, or the names of a model's inputs, else the encoders of the mode's motors.
     outputs : sequence of str, optional
-        Motors. By default the law's own, or the names of a model's outputs, else all of the mode.
+        Motors. By default the law's own, or the names of a model's outputs, else all motors of the mode.
     reference : mapping of str to float or callable, "plan", "open-loop", or a run, optional
-        What is taken off the readings of sensors: numbers, functions of time, the values on the planned motion of
-        all that it tells (angles and travels of joints, their rates, and the end-effector's coordinates), what sensors
-        read where the planned torques alone drive the mechanism, as it is flexible, or in another run. By default the
-        law's own.
+        Reference that is subtracted from the readings: numbers or functions of time by sensor; "plan", the values on
+        the planned motion (angles and travels of joints, their rates, and the end-effector's coordinates); "open-loop",
+        the readings where the planned torques alone drive the flexible mechanism; or the readings in another run. The
+        law's own by default.
     quantise : float or mapping of str to float, optional
-        Resolution of readings, of all or by sensor: they are rounded to its multiples.
+        Resolution of all readings or by sensor, to whose multiples they are rounded; not quantised by default.
     filters : mapping of str to Filter, optional
-        By sensor: cut-off frequency of a low-pass of first order [Hz], or coefficients (numerator, denominator) in
-        descending powers of s. It starts settled at the first reading, and takes readings for straight lines between
-        samples.
+        Filters by sensor: cut-off frequency of a first-order low-pass filter [Hz], or coefficients (numerator,
+        denominator) in descending powers of s. A filter starts in steady state at the first reading, and is sampled
+        with a first-order hold (readings are linear between samples).
     limits : float, pair or mapping of str to either, optional
-        Of torques, of all or by motor: their largest magnitude, or (lowest, highest) [N m, N]; never beyond what the
-        motors' amplifiers take, n k_t I or n k_t U/R.
+        Limits of all torques or by motor: largest magnitude, or (lowest, highest) [N m, N]. They never exceed the
+        limits of the motors' amplifiers, n k_t I or n k_t U/R.
     rates : float or mapping of str to float, optional
-        Largest change of torques in a second [N m/s, N/s].
+        Largest rates of the torques [N m/s, N/s]; unlimited by default.
     name : str
-        In results and errors.
+        Name in results and errors.
 
     Raises
     ------
     InputError
-        A number that makes no sense, a continuous model, or one with other numbers of inputs and outputs. Of names that
-        the mechanism does not have as it starts.
+        A number out of range, a continuous model, or one with other numbers of inputs and outputs. Names that the
+        mechanism does not have are reported when the controller starts.
     """
 
     @checked_arguments()
@@ -136,15 +137,20 @@ class SampledController:
             self.law.check(self.inputs, self.outputs, self.period)
 
     def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[Any], ...]:
-        """Components around the law, in the order of sensors and motors; None where there is nothing.
+        """Return the components of the chain in the order of sensors and motors, None where there is none.
 
-        Resolution of readings, their filters (numerator, denominator), limits (lowest, highest) of torques [N m, N] and
-        of their rates [N m/s, N/s].
+        They are the resolutions of readings, their filters (numerator, denominator), the limits (lowest, highest) of
+        torques [N m, N], and the limits of their rates [N m/s, N/s].
+
+        Parameters
+        ----------
+        inputs, outputs : sequence of str
+            Sensors and motors.
 
         Raises
         ------
         InputError
-            Other names, or numbers that make no sense.
+            Unknown names, or numbers out of range.
         """
         return (
             _in_order(self.quantise, inputs, "quantise", "sensor", partial(checked_number, unit="the sensor's unit")),
@@ -154,7 +160,7 @@ class SampledController:
         )
 
     def start(self, plant: Plant) -> None:
-        """See `Controller`.
+        """Prepare for a run: see `Controller.start`.
 
         Raises
         ------
@@ -172,32 +178,32 @@ class SampledController:
         if hasattr(self.law, "start"):
             resolution = tuple(self.resolution.tolist())
             self.law.start(replace(plant, resolution=resolution) if any(resolution) else plant)
-        # What the law holds an equilibrium with acts before the first sample.
+        # Torques with which the law holds an equilibrium act from before the first sample.
         self.holding_torques: Array = np.clip(getattr(self.law, "holding_torques", 0.0), self._lowest, self._highest)
         self._given: Array = self.holding_torques
 
     @property
     def whole_torque(self) -> bool:
-        """Whether its law gives the whole torque, so that no planned torque acts besides."""
+        """Whether the law gives the whole torque, so that no planned torque acts as well."""
         return bool(getattr(self.law, "whole_torque", False))
 
     @property
     def title(self) -> str:
-        """What its law is, in a few words."""
+        """Short description of the law."""
         return str(getattr(self.law, "title", type(self.law).__name__))
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Lowest and highest torques (outputs, 2), and their largest changes in a second (outputs,), once started."""
+        """Lowest and highest torques (outputs, 2), and largest rates (outputs,); available once started."""
         return np.stack([self._lowest, self._highest], axis=1), self._most / self.period
 
     @property
     def filter_models(self) -> list[StateSpace | None]:
-        """Filters of readings as discrete models, once started."""
+        """Filters of the readings as discrete models; available once started."""
         return [None if each is None else each.model for each in self._filters]
 
     def step(self, k: int, t: float, y: Array) -> Any:
-        """See `Controller`."""
+        """Evaluate the chain and the law at a sample: see `Controller.step`."""
         y = rounded(np.array(y, dtype=float), self.resolution)
         for i, filtered in enumerate(self._filters):
             if filtered is not None:
@@ -208,10 +214,10 @@ class SampledController:
                 errors[i] -= reference(t)
         said = self.law.step(k, t, errors)
         if said is None:
-            return None  # Which as a number would be NaN.
+            return None  # As a float array it would be NaN.
         wanted = real_numbers(said)
         if wanted is None:
-            return said  # The loop says what is wrong with it.
+            return said  # The loop reports the error.
         if wanted.shape != self._given.shape or not np.all(np.isfinite(wanted)):
             return wanted
         given = np.clip(wanted, self._lowest, self._highest)
@@ -224,7 +230,7 @@ class SampledController:
 
 
 class _Function:
-    """A function as a law."""
+    """Adapter from a function to a law with a method `step`."""
 
     def __init__(self, function: Callable[[int, float, Array], Any]) -> None:
         self.step = function
@@ -233,14 +239,14 @@ class _Function:
 
 
 def as_law(given: Any) -> Any:
-    """A law from what is taken for one: see `SampledController`.
+    """Return the law for an object that is accepted as one: see `SampledController`.
 
     Raises
     ------
     InputError
-        Anything else, or a continuous model.
+        Any other object, or a continuous model.
     """
-    # Models of SciPy have a method "step" as well, their response to one.
+    # Models of SciPy have a method "step" as well, their step response.
     if is_model(given):
         return discrete_model(given)
     if callable(getattr(given, "step", None)) and not inspect.isclass(given):
@@ -254,7 +260,7 @@ def as_law(given: Any) -> Any:
 
 
 class _SettledFilter:
-    """A transfer function of a sampled signal, settled at its first value."""
+    """Transfer function of a sampled signal, in steady state at its first value."""
 
     def __init__(self, given: tuple[Array, Array], period: float) -> None:
         continuous = scipy.signal.tf2ss(*given)
@@ -270,13 +276,13 @@ class _SettledFilter:
 
 
 def _in_order(given: Any, names: Sequence[str], field: str, what: str, take: Callable[[Any, str], Any]) -> list[Any]:
-    """What is given for all, or by name, in the order of the names; None for the others."""
+    """Return values in the order of the names, from one value for all or values by name; None for names without one."""
     found = {} if given is None else by_name(given, names, field, what, take)
     return [found.get(name) for name in names]
 
 
 def _range(value: Any, field: str) -> tuple[float, float]:
-    """The lowest and the highest torque, from a pair or from their largest magnitude."""
+    """Return the lowest and the highest torque, from such a pair or from the largest magnitude."""
     if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
         most = checked_number(value, field, "N m or N")
         return -most, most

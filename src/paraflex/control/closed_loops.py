@@ -1,4 +1,4 @@
-"""A sampled linear plant with a linear controller: poles, sensitivity, and the same over several models."""
+"""Closed loop of a sampled linear plant and controller: poles, sensitivity, and comparison over several models."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Complex = NDArray[np.complex128]
-# Poles on the unit circle are found that near to it.
+# Accuracy of poles on the unit circle.
 _ON_CIRCLE = 1e-9
-# Angles about those of poles, in distances of these from the circle; others; the largest turn from one to the next, and
-# the least distance, of a pole on the circle.
+# Angles about those of the poles, in units of their distance from the circle; number of further angles; largest phase
+# change between neighbouring angles, and least spacing of angles, for poles on the circle.
 _ABOUT, _GRID, _TURN, _NARROW = np.array([-8.0, -3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0, 8.0]), 400, 0.5, 1e-12
-# Delay margins are sought up to so many periods, in steps of this part of one.
+# Delay margins are sought up to this number of periods, in steps of this fraction of a period.
 _LATEST, _STEP = 200, 0.25
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """A sampled plant whose torques follow from its readings, u = controller(y).
+    """Sampled plant in feedback with a linear controller, u = controller(y).
 
     Attributes
     ----------
     plant : SampledPlant
-        With the controller's motors as inputs and its sensors as outputs, in its order.
+        Plant with the controller's motors as inputs and its sensors as outputs, in its order.
     controller : StateSpace
-        Discrete: from readings to torques, signs included.
+        Discrete controller from readings to torques, signs included.
     model : object
-        The continuous model, if the plant was made from one.
+        Continuous model, if the plant was made from one; else None.
     """
 
     plant: SampledPlant
@@ -59,7 +59,7 @@ class ClosedLoop:
 
     @cached_property
     def A(self) -> Array:
-        """Of the plant's states, then the controller's (n, n)."""
+        """State matrix (n, n) of the loop: states of the plant, then of the controller."""
         plant, law = self.plant, self.controller
         return np.block([
             [plant.A + plant.B @ law.D @ plant.C, plant.B @ law.C],
@@ -74,17 +74,17 @@ class ClosedLoop:
 
     @property
     def spectral_radius(self) -> float:
-        """The largest magnitude of the poles: below one, the loop is stable."""
+        """Largest magnitude of the poles; the loop is stable if it is below one."""
         return float(np.max(np.abs(self.poles), initial=0.0))
 
     @property
     def stable(self) -> bool:
-        """Whether all poles are within the unit circle."""
+        """Whether all poles are inside the unit circle."""
         return self.spectral_radius < 1.0 - _ON_CIRCLE
 
     @property
     def slowest(self) -> tuple[float, float]:
-        """Frequency [Hz] and damping ratio of the pole nearest to the unit circle; the ratio is negative outside."""
+        """Frequency [Hz] and damping ratio, negative outside the unit circle, of the pole of largest magnitude."""
         return damped_frequency(complex(self.poles[0]), self.plant.period)
 
     @cached_property
@@ -92,12 +92,12 @@ class ClosedLoop:
         return _triangular(self.A, self.plant, self.controller)
 
     def sensitivity(self, omega: ArrayLike) -> Complex:
-        """Sensitivity S (k, motors, motors) at the motors: what torques become that are added there.
+        """Return the sensitivity S (k, motors, motors) at the motors, the response to torques that are added there.
 
         Parameters
         ----------
         omega : (k,) array
-            [rad/s], up to pi / period.
+            Angular frequencies up to pi / period [rad/s].
         """
         upper, added, follow = self._triangular
         eye, one = np.eye(len(upper)), np.eye(added.shape[1])
@@ -106,18 +106,19 @@ class ClosedLoop:
         return np.array(found).reshape(-1, *one.shape)
 
     def loop(self, omega: ArrayLike) -> Complex:
-        """Responses L_i (k, motors) of the loop opened at one motor, with the others closed: 1 + L_i = 1 / S_ii.
+        """Return the responses L_i (k, motors) of the loop opened at one motor, the others closed: 1 + L_i = 1 / S_ii.
 
         Parameters
         ----------
         omega : (k,) array
-            [rad/s], up to pi / period; at zero a loop with integrals or free motions has none that is finite.
+            Angular frequencies up to pi / period [rad/s]; at zero, a loop with integrators or free motions has no
+            finite response.
         """
         own = np.diagonal(self.sensitivity(omega), axis1=1, axis2=2)
         return np.asarray(1.0 / np.where(own == 0.0, np.finfo(float).tiny, own) - 1.0, dtype=complex)
 
     def later(self, delay: float) -> ClosedLoop:
-        """The same controller with torques that act so late [s].
+        """Return the loop of the same controller with another delay of the torques [s].
 
         Raises
         ------
@@ -131,10 +132,10 @@ class ClosedLoop:
         return ClosedLoop(plant, self.controller, self.model)
 
     def delay_margin(self) -> float:
-        """How much later all torques may act before a pole leaves the unit circle [s].
+        """Return the additional delay of all torques at which a pole leaves the unit circle [s].
 
-        Exact for any delay, as the plant is sampled anew; nan of a loop that is unstable, with a warning, inf if it
-        stays stable with 200 periods.
+        It is exact for any delay, as the plant is sampled anew. It is nan, with a warning, if the loop is unstable, and
+        inf if the loop stays stable with 200 periods.
 
         Raises
         ------
@@ -163,24 +164,33 @@ def closed_loop(
     model: Any, controller: Any, *, period: float | None = None, delay: float | None = None,
     inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
 ) -> ClosedLoop:  # fmt: skip
-    """A linear model with a linear controller, sampled.
+    """Close the loop of a linear model with a sampled linear controller.
 
     Parameters
     ----------
     model : LinearModel, ReducedModel, state space, (A, B, C, D) or SampledPlant
+        Model of the plant.
     controller : LQGDesign, law, SampledController, or state space
-        From readings to torques with its sign, u = C x + D y; of a chain its law, without limits, filters, resolution.
+        Controller from readings to torques with its sign, u = C x + D y. For a `SampledController` the law is used,
+        without limits, filters and resolution.
     period, delay : float, optional
-        [s]; by default the controller's own. Of a `SampledPlant` its own count.
+        Sampling period and delay [s]; the controller's own by default. A `SampledPlant` must have this period, and
+        keeps its own delay.
     inputs : sequence of str, optional
-        Sensors, outputs of the model; by default the controller's own, else all.
+        Sensors, which are outputs of the model; the controller's own by default, else all.
     outputs : sequence of str, optional
-        Motors, inputs of the model; by default the controller's own, else all.
+        Motors, which are inputs of the model; the controller's own by default, else all.
+
+    Returns
+    -------
+    ClosedLoop
+        Closed loop.
 
     Raises
     ------
     InputError
-        What is no linear law; no period; names or numbers of sensors and motors that do not fit.
+        An object that is not a linear controller, no period, or names or numbers of sensors and motors that do not
+        match.
     """
     law = law_of(controller)
     plant = _sampled_for(model, controller, period, delay)
@@ -199,12 +209,12 @@ def closed_loop(
 
 
 def law_of(controller: Any) -> StateSpace:
-    """The matrices of a linear controller, from readings to torques.
+    """Return the matrices of a linear controller, from readings to torques.
 
     Raises
     ------
     InputError
-        One without matrices, or a continuous one.
+        A controller without matrices, or a continuous one.
     """
     inner = getattr(controller, "law", None)
     own = controller if inner is None or callable(inner) else inner
@@ -218,12 +228,12 @@ def law_of(controller: Any) -> StateSpace:
 
 
 def named_law(controller: Any) -> DiscreteModel:
-    """A linear controller with the names of its sensors and motors: see `law_of`.
+    """Return a linear controller with the names of its sensors and motors: see `law_of`.
 
     Raises
     ------
     InputError
-        One without matrices, a continuous one, or one without names.
+        A controller without matrices or without names, or a continuous one.
     """
     law = law_of(controller)
     names = [_chosen(controller, attribute, None) or _chosen(controller, labels, None)
@@ -237,40 +247,47 @@ def named_law(controller: Any) -> DiscreteModel:
 
 @checked_arguments()
 def spillover(full: Any, reduced: Any, controller: Any, **settings: Any) -> pd.DataFrame:
-    """A controller that was designed on a reduced model, on that and on the full one: see `closed_loops`.
+    """Compare a controller designed on a reduced model with its effect on the full model: see `closed_loops`.
 
-    The vibrations that the design does not know may become unstable (spillover): the row "full" says which.
+    Vibrations that are not in the design may become unstable (spillover), which the row "full" shows.
 
     Parameters
     ----------
     full, reduced : LinearModel, ReducedModel, state space or (A, B, C, D)
-    controller
-        See `closed_loop`, with its `settings`.
+        Full model, and reduced model of the design.
+    controller : LQGDesign, law, SampledController, or state space
+        Controller: see `closed_loop`, with its `settings`.
+
+    Returns
+    -------
+    DataFrame
+        Table with the rows "reduced" and "full", the worse one last.
 
     Warns
     -----
     ResultWarning
-        One of the two is unstable.
+        One of the two loops is unstable.
     """
     return closed_loops({"reduced": reduced, "full": full}, controller, **settings)
 
 
 @checked_arguments()
 def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) -> pd.DataFrame:
-    """One controller on several models: poses along a path, payloads, one of few states and the full one.
+    """Evaluate one controller on several models: poses along a path, payloads, a reduced model and the full one.
 
     Parameters
     ----------
     models : mapping of str to model
-        By name; `{f"{s:.3f} m": model for s, model in zip(poses.places, poses.models)}` of `poses_along`.
-    controller
-        See `closed_loop`, with its `settings`.
+        Models by name, for example `{f"{s:.3f} m": model for s, model in zip(poses.places, poses.models)}` of
+        `poses_along`.
+    controller : LQGDesign, law, SampledController, or state space
+        Controller: see `closed_loop`, with its `settings`.
 
     Returns
     -------
     DataFrame
-        A row a model, the worst last: `stable`, `spectral_radius`, of the pole nearest to the unit circle `frequency`
-        [Hz], `damping` and the `rate` of its growth [1/s].
+        Table with one row per model, the worst last: `stable`, `spectral_radius`, and for the pole of largest magnitude
+        `frequency` [Hz], `damping` and growth `rate` [1/s].
 
     Raises
     ------
@@ -280,7 +297,7 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
     Warns
     -----
     ResultWarning
-        The loop is unstable with some of them.
+        The loop is unstable with some of the models.
     """
     import pandas as pd
 
@@ -303,17 +320,27 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
 
 
 def _triangular(A: Array, plant: SampledPlant, law: StateSpace) -> tuple[Complex, Complex, Complex]:
-    """Schur form of A, and what torques added at the motors lead to, and which torques follow, in its basis."""
+    """Return the Schur form of A, and the input matrix at the motors and the output matrix of torques in its basis."""
     upper, basis = scipy.linalg.schur(A.astype(complex), output="complex")
     added = np.vstack([plant.B, np.zeros((len(law.A), plant.B.shape[1]))])
     return upper, basis.conj().T @ added, np.hstack([law.D @ plant.C, law.C]) @ basis
 
 
 def poles_beyond(loop: ClosedLoop, later: int, radius: float) -> int:
-    """Number of poles with larger magnitudes than a radius above one, of a loop with torques so many samples later.
+    """Return the number of poles of larger magnitude than a radius above one, for a loop with an added delay.
 
-    With G the open loop without that delay, F = det(1 - z^-later G) has poles where that has, zeros at the poles of the
-    closed loop, and is one at infinity: the number is that of the open loop less the turns of F along the circle.
+    Let G be the open loop without the added delay of `later` samples. F = det(1 - z^-later G) has poles at the poles of
+    the open loop, zeros at those of the closed loop, and is one at infinity. The number is that of the open loop less
+    the turns of F about zero along the circle.
+
+    Parameters
+    ----------
+    loop : ClosedLoop
+        Closed loop without the added delay.
+    later : int
+        Added delay in samples.
+    radius : float
+        Radius of the circle.
     """
     plant, law = loop.plant, loop.controller
     A = np.block([[plant.A, np.zeros((len(plant.A), len(law.A)))], [law.B @ plant.C, law.A]])
@@ -347,7 +374,7 @@ def warn_if_unstable(loop: ClosedLoop, where: str = "") -> None:
 
 
 def unstable_poles(loop: ClosedLoop) -> str:
-    """The poles outside the unit circle in words: magnitudes and frequencies of the first four."""
+    """Return a description of the poles outside the unit circle: magnitudes and frequencies of the first four."""
     outside = [z for z in loop.poles if abs(z) >= 1.0 - _ON_CIRCLE and z.imag >= 0.0]
     named = ", ".join(
         f"|z| = {_magnitude(abs(z))} at {frequency_of(complex(z), loop.plant.period):.4g} Hz" for z in outside[:4]
@@ -356,12 +383,12 @@ def unstable_poles(loop: ClosedLoop) -> str:
 
 
 def _magnitude(size: float) -> str:
-    """A pole's magnitude, with two digits of its distance from one, and at least six."""
+    """Return a pole's magnitude as text, with two digits of its distance from one, and at least six digits."""
     return f"{size:.{max(6, 2 - math.floor(math.log10(max(abs(size - 1.0), _ON_CIRCLE))))}g}"
 
 
 def damped_frequency(z: complex, period: float) -> tuple[float, float]:
-    """Natural frequency |s| / (2 pi) [Hz] and damping ratio -Re s / |s| of a sampled pole, s = ln z / T."""
+    """Return natural frequency |s| / (2 pi) [Hz] and damping ratio -Re s / |s| of a sampled pole, s = ln z / T."""
     if z == 0.0:
         return 0.0, 1.0
     s = np.log(complex(z)) / period
@@ -369,7 +396,7 @@ def damped_frequency(z: complex, period: float) -> tuple[float, float]:
 
 
 def _sampled_for(model: Any, controller: Any, period: float | None, delay: float | None) -> SampledPlant:
-    """The plant at the controller's period and delay, or at those given."""
+    """Return the plant at the given period and delay, by default the controller's."""
     inner = getattr(controller, "law", None)
     sources = [controller, *([inner] if inner is not None and not callable(inner) else [])]
     for source in sources:
@@ -392,10 +419,10 @@ def _own(source: Any, attributes: Sequence[str]) -> float | None:
 
 
 def _chosen(controller: Any, attribute: str, given: Sequence[str] | None) -> tuple[str, ...] | None:
-    """Names that are given, or a controller's own, if it has any that are names."""
+    """Return the given names, or a controller's own if it has any that are texts."""
     if given is not None:
         return tuple(given)
     own = getattr(controller, attribute, None)
-    # Models of python-control have a number of inputs.
+    # Models of python-control have the number of inputs in this attribute.
     names = tuple(own) if isinstance(own, tuple | list) else ()
     return names if names and all(isinstance(one, str) for one in names) else None

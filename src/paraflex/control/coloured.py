@@ -1,4 +1,4 @@
-"""Disturbances of limited bandwidth: noise through filters, whose states are the plant's as well."""
+"""Coloured disturbances: noise through filters, whose states are added to those of the plant."""
 
 from __future__ import annotations
 
@@ -15,33 +15,34 @@ from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import all_known, positive
 
-# Names of the inputs of filters.
+# Names of the noise inputs of the filters.
 _NOISE = "{} noise".format
 
 
 def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[str, Any]) -> tuple[SampledPlant, Array]:
-    """A sampled model whose inputs are disturbed by what filters make of noise.
+    """Return the sampled plant of a model whose inputs are disturbed by filtered noise.
 
-    Noise is constant from sample to sample; the filters, as the model, are sampled exactly.
+    The noise is constant between samples; the filters are sampled exactly, as is the model.
 
     Parameters
     ----------
     model, period, delay
         See `as_sampled`.
     coloured : mapping of str to (float, Filter)
-        By input: standard deviation of the disturbance [N m, N], and the filter that noise comes through.
+        Standard deviation of the disturbance [N m, N], and the filter that shapes the noise, by input.
 
     Returns
     -------
     SampledPlant
-        Its own states are the model's and then the filters'.
+        Sampled plant; its own states are those of the model, then those of the filters.
     (n, filters) array
-        What noise of unit variance adds to the states from sample to sample.
+        Noise input matrix: contribution of noise of unit variance to the states from sample to sample.
 
     Raises
     ------
     InputError
-        See `discretise`; an unknown input, no pair, a deviation that is not positive, what is no stable filter.
+        See `discretise`; an unknown input, a value that is not a pair, a deviation that is not positive, or a filter
+        that is not stable.
     """
     if not coloured:
         plant = as_sampled(model, period, delay)
@@ -58,12 +59,12 @@ def disturbed_plant(model: Any, period: float, delay: float, coloured: Mapping[s
 
 
 def deviation_and_filter(name: str, given: Any) -> tuple[float, StateSpace]:
-    """Standard deviation of a disturbance by its name, and the filter that makes it of noise.
+    """Return the standard deviation of a named disturbance, and the filter that shapes the noise.
 
     Raises
     ------
     InputError
-        No pair, a deviation that is not positive, what is no stable filter.
+        A value that is not a pair, a deviation that is not positive, or a filter that is not stable.
     """
     field = f"coloured.{name}"
     try:
@@ -79,7 +80,7 @@ def deviation_and_filter(name: str, given: Any) -> tuple[float, StateSpace]:
 
 
 def _scaled(deviation: float, through: StateSpace, period: float) -> StateSpace:
-    """A filter that makes this standard deviation of noise of unit variance, held for a period."""
+    """Return the filter scaled to give this standard deviation for noise of unit variance held for a period."""
     A, B, C, D, _ = scipy.signal.cont2discrete(through, period)
     P = scipy.linalg.solve_discrete_lyapunov(A, B @ B.T)
     gain = deviation / float(np.sqrt(C @ P @ C.T + D**2).item())
@@ -87,7 +88,7 @@ def _scaled(deviation: float, through: StateSpace, period: float) -> StateSpace:
 
 
 def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) -> NamedMatrices:
-    """The model with filters before some inputs: x' = A x + B (u + F w)."""
+    """Return the model with filters before some inputs: x' = A x + B (u + F w)."""
     A, B, C, D = named.matrices
     own = scipy.linalg.block_diag(*(one.A for one in filters))
     made, into = (scipy.linalg.block_diag(*parts) for parts in zip(*((one.C, one.B) for one in filters), strict=True))

@@ -1,4 +1,4 @@
-"""Functions of laws, compiled with bounds of arrays checked, and their entries for the compiled time loop."""
+"""Compilation of users' control laws, with array bounds checked, and their C entry points for the time loop."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ MOST_STATES = 100_000
 
 _POINTER = types.CPointer(types.float64)
 _SIGNATURE = types.int64(types.int64, types.float64, _POINTER, _POINTER, _POINTER)
-# Colours in messages of Numba.
+# Escape sequences for colours in Numba's messages.
 _STYLES = re.compile(r"\x1b\[[0-9;]*m")
-# Options of Numba that say how the machine code is, not where it is kept or what may call it.
+# Numba options that affect the machine code, as opposed to caching and calling.
 _KEPT = ("error_model", "fastmath", "locals")
 
 
 class CompiledFunction:
-    """A function of (k, t, y, x, torques) for laws: see `CompiledLaw`.
+    """Compiled function of (k, t, y, x, torques) that evaluates a control law: see `CompiledLaw`.
 
     Parameters
     ----------
     function : callable
-        Compiled by Numba, or such that Numba can compile it.
+        Function compiled by Numba, or one that Numba can compile.
     """
 
     def __init__(self, function: Callable[..., None]) -> None:
@@ -39,7 +39,14 @@ class CompiledFunction:
         self.function: Any = checked(function if is_jitted(function) else njit(function), {})
 
     def entry(self, inputs: int, states: int, outputs: int) -> Any:
-        """The function for C, of numbers and pointers: 0, or 1 where an exception was raised.
+        """Return the C function for given numbers of inputs, states and outputs.
+
+        It takes numbers and pointers, and returns 0, or 1 where an exception was raised.
+
+        Parameters
+        ----------
+        inputs, states, outputs : int
+            Numbers of readings, of states and of torques.
 
         Raises
         ------
@@ -70,20 +77,21 @@ _FUNCTIONS: WeakKeyDictionary[Any, CompiledFunction] = WeakKeyDictionary()
 
 
 def compiled_function(function: Callable[..., None]) -> CompiledFunction:
-    """A function for laws, compiled once for all of them."""
+    """Return the compiled function of a control law, compiled once and cached."""
     if function not in _FUNCTIONS:
         _FUNCTIONS[function] = CompiledFunction(function)
     return _FUNCTIONS[function]
 
 
 def checked(function: Any, done: dict[int, Any]) -> Any:
-    """A compiled function with bounds of arrays checked, in it and in compiled functions that it calls by name.
+    """Recompile a function with array bounds checked, together with the compiled functions that it calls by name.
 
     Parameters
     ----------
     function : numba dispatcher
+        Compiled function.
     done : dict
-        Checked functions made so far, by the `id` of the original; functions may call one another.
+        Functions recompiled so far, by the `id` of the original, as functions may call one another.
     """
     if id(function) in done:
         return done[id(function)]
@@ -101,7 +109,7 @@ def checked(function: Any, done: dict[int, Any]) -> Any:
 
 
 def _checked_within(value: Any, read: set[str], done: dict[int, Any]) -> Any:
-    """A compiled function as `checked` has it, a module with such functions among names that are read; or as it is."""
+    """Return a compiled function, or a module that holds some, with bounds checked; other values unchanged."""
     if is_jitted(value):
         return checked(value, done)
     if isinstance(value, ModuleType):
@@ -115,6 +123,6 @@ def _checked_within(value: Any, read: set[str], done: dict[int, Any]) -> Any:
 
 
 def _names(code: CodeType) -> set[str]:
-    """All global names and attributes that code, and functions within it, read."""
+    """Return all names of globals and attributes that a code object reads, inner functions included."""
     inner = (_names(each) for each in code.co_consts if isinstance(each, CodeType))
     return set(code.co_names).union(*inner)

@@ -1,8 +1,9 @@
-"""Computed torque of the rigid mechanism in task space.
+"""Computed torque control of the rigid mechanism in task space.
 
-tau = B^+ Z^T (M a + h - F) with the accelerations a of the end-effector's x'' = x_d'' - Kv (x' - x_d') - Kp (x - x_d):
-its place x and its velocity follow from the encoders by the rigid mechanism's kinematics, of redundant encoders in the
-sense of least squares. Torques are those of least norm.
+The torques are tau = B^+ Z^T (M a + h - F), where the accelerations a follow from the end-effector's x'' = x_d'' - Kv
+(x' - x_d') - Kp (x - x_d). Its position x and velocity follow from the encoders by the kinematics of the rigid
+mechanism, for redundant encoders in the least-squares sense. The torques are those of least norm. As they are the whole
+torque, feed-forward must not act as well.
 """
 
 from __future__ import annotations
@@ -22,27 +23,29 @@ from paraflex.kinematics import RigidMotion
 from paraflex.kinematics.closure import PathClosure
 from paraflex.mechanism.quantities import positive
 
-# A place is found when it moves by less than this part of the mechanism's size, in so many iterations.
+# The iteration for the position has converged at a change below this fraction of the mechanism's size; largest number
+# of iterations.
 _FOUND, _ITERATIONS = 1e-11, 20
 
 
 class ComputedTorque:
-    """Computed torque in task space: a law for `SampledController`. It gives the whole torque: no feed-forward besides.
+    """Computed torque control in task space: a law for `SampledController`, which gives the whole torque.
 
     Parameters
     ----------
     frequency : float
-        Of the end-effector's error, as of an oscillator [Hz]: Kp = (2 pi frequency)^2.
+        Natural frequency of the end-effector's error dynamics [Hz]: Kp = (2 pi frequency)^2.
     damping_ratio : float
-        Of it: Kv = 2 damping_ratio 2 pi frequency.
+        Damping ratio of the error dynamics: Kv = 2 damping_ratio 2 pi frequency.
     cutoff : float, optional
-        Of the low-pass filter of rates, which are differences of readings over the period [Hz].
+        Cut-off frequency of the low-pass filter of rates, which are differences of readings over the period [Hz]; no
+        filter by default.
 
     Raises
     ------
     InputError
-        A frequency, damping ratio or cut-off that is not positive; as it starts, no plan, or readings of other joints
-        than those of motors.
+        A frequency, damping ratio or cut-off that is not positive; when started, no plan, or readings of joints without
+        a motor.
     """
 
     title = "computed torque"
@@ -58,7 +61,7 @@ class ComputedTorque:
         self._cutoff = checked_cutoff(cutoff)
 
     def start(self, plant: Plant) -> None:
-        """See `Controller`."""
+        """Prepare for a run: see `Controller.start`."""
         if plant.task is None:
             raise InputError("there is no planned motion to follow", field="law", value=self.title,
                              remedy="give a path to plan along, or another law")  # fmt: skip
@@ -78,7 +81,7 @@ class ComputedTorque:
         self._pose = self._plan.q[0]
 
     def step(self, k: int, t: float, y: Array) -> Array:
-        """See `Controller`; y are angles and travels of joints."""
+        """Compute the torques of a sample from angles and travels y of joints: see `Controller.step`."""
         sample = min(max(round((t - self._start) / self._period), 0), len(self._plan.t) - 1)
         place = self._closure.task(self._plan.q[sample])
         _, rate, acceleration = self._wanted[sample]
@@ -89,7 +92,7 @@ class ComputedTorque:
         return np.linalg.pinv(effort.matrix[0][:, self._motors]) @ effort.required[0]
 
     def _read(self, y: Array, place: Array) -> tuple[Array, Array]:
-        """The end-effector's place (tasks,) where joints read y nearly, and its changes by theirs (tasks, joints)."""
+        """Return the end-effector's position (tasks,) from joint readings y, and its Jacobian (tasks, joints)."""
         size = self._closure.system.size
         for _ in range(_ITERATIONS):
             motion = self._motion(0.0, place, np.zeros_like(place), np.zeros_like(place))
@@ -103,7 +106,7 @@ class ComputedTorque:
         raise ArithmeticError("the rigid mechanism has no pose near the readings of its encoders")
 
     def _motion(self, t: float, place: Array, velocity: Array, acceleration: Array) -> RigidMotion:
-        """The rigid mechanism with its end-effector there and moving so, near the last pose."""
+        """Return the motion of the rigid mechanism with this motion of the end-effector, near the last pose."""
         target = np.ascontiguousarray(np.stack([place, velocity, acceleration])[None])
         status, _, _, (q, v, a, basis) = self._closure.run(np.zeros(1), target, self._pose)
         if status != LOOPS_CLOSED:

@@ -1,4 +1,4 @@
-"""What a controller is, and what it is told as it starts."""
+"""Interface of a controller, and the plant description that it receives when it starts."""
 
 from __future__ import annotations
 
@@ -13,28 +13,30 @@ from paraflex.tracking import TrackingTask
 
 @dataclass(frozen=True)
 class Plant:
-    """What a controller acts on, as it is told when it starts.
+    """Description of the plant that a controller receives when it starts.
 
     Attributes
     ----------
     mechanism : Mechanism
+        Mechanism to be controlled.
     mode : ActuationMode
         Motors that take torques.
     task : TrackingTask or None
-        The plan whose path it is to follow: rigid motion, feed-forward torques.
+        Plan whose path is to be followed: rigid motion, feed-forward torques. None without a path.
     state : State
-        At the start.
+        State at the start.
     inputs : tuple of str
-        Sensors, in the order of the readings that the controller is given.
+        Sensors, in the order of the readings that the controller receives.
     input_units : tuple of str
+        Units of the readings.
     outputs : tuple of str
-        Motors, in the order of the torques that it returns.
+        Motors, in the order of the torques that the controller returns.
     period, delay : float
-        [s]
+        Sampling period, and delay from a sample until its torques act [s].
     resolution : tuple of float
-        Of the readings, to whose multiples they are rounded, zero of those that are not; none if none is.
+        Resolution of each reading, to whose multiples it is rounded; zero if it is not rounded. Empty if no reading is.
     feed_forward : bool
-        Whether planned torques act besides.
+        Whether planned torques act as well.
     """
 
     mechanism: Mechanism
@@ -52,21 +54,21 @@ class Plant:
 
 @runtime_checkable
 class Controller(Protocol):
-    """A sampled controller: at t_k = k `period` it reads its sensors, and its torques act from t_k + `delay` on.
+    """Sampled controller: at t_k = k `period` it reads its sensors, and its torques act from t_k + `delay` on.
+
+    The state of a controller consists of all its attributes: a saved simulation holds copies of them.
 
     Attributes
     ----------
     period : float
-        Between samples [s].
+        Sampling period [s].
     delay : float
-        From a sample until its torques act [s].
+        Delay from a sample until its torques act [s].
     inputs : tuple of str
-        Names of sensors: encoders have those of motors' joints, the end-effector's coordinates are "x" and "y". None
-        stands for the encoders of its motors.
+        Names of sensors. Encoders have the names of motors' joints; the end-effector's coordinates are "x" and "y". If
+        empty, the encoders of its motors.
     outputs : tuple of str
-        Names of motors; none for all of the mode.
-
-    Its state is all that its attributes hold: a saved simulation has copies of them.
+        Names of motors; if empty, all motors of the mode.
     """
 
     period: float
@@ -75,9 +77,9 @@ class Controller(Protocol):
     outputs: tuple[str, ...]
 
     def start(self, plant: Plant) -> None:
-        """Prepare for a run, and forget an earlier one."""
+        """Prepare for a run, and reset the state."""
         ...
 
     def step(self, k: int, t: float, y: Array) -> Any:
-        """Torques (outputs,) that follow from the readings y (inputs,) of sample k at time t [N m, N]."""
+        """Return the torques (outputs,) from the readings y (inputs,) of sample k at time t [N m, N]."""
         ...

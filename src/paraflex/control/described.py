@@ -1,4 +1,4 @@
-"""Controllers as a model file describes them: frozen, without states, for any mode."""
+"""Controllers as described in a model file: frozen, without states, for any actuation mode."""
 
 from __future__ import annotations
 
@@ -20,36 +20,37 @@ from paraflex.mechanism.quantities import all_known
 if TYPE_CHECKING:
     from paraflex.control.chain import SampledController
 
-# Where a model file has controllers; and the word for none of them.
+# Table of a model file that holds the controllers; and the word that selects none of them.
 TABLE, NONE = "controller", "none"
 
 
 @given_as("a description of a controller", "a ControllerDescription, as [controller.NAME] of a model file is read")
 @dataclass(frozen=True)
 class ControllerDescription(CheckedFields):
-    """A sampled controller as a model file describes it: a law and its chain, see `SampledController`.
+    """Sampled controller as a model file describes it: a control law and its signal chain, see `SampledController`.
 
-    What is given by motor or sensor is used of those that a mode has.
+    Entries given by motor or sensor are used for those motors and sensors that a mode has.
 
     Attributes
     ----------
     name : str
+        Name of the controller.
     law : DescribedLaw
-        One of the descriptions in `LAWS`.
+        Control law, one of the descriptions in `LAWS`.
     period, delay : float
-        [s]
+        Sampling period, and delay from a sample until its torques act [s].
     inputs, outputs : tuple of str
-        Sensors and motors; none for those of the law, else the encoders of its motors and all motors of a mode.
+        Sensors and motors. If empty, those of the law, else the encoders of its motors and all motors of a mode.
     reference : "plan", "open-loop" or mapping of str to float or AngleLaw, optional
-        What is taken off the readings; by default the law's own.
+        Reference that is subtracted from the readings; the law's own by default.
     limits : float, pair or mapping of str to either, optional
-        [N m, N]
+        Limits of the torques [N m, N]; none by default.
     rates : float or mapping of str to float, optional
-        [N m/s, N/s]
+        Limits of the rates of the torques [N m/s, N/s]; none by default.
     quantise : float or mapping of str to float, optional
-        Resolution of readings.
+        Resolution of the readings; not quantised by default.
     filters : mapping of str to float, or to numerator and denominator
-        [Hz]
+        Filters of the readings by sensor: cut-off frequency [Hz], or a transfer function.
     """
 
     _own = ("law", "reference", "limits", "filters")
@@ -67,16 +68,21 @@ class ControllerDescription(CheckedFields):
 
     @property
     def whole_torque(self) -> bool:
-        """Whether no planned torque is to act besides."""
+        """Whether the law gives the whole torque, so that no planned torque acts as well."""
         return bool(self.law.whole_torque)
 
     def check(self, mechanism: Mechanism) -> None:
-        """Check its names and numbers.
+        """Check the names and numbers of the description.
+
+        Parameters
+        ----------
+        mechanism : Mechanism
+            Mechanism to be controlled.
 
         Raises
         ------
         InputError
-            A sensor or a motor that the mechanism does not have, a number that makes no sense.
+            A sensor or a motor that the mechanism does not have, or a number out of range.
         """
         motors = [motor.name for motor in mechanism.motors]
         sensors = [sensor.name for sensor in measured_sensors(mechanism)]
@@ -97,12 +103,14 @@ class ControllerDescription(CheckedFields):
         sampled.check(among, sampled.outputs or names.motors)
 
     def made(self, mechanism: Mechanism, motors: Sequence[str]) -> SampledController:
-        """The controller for a mode with some motors of a mechanism.
+        """Return the controller for a mode with some motors of a mechanism.
 
         Parameters
         ----------
         mechanism : Mechanism
+            Mechanism to be controlled.
         motors : sequence of str
+            Motors of the mode.
 
         Raises
         ------
@@ -132,12 +140,12 @@ class ControllerDescription(CheckedFields):
 
 
 def check_controllers(controllers: Mapping[str, ControllerDescription], mechanism: Mechanism) -> None:
-    """Check the controllers of a model; see `ControllerDescription.check`.
+    """Check the controllers of a model: see `ControllerDescription.check`.
 
     Raises
     ------
     InputError
-        And a name that stands for none.
+        An error of a description, or the reserved name "none".
     """
     for name, one in controllers.items():
         with renamed(TABLE):
@@ -153,7 +161,7 @@ def check_together(controllers: Iterable[ControllerDescription]) -> None:
     Raises
     ------
     InputError
-        A period that is no multiple of the shortest, or two laws each of which gives the whole torque.
+        A period that is not a multiple of the shortest one, or two laws each of which gives the whole torque.
     """
     several = list(controllers)
     with within(TABLE):
@@ -163,7 +171,7 @@ def check_together(controllers: Iterable[ControllerDescription]) -> None:
 
 
 def _functions(reference: Any) -> Any:
-    """References with functions of time in place of laws."""
+    """Return references with angle laws replaced by functions of time."""
     if not isinstance(reference, Mapping):
         return reference
     return {name: _value(each) if isinstance(each, AngleLaw) else each for name, each in reference.items()}

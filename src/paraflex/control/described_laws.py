@@ -1,4 +1,4 @@
-"""Control laws as a model file describes them: a kind of law is a class here, listed in `LAWS`."""
+"""Control laws as described in a model file: each kind of law is a class here, listed in `LAWS`."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ if TYPE_CHECKING:
     from paraflex.control.rates import RateFeedback
 
 Rows = Sequence[Sequence[float]]
-# Of a PID law.
+# Gains of a PID law.
 _GAINS = ("stiffness", "damping", "integral")
 
 
 class LawNames(NamedTuple):
-    """Sensors and motors that a description names.
+    """Names of sensors and motors against which a description is checked.
 
     Attributes
     ----------
     inputs, outputs : sequence of str
-        Those that it names itself, which may be none.
+        Sensors and motors that the description names itself; may be empty.
     sensors, motors : sequence of str
-        All that the mechanism has.
+        All sensors and motors of the mechanism.
     encoders : sequence of str
-        Of its motors, of all motors where it names none.
+        Encoders of the motors that the description names, or of all motors if it names none.
     points : sequence of str
-        Of bodies, as "link.tip".
+        Points of bodies, such as "link.tip".
     """
 
     inputs: Sequence[str]
@@ -50,14 +50,14 @@ class LawNames(NamedTuple):
 
 
 class DescribedLaw(CheckedFields, ABC):
-    """What computes torques from readings, as a file describes it; a kind of law is such a class in `LAWS`.
+    """Base class of control laws as described in a file; each kind of law is a subclass listed in `LAWS`.
 
     Attributes
     ----------
     kind : str
-        `type` in files.
+        Value of `type` in files.
     whole_torque : bool
-        Whether it gives the whole torque, so that no planned torque acts besides.
+        Whether the law gives the whole torque, so that no planned torque acts as well.
     """
 
     kind: ClassVar[str]
@@ -65,31 +65,31 @@ class DescribedLaw(CheckedFields, ABC):
 
     @abstractmethod
     def check(self, names: LawNames) -> None:
-        """Check its numbers and names.
+        """Check the numbers and names of the description.
 
         Raises
         ------
         InputError
-            A number that makes no sense, an unknown motor.
+            A number out of range, or an unknown motor or sensor.
         """
 
     @abstractmethod
     def made(self, outputs: Sequence[str], period: float) -> Any:
-        """A law for `SampledController` that drives some motors."""
+        """Return a law for `SampledController` that drives the motors `outputs` at a period [s]."""
 
 
 @dataclass(frozen=True)
 class PIDDescription(DescribedLaw):
-    """A PID law of the angles of motors, with feedback of errors from the planned motion: see `JointPID`.
+    """PID control of motor angles, with feedback of errors from the planned motion: see `JointPID`.
 
     Attributes
     ----------
     stiffness, damping, integral : float or mapping of str to float
-        Kp [N m/rad, N/m], Kd [N m s/rad, N s/m] and Ki [N m/(rad s), N/(m s)], of all motors or by motor.
+        Gains Kp [N m/rad, N/m], Kd [N m s/rad, N s/m] and Ki [N m/(rad s), N/(m s)], of all motors or by motor.
     project : bool
-        Whether torques that only strain links are taken out.
+        Whether torques that only strain links are removed.
     cutoff : float or None
-        Of the low-pass filter of rates [Hz].
+        Cut-off frequency of the low-pass filter of rates [Hz]; no filter if None.
     """
 
     kind: ClassVar[str] = "pid"
@@ -100,7 +100,7 @@ class PIDDescription(DescribedLaw):
     cutoff: float | None = None
 
     def check(self, names: LawNames) -> None:
-        """See `DescribedLaw`."""
+        """Check the gains and pairs of readings and motors: see `DescribedLaw.check`."""
         from paraflex.control.laws import check_pairs, gains_of
 
         for name in _GAINS:
@@ -110,7 +110,7 @@ class PIDDescription(DescribedLaw):
             check_pairs(names.inputs, names.outputs)
 
     def made(self, outputs: Sequence[str], period: float) -> JointPID:
-        """See `DescribedLaw`."""
+        """Return the law: see `DescribedLaw.made`."""
         from paraflex.control.laws import JointPID
 
         gains: dict[str, Any] = {name: of_names(getattr(self, name), outputs) for name in _GAINS}
@@ -119,16 +119,18 @@ class PIDDescription(DescribedLaw):
 
 @dataclass(frozen=True)
 class StateSpaceDescription(DescribedLaw):
-    """A discrete model in state space: x_k+1 = A x_k + B y_k, torques C x_k + D y_k.
+    """Discrete state-space model x_k+1 = A x_k + B y_k with torques C x_k + D y_k.
 
     Attributes
     ----------
     D : (outputs, inputs) rows
-        From readings, less their references, to torques.
+        Feed-through matrix, from readings less their references to torques.
     A : (n, n) rows
-        None of a model without states.
+        State matrix; empty for a model without states.
     B : (n, inputs) rows
+        Input matrix.
     C : (outputs, n) rows
+        Output matrix.
     """
 
     kind: ClassVar[str] = "state-space"
@@ -154,11 +156,11 @@ class StateSpaceDescription(DescribedLaw):
             object.__setattr__(self, name, rows if any(rows) else ())
 
     def check(self, names: LawNames) -> None:
-        """See `DescribedLaw`."""
+        """Check the numbers of sensors and motors: see `DescribedLaw.check`."""
         self._model(1.0).check(names.inputs, names.outputs, 1.0)
 
     def made(self, outputs: Sequence[str], period: float) -> DiscreteModel:
-        """See `DescribedLaw`."""
+        """Return the law: see `DescribedLaw.made`."""
         return self._model(period)
 
     def _model(self, period: float) -> DiscreteModel:
@@ -169,16 +171,16 @@ class StateSpaceDescription(DescribedLaw):
 
 @dataclass(frozen=True)
 class ComputedTorqueDescription(DescribedLaw):
-    """Computed torque of the rigid mechanism in task space: see `ComputedTorque`.
+    """Computed torque control of the rigid mechanism in task space: see `ComputedTorque`.
 
     Attributes
     ----------
     frequency : float
-        Of the end-effector's error, as of an oscillator [Hz].
+        Natural frequency of the end-effector's error dynamics [Hz].
     damping_ratio : float
-        Of it.
+        Damping ratio of the error dynamics.
     cutoff : float or None
-        Of the low-pass filter of rates [Hz].
+        Cut-off frequency of the low-pass filter of rates [Hz]; no filter if None.
     """
 
     kind: ClassVar[str] = "computed-torque"
@@ -188,11 +190,11 @@ class ComputedTorqueDescription(DescribedLaw):
     cutoff: float | None = None
 
     def check(self, names: LawNames) -> None:
-        """See `DescribedLaw`."""
+        """Check the numbers: see `DescribedLaw.check`."""
         self.made(names.motors, 1.0)
 
     def made(self, outputs: Sequence[str], period: float) -> ComputedTorque:
-        """See `DescribedLaw`."""
+        """Return the law: see `DescribedLaw.made`."""
         from paraflex.control.computed_torque import ComputedTorque
 
         return ComputedTorque(self.frequency, self.damping_ratio, cutoff=self.cutoff)
@@ -200,14 +202,15 @@ class ComputedTorqueDescription(DescribedLaw):
 
 @dataclass(frozen=True)
 class RateFeedbackDescription(DescribedLaw):
-    """Feedback of rates of readings: see `RateFeedback`.
+    """Feedback of the rates of readings: see `RateFeedback`.
 
     Attributes
     ----------
     gains : mapping of str to mapping of str to float
-        By motor and sensor: torque by rate of the reading [N m s by the sensor's unit]. Of a mode those of its motors.
+        Gains by motor and sensor: torque per rate of the reading [N m s per unit of the sensor]. A mode uses those of
+        its motors.
     cutoff : float or None
-        Of the low-pass filter of rates [Hz].
+        Cut-off frequency of the low-pass filter of rates [Hz]; no filter if None.
     """
 
     kind: ClassVar[str] = "rate-feedback"
@@ -215,7 +218,7 @@ class RateFeedbackDescription(DescribedLaw):
     cutoff: float | None = None
 
     def check(self, names: LawNames) -> None:
-        """See `DescribedLaw`."""
+        """Check the gains and names: see `DescribedLaw.check`."""
         for motor, row in self.gains.items():
             known(motor, names.motors, "gains", "motor")
             for sensor in row:
@@ -227,7 +230,7 @@ class RateFeedbackDescription(DescribedLaw):
                                  remedy="leave it out")  # fmt: skip
 
     def made(self, outputs: Sequence[str], period: float) -> RateFeedback:
-        """See `DescribedLaw`."""
+        """Return the law: see `DescribedLaw.made`."""
         from paraflex.control.rates import RateFeedback
 
         return RateFeedback(_some_of(self.gains, outputs, "gains"), cutoff=self.cutoff)
@@ -235,27 +238,27 @@ class RateFeedbackDescription(DescribedLaw):
 
 @dataclass(frozen=True)
 class LQGDescription(DescribedLaw):
-    """LQG designed as a run starts, on the linear model of the mechanism in its mode: see `DesignedLQG`.
+    """LQG controller designed when a run starts, for the mechanism's linear model in its mode: see `DesignedLQG`.
 
     Attributes
     ----------
     deviations : mapping of str to float
-        Largest that are allowed of sensors, in their units.
+        Largest allowed deviations of sensors, in their units.
     effort : float or mapping of str to float
-        Largest torques or forces [N m, N]. Of a mapping motors that it does not name are not used.
+        Largest torques or forces [N m, N]. Motors that a mapping does not name are not used.
     noise : float or mapping of str to float, optional
         Standard deviations of readings in their units; by default those of rounding to the controller's `quantise`.
     disturbance : float or mapping of str to float, optional
-        Standard deviations of random efforts at motors [N m, N]; by default a tenth of `effort`.
+        Standard deviations of random efforts at motors [N m, N]; a tenth of `effort` by default.
     integrators : mapping of str to float
-        Sensors whose errors are to vanish under constant loads, with its time constant: see `lqr` [s].
+        Sensors whose errors are to vanish under constant loads, with the time constants of that decay [s]: see `lqr`.
     coloured : mapping of str to (float, float or numerator and denominator)
-        Disturbances that last, by motor or by point and axis, "link.tip.x": standard deviation [N m, N], and the
-        filter that makes them of noise.
+        Coloured disturbances by motor, or by point and axis such as "link.tip.x": standard deviation [N m, N], and the
+        filter that shapes the noise.
     states : int or None
-        Of the reduced model: 16 where None, all if the mechanism has fewer.
+        Number of states of the reduced model: 16 if None, or all if the mechanism has fewer.
     at : float or None
-        Time of the planned motion that it is designed about [s]: its start where None.
+        Time of the planned motion about which the model is linearised [s]; its start if None.
     """
 
     kind: ClassVar[str] = "lqg"
@@ -269,7 +272,7 @@ class LQGDescription(DescribedLaw):
     at: float | None = None
 
     def check(self, names: LawNames) -> None:
-        """See `DescribedLaw`."""
+        """Check the names: see `DescribedLaw.check`."""
         among = {"effort": names.motors, "disturbance": names.motors, "deviations": names.sensors,
                  "noise": names.inputs or names.encoders, "integrators": names.inputs or names.encoders}  # fmt: skip
         for field_name, known_names in among.items():
@@ -284,7 +287,7 @@ class LQGDescription(DescribedLaw):
                              remedy="leave it out, or give the effort of each")  # fmt: skip
 
     def made(self, outputs: Sequence[str], period: float) -> DesignedLQG:
-        """See `DescribedLaw`."""
+        """Return the law: see `DescribedLaw.made`."""
         from paraflex.control.designed import DesignedLQG
 
         return DesignedLQG(
@@ -294,7 +297,7 @@ class LQGDescription(DescribedLaw):
         )  # fmt: skip
 
 
-# What `type` may be in files.
+# Classes of laws by `type` in files.
 LAWS: Mapping[str, type[Any]] = {
     law.kind: law
     for law in (
@@ -308,12 +311,12 @@ LAWS: Mapping[str, type[Any]] = {
 
 
 def of_names(given: Any, names: Sequence[str]) -> Any:
-    """What is given by name, of some names alone; other values as they are."""
+    """Return the entries of a mapping for some names only; other values unchanged."""
     return {name: each for name, each in given.items() if name in names} if isinstance(given, Mapping) else given
 
 
 def _some_of(given: Any, names: Sequence[str], field: str) -> Any:
-    """What is given by name, of some names, at least of one."""
+    """Return the entries of a mapping for some names, and check that there is at least one."""
     found = of_names(given, names)
     if isinstance(given, Mapping) and given and not found:
         raise InputError("none of the motors that act", field=field, value=", ".join(given),

@@ -1,4 +1,4 @@
-"""LQG designed as a run starts, on the linear model of the mechanism that it is to act on."""
+"""LQG controller that is designed when a run starts, for the linear model of the mechanism in that run."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from paraflex.mechanism.quantities import finite, not_negative, positive
 
 
 class DesignedLQG:
-    """`lqg` on the linear model of the mechanism that it is to act on: a law for `SampledController`.
+    """LQG design for the linear model of the mechanism that it controls: a law for `SampledController`.
 
-    It is designed as it starts, for its sensors, motors, period and delay: about the start of the planned motion, or
-    about the pose at the start of a run without a path, on a model of few states. Motors of other modes are no inputs.
+    It is designed when it starts, for its sensors, motors, period and delay: about the start of the planned motion, or
+    about the initial pose of a run without a path, on a reduced model. Motors of other modes are not inputs.
 
     Parameters
     ----------
     deviations, effort, disturbance, integrators
-        See `lqr` and `lqg`.
-        Integrators are used of the sensors that it reads.
+        See `lqr` and `lqg`. Integrators of sensors that it does not read are ignored.
     noise : float or mapping of str to float, optional
-        Standard deviations of readings in their units, of all or by sensor; of others `quantisation_noise` of what the
-        controller rounds them to.
+        Standard deviations of readings in their units, of all or by sensor; by default `quantisation_noise` of the
+        controller's resolution.
     coloured : mapping of str to (float, Filter), optional
-        Disturbances that last, at motors and at points as "link.point.x": see `lqg`. Of motors those that it drives.
+        Coloured disturbances at motors, and at points such as "link.point.x": see `lqg`. Motors that it does not drive
+        are ignored.
     states : int, optional
-        Of the reduced model, 16 by default, or all of fewer.
+        Number of states of the reduced model; 16 by default, or all if there are fewer.
     at : float, optional
-        Time of the planned motion that it is designed about [s], by default its start.
+        Time of the planned motion about which the model is linearised [s]; its start by default.
 
     Attributes
     ----------
     design : LQGDesign or None
-        Once started.
+        Design, available once started.
 
     Raises
     ------
     InputError
-        Numbers that are not positive; as it starts, see `lqg` and `reduce`, readings without noise, a time without a
+        Numbers that are not positive; when started, see `lqg` and `reduce`, readings without noise, or a time without a
         plan.
     """
 
@@ -95,11 +95,11 @@ class DesignedLQG:
 
     @property
     def title(self) -> str:
-        """What it is, with the states of the model once it is designed."""
+        """Short description of the law, with the number of states of the model once designed."""
         return "LQG" if self.design is None else f"LQG of {self.design.regulator.plant.own} states"
 
     def start(self, plant: Plant) -> None:
-        """See `Controller`."""
+        """Design the controller and prepare for a run: see `Controller.start`."""
         own = [motor.name for motor in plant.mechanism.motors]
         coloured = {name: each for name, each in self._coloured.items() if name in plant.outputs or name not in own}
         points = tuple(dict.fromkeys(name.rpartition(".")[0] for name in coloured if name not in own))
@@ -114,19 +114,19 @@ class DesignedLQG:
         self.holding_torques: Array = self._law.holding_torques
 
     def step(self, k: int, t: float, y: Array) -> Array:
-        """See `Controller`; y are errors of readings."""
+        """Compute the torques of a sample from errors y of readings: see `Controller.step`."""
         return self._law.step(k, t, y)
 
     def limited(self, torques: Array) -> None:
-        """See `LQGLaw`."""
+        """Record the torques after limits: see `LQGLaw.limited`."""
         self._law.limited(torques)
 
     def linear_law(self) -> LinearLaw:
-        """See `LQGLaw`."""
+        """Return the law for the compiled time loop: see `LQGLaw.linear_law`."""
         return self._law.linear_law()
 
     def _model(self, plant: Plant, points: tuple[str, ...]) -> LinearModel:
-        """Of all states, with the motors that it drives, and forces at points, as inputs."""
+        """Return the full linear model, with its motors and forces at points as inputs."""
         mode = mode_of_motors(plant.mechanism, plant.outputs)
         if plant.task is not None:
             return linearise(plant.task, mode=mode, at=self._at, forces=points)
@@ -135,7 +135,7 @@ class DesignedLQG:
         return linearise(plant.mechanism, mode=mode, start=plant.state, forces=points)
 
     def _noise_of(self, plant: Plant) -> dict[str, float]:
-        """Standard deviations of readings by sensor: those given, else those of rounding."""
+        """Return the standard deviations of readings by sensor: the given ones, else those of rounding."""
         given = self._noise if isinstance(self._noise, Mapping) else {}
         if self._noise is not None and not isinstance(self._noise, Mapping):
             return dict.fromkeys(plant.inputs, self._noise)

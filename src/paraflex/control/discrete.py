@@ -1,4 +1,4 @@
-"""Discrete models in state space as control laws."""
+"""Discrete state-space models as control laws."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from paraflex.linear.zeros import StateSpace
 
 
 class DiscreteModel:
-    """x_k+1 = A x_k + B y_k, torques C x_k + D y_k: a law.
+    """Discrete linear control law x_k+1 = A x_k + B y_k with torques C x_k + D y_k.
 
     Parameters
     ----------
     A, B, C, D : arrays
+        State, input, output and feed-through matrices.
     period : float or None
-        [s]; None where the model does not say it.
+        Sampling period [s]; None if the model does not specify it.
     inputs, outputs : tuple of str
-        Names, where the model has any.
+        Names of sensors and motors; empty if the model has none.
     """
 
     title = "state space"
@@ -50,12 +51,12 @@ class DiscreteModel:
         self.x: Array = np.zeros(len(A))
 
     def check(self, inputs: Sequence[str], outputs: Sequence[str], period: float) -> None:
-        """Compare its size and its period with what it is to have.
+        """Check that the size and the period of the model are as required.
 
         Raises
         ------
         InputError
-            They differ.
+            Another number of inputs or outputs, or another period.
         """
         if inputs:
             _check_count(inputs, self.B.shape[1], "inputs")
@@ -66,17 +67,17 @@ class DiscreteModel:
                              remedy="leave it out")  # fmt: skip
 
     def start(self, plant: Plant) -> None:
-        """Set its states to zero."""
+        """Set the states to zero."""
         _check_count(plant.inputs, self.B.shape[1], "inputs")
         _check_count(plant.outputs, self.C.shape[0], "outputs")
         self.x = np.zeros(len(self.A))
 
     def linear_law(self) -> LinearLaw:
-        """Itself, for the compiled time loop."""
+        """Return the law for the compiled time loop."""
         return LinearLaw(self.A, self.B, self.C, self.D)
 
     def step(self, k: int, t: float, y: Array) -> Array:
-        """Torques of this sample; its states go on to the next."""
+        """Return the torques of this sample, and advance the states to the next one."""
         torques = self.C @ self.x + self.D @ y
         self.x = self.A @ self.x + self.B @ y
         return torques
@@ -88,12 +89,12 @@ def _check_count(names: Sequence[str], count: int, field: str) -> None:
 
 
 def discrete_model(given: Any) -> DiscreteModel:
-    """A model of python-control or SciPy as a law.
+    """Return a model of python-control or SciPy as a control law.
 
     Raises
     ------
     InputError
-        It is continuous, or holds numbers that are not finite.
+        A continuous model, or one with numbers that are not finite.
     """
     check_discrete(given.dt, given, "law", "model")
     labels = [_own_names(getattr(given, name, None)) for name in ("input_labels", "output_labels")]
@@ -106,7 +107,7 @@ def is_model(given: Any) -> bool:
 
 
 def side_by_side(laws: Sequence[DiscreteModel]) -> DiscreteModel:
-    """Laws with names and one period as one law: torques for one motor add up.
+    """Combine named laws of one period into one law; torques for one motor add up.
 
     Raises
     ------
@@ -130,12 +131,12 @@ def side_by_side(laws: Sequence[DiscreteModel]) -> DiscreteModel:
 
 
 def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
-    """Raise unless a model with this time step is discrete, as python-control and SciPy have it.
+    """Check that a model with this time step is discrete, by the conventions of python-control and SciPy.
 
     Raises
     ------
     InputError
-        It is continuous.
+        A continuous model.
     """
     if dt is None or (dt is not True and not dt > 0.0):
         # The method that discretises a continuous model has one name in SciPy, the other in python-control.
@@ -145,7 +146,13 @@ def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
 
 
 def matrices_of(model: Any) -> StateSpace:
-    """Matrices of a model in state space, which may have no states, or of a proper transfer function."""
+    """Return the matrices of a state-space model, which may have no states, or of a proper transfer function.
+
+    Raises
+    ------
+    InputError
+        A transfer function that is not proper, or numbers that are not finite.
+    """
     try:
         model = model if hasattr(model, "A") else model.to_ss()
     except (ValueError, NotImplementedError) as error:
@@ -158,6 +165,6 @@ def matrices_of(model: Any) -> StateSpace:
 
 
 def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:
-    """Names that somebody gave: python-control calls others u[0], u[1] and y[0], y[1]."""
+    """Return labels given by the user; none if they are python-control's defaults such as u[0] and y[0]."""
     names = tuple(labels or ())
     return () if any(name[:2] in ("u[", "y[") for name in names) else names

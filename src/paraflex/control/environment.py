@@ -1,7 +1,7 @@
-"""A simulation as an environment of Gymnasium, for reinforcement learning and for anything else that acts and observes.
+"""Gymnasium environment of a simulation, for reinforcement learning and other agents that act and observe.
 
-Gymnasium is an extra: this module is imported without it, but makes no environments then. With it the environment
-"paraflex/RAParM-I-v0" is registered.
+Gymnasium is an optional dependency: this module can be imported without it, but makes no environments then. With it the
+environment "paraflex/RAParM-I-v0" is registered.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ else:
         from paraflex.control.no_gymnasium import Env
 
 Reward = Callable[[Simulation, Mapping[str, float], Array], float]
-# Beside the feed-forward actions are corrections, of this part of its torques.
+# With feed-forward, actions are corrections: default limits as a fraction of its largest torque.
 _CORRECTING = 0.1
-# With 0.25 ms deviations of RAParM-I are exact to a hundredth.
+# With 0.25 ms steps deviations of RAParM-I are accurate to 1 %.
 _STEP = 2.5e-4
-# Environments of the library: what makes them, and its settings.
+# Environments of the library: entry points and their settings.
 REGISTERED: dict[str, tuple[str, dict[str, Any]]] = {
     "paraflex/RAParM-I-v0": (
         "paraflex.library:environment",
@@ -51,78 +51,80 @@ REGISTERED: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 class Environment(Env[Array, NDArray[Any]]):
-    """A mechanism as an environment of Gymnasium, its actions the torques of motors.
+    """Gymnasium environment of a mechanism, with motor torques as actions.
 
-    An action a (motors,) lets the torques a x `limits` act for one period, beside those of the plan where it has a
+    An action a (motors,) applies the torques a x `limits` for one period, in addition to those of the plan if there is
     feed-forward. The observation is read at the end of the period. The reward of a period is
 
         - min((d / accuracy)^2 + effort_weight sum(a^2), penalty),
 
-    d the deviation of the end-effector from the plan at its end. An episode is truncated at the end of the run. It is
-    terminated, with the cause in `info["error"]`, where an event of the options ends it, or where it has diverged and
-    cannot go on; its last observation is shown again, and each period left costs `penalty`, so that it never pays.
+    with d the deviation of the end-effector from the plan at the end of the period. An episode is truncated at the end
+    of the run. It is terminated, with the cause in `info["error"]`, if an event of the options ends it, or if it has
+    diverged and cannot continue. The last observation is then returned again, and each remaining period costs
+    `penalty`, so that termination never pays.
 
     Torques that jump from one period to the next make the steps of an adaptive method short. With
-    `IntegrationOptions(method="generalised-alpha", step=2.5e-4)` runs are some ten times as fast, and coarser.
+    `IntegrationOptions(method="generalised-alpha", step=2.5e-4)` runs are about ten times as fast, and less accurate.
 
     Parameters
     ----------
     source : TrackingTask, Mechanism or Model
-        A plan; or a mechanism without a path, whose reward must be given.
+        Plan; or a mechanism without a path, for which `reward` is required.
     mode : str or ActuationMode, optional
         Motors of the actions; all by default.
     period : float
-        From one action to the next [s].
+        Time from one action to the next [s].
     limits : float or mapping of str to float, optional
-        Torque of an action of one, of all motors of the mode or each [N m, N]. By default the largest that a plan needs
-        of any of them, or a tenth of it beside the feed-forward.
+        Torque of an action of one, for all motors of the mode or by motor [N m, N]. By default the largest torque that
+        the plan needs of any of them, or a tenth of it with feed-forward.
     sensors : sequence of str, optional
-        Observed ones: see `Simulation.sensors_read`. By default encoders of the motors and the end-effector's place.
+        Observed sensors: see `Simulation.sensors_read`. By default the encoders of the motors and the position of the
+        end-effector.
     errors : bool
-        Whether what the plan says of a sensor is taken off its reading.
+        Whether planned readings are subtracted from the readings.
     ahead : sequence of float
-        By how much the plan is seen ahead [s]: for each, the change of planned readings from now until then.
+        Preview times of the plan [s]: the change of the planned readings over each of them is observed as well.
     scales : mapping of str to float, optional
-        By sensor, the reading that is observed as one, in its unit.
+        Reading that is observed as one, by sensor and in its unit; one by default.
     noise, quantise : mapping of str to float, optional
-        By sensor, in its unit: standard deviation of white noise, resolution.
+        Standard deviation of white noise, and resolution, by sensor and in its unit; zero by default.
     feed_forward : bool, optional
-        Whether the plan's torques act by themselves; by default where there is a plan.
+        Whether the planned torques act as well; by default if there is a plan.
     accuracy : float
         Deviation that costs one in a period [m].
     effort_weight : float
-        What a motor at its limit costs in a period.
+        Cost of a motor at its limit in a period.
     penalty : float
-        The most that a period costs, and what each costs that is left when an episode is terminated.
+        Largest cost of a period, and cost of each remaining period when an episode is terminated.
     reward : callable, optional
-        reward(simulation, readings, action) after a period, in place of the formula: readings of all sensors by name,
-        without noise.
+        Function reward(simulation, readings, action) that is called after a period and replaces the formula; `readings`
+        are those of all sensors by name, without noise.
     vary : callable, optional
-        vary(random) -> Mechanism: that of an episode, from the environment's generator of random numbers, of members
-        with the same names. A plan stays that of the mechanism it was made for.
+        Function vary(random) -> Mechanism that returns the mechanism of an episode, from the environment's random
+        number generator; its members keep their names. The plan stays that of the mechanism for which it was made.
     duration, start, balanced, method, options
         See `Simulation`.
 
     Attributes
     ----------
     simulation : Simulation
-        Of the episode: `simulation.result()` is its run so far, for figures and data.
+        Simulation of the episode: `simulation.result()` returns its run so far, for figures and data.
     motors : tuple of str
-        In the order of actions.
+        Motors, in the order of the actions.
     limits : (motors,) array
-        [N m, N]
+        Torques of an action of one [N m, N].
     observed : tuple of str
-        Names of what is observed, in order: sensors, then those seen ahead, "x+0.01".
+        Names of the observed values, in order: sensors, then previews such as "x+0.01".
     action_space : Box
-        (motors,) in [-1, 1], of float32; numbers beyond are cut off, float64 is not rounded.
+        Actions (motors,) in [-1, 1], float32; numbers outside are clipped, float64 is not rounded.
     observation_space : Box
-        (observed,) of float64, in [-1e6, 1e6].
+        Observations (observed,) in [-1e6, 1e6], float64.
 
     Raises
     ------
     InputError
         Gymnasium is not installed; unknown motors or sensors; numbers that are not positive; no reward or no limits
-        where there is no plan; what `Simulation` refuses.
+        where there is no plan; or arguments that `Simulation` rejects.
     ActuationError
         The mode cannot drive the mechanism along the plan's path.
     """
@@ -193,19 +195,19 @@ class Environment(Env[Array, NDArray[Any]]):
         self.observation_space: Space[Any] = Box(-WIDEST, WIDEST, (len(self.observed),), np.float64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode; the first observation, and `info`.
+        """Begin an episode, and return the first observation and `info`.
 
         Parameters
         ----------
         seed : int, optional
-            Of noise and `vary`: the same seed and actions give the same bits.
+            Seed of the noise and of `vary`: equal seeds and actions give bit-identical episodes.
         options : dict, optional
-            There are none.
+            Must be empty: there are no options.
 
         Raises
         ------
         InputError
-            Options; a mechanism of `vary` that has other members.
+            Options, or a mechanism of `vary` with other members.
         """
         super().reset(seed=seed)
         if options:
@@ -218,20 +220,20 @@ class Environment(Env[Array, NDArray[Any]]):
         return self._seen.copy(), self._info(np.zeros(len(self.motors)))
 
     def step(self, action: NDArray[Any]) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Let torques act for one period; observation, reward, whether terminated, whether truncated, `info`.
+        """Apply torques for one period; return observation, reward, terminated, truncated and `info`.
 
-        `info` has the "time" reached [s], the "torques" of the action [N m, N], with a plan the end-effector's
-        "deviation" [m], and the "error" that has terminated the episode.
+        `info` contains the "time" reached [s], the "torques" of the action [N m, N], with a plan the "deviation" of the
+        end-effector [m], and after termination the "error".
 
         Parameters
         ----------
         action : (motors,) array
-            As parts of the limits.
+            Torques as fractions of the limits.
 
         Raises
         ------
         InputError
-            An action of another shape, or that is not finite.
+            An action of another shape, or one that is not finite.
         gymnasium.error.ResetNeeded
             The episode has ended, or none has begun.
         """
@@ -254,7 +256,7 @@ class Environment(Env[Array, NDArray[Any]]):
         return self._seen.copy(), reward, False, truncated, info
 
     def _terminated(self, error: IntegrationError, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """What `step` returns where the run cannot go on."""
+        """Return the result of `step` where the run cannot continue."""
         assert self._step is not None
         left = self._times.size - self._step
         info = {"time": self.simulation.time, "torques": action * self.limits, "error": str(error)}
@@ -277,7 +279,7 @@ class Environment(Env[Array, NDArray[Any]]):
         return info
 
     def _cut(self, action: Any) -> Array:
-        """An action within the limits."""
+        """Return an action clipped to the limits."""
         try:
             given = np.asarray(action, dtype=float)
         except (TypeError, ValueError):
@@ -288,7 +290,7 @@ class Environment(Env[Array, NDArray[Any]]):
         return np.clip(given, -1.0, 1.0)
 
     def _varied(self, mechanism: Mechanism) -> Simulation:
-        """The simulation of another mechanism, of the same members."""
+        """Return the simulation of another mechanism with the same members."""
         if _members(mechanism) != self._members:
             raise InputError("makes a mechanism of other members", field="vary", value=mechanism.name,
                              remedy="change numbers only: members keep their names")  # fmt: skip
@@ -299,13 +301,13 @@ class Environment(Env[Array, NDArray[Any]]):
 
 
 def _members(mechanism: Mechanism) -> tuple[tuple[str, ...], ...]:
-    """Names of bodies, joints, motors and sensors."""
+    """Return the names of bodies, joints, motors and sensors."""
     groups = (mechanism.bodies, mechanism.joints, mechanism.motors, measured_sensors(mechanism))
     return tuple(tuple(each.name for each in group) for group in groups)
 
 
 def _instants(start: float, end: float, period: float) -> Array:
-    """Instants (k,) of observations [s]: the start, then ends of periods, the last one shorter."""
+    """Return the times (k,) of observations [s]: the start, then the ends of periods, the last one being shorter."""
     count = periods_in(end - start, period)
     times = start + period * np.arange(count + 1, dtype=np.float64)
     times[-1] = end
@@ -313,7 +315,7 @@ def _instants(start: float, end: float, period: float) -> Array:
 
 
 def _limits(given: Any, task: TrackingTask | None, simulation: Simulation, part: float) -> Array:
-    """Torques (motors,) of an action of one; by default this part of the largest that a plan needs."""
+    """Return the torques (motors,) of an action of one; by default a fraction of the plan's largest torque."""
     motors = simulation.motors
     if given is None:
         if task is None:
@@ -331,7 +333,7 @@ def _limits(given: Any, task: TrackingTask | None, simulation: Simulation, part:
 
 
 def register() -> None:
-    """Register the environments of the library with Gymnasium, where they are not yet."""
+    """Register the environments of the library with Gymnasium unless they are registered already."""
     import gymnasium
 
     for name, (entry_point, settings) in REGISTERED.items():

@@ -1,4 +1,4 @@
-"""Estimates from readings: the steady Kalman filter, and rates of quantised angles."""
+"""State estimation from readings: the steady-state Kalman filter, and rates of quantised readings."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from paraflex.mechanism.quantities import positive
 
 @checked_arguments()
 def quantisation_noise(resolution: float) -> float:
-    """Standard deviation of what rounding to multiples of a resolution adds, resolution / sqrt(12), in its unit.
+    """Return the standard deviation of the quantisation error of a resolution, resolution / sqrt(12), in its unit.
 
-    The error of a signal that moves over several multiples is spread evenly over one (Widrow and Kollar, Quantization
-    Noise, 2008). Of a signal that stands still it is constant.
+    The error of a signal that moves over several multiples of the resolution is uniformly distributed (Widrow and
+    Kollar, Quantization Noise, 2008). The error of a constant signal is constant.
 
     Raises
     ------
@@ -33,31 +33,32 @@ def quantisation_noise(resolution: float) -> float:
 
 
 def rounded(readings: Array, resolution: Array) -> Array:
-    """Readings (k,) as multiples of their resolutions (k,); of those whose resolution is zero nothing is taken."""
+    """Round readings (k,) to multiples of their resolutions (k,); readings of resolution zero are not rounded."""
     coarse = resolution > 0.0
     steps = np.where(coarse, resolution, 1.0)
     return np.where(coarse, steps * np.round(readings / steps), readings)
 
 
-# Poles that SciPy's solution moves by less than this from the unit circle may be there by rounding.
+# A spectral radius of SciPy's solution above this may be one but for rounding: the solution is rejected.
 _STABLE = 1.0 - 1e-8
-# Doublings reach 2^60 samples; the last one changes nothing.
+# Largest number of doublings, 2^60 samples, and relative change at which they have converged.
 _DOUBLINGS, _CONVERGED = 60, 1e-15
 
 
 @dataclass(frozen=True)
 class KalmanFilter:
-    """Steady Kalman filter of x_k+1 = A x_k + B u_k + w_k, y_k = C x_k + e_k.
+    """Steady-state Kalman filter of x_k+1 = A x_k + B u_k + w_k, y_k = C x_k + e_k.
 
-    At a sample the estimate is corrected, x + L (y - C x), then carried on with the torques that act, A x + B u.
+    At a sample the estimate is corrected, x + L (y - C x), then propagated with the torques that act, A x + B u.
 
     Attributes
     ----------
     A, B, C : (n, n), (n, inputs) and (outputs, n) arrays
+        Matrices of the plant.
     gain : (n, outputs) array
-        L.
+        Filter gain L.
     covariance : (n, n) array
-        Of the error before a reading is taken.
+        Covariance of the estimation error before a reading is taken.
     """
 
     A: Array
@@ -68,20 +69,20 @@ class KalmanFilter:
 
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
-        """How the error decays: eigenvalues z (n,) of A (1 - L C)."""
+        """Poles z (n,) of the estimation error: eigenvalues of A (1 - L C)."""
         return np.asarray(np.linalg.eigvals(self.A - self.A @ self.gain @ self.C), dtype=complex)
 
     def corrected(self, x: Array, y: Array) -> Array:
-        """The estimate (n,) after readings (outputs,)."""
+        """Return the estimate (n,) corrected by readings (outputs,)."""
         return x + self.gain @ (y - self.C @ x)
 
     def carried_on(self, x: Array, u: Array) -> Array:
-        """The estimate (n,) of the next sample, under torques (inputs,)."""
+        """Return the estimate (n,) propagated to the next sample under torques (inputs,)."""
         return self.A @ x + self.B @ u
 
 
 def kalman_filter(A: Array, B: Array, C: Array, process: Array, noise: Array) -> KalmanFilter:
-    """The filter whose error is smallest, from the stationary Riccati equation.
+    """Return the filter of least error covariance, from the stationary Riccati equation.
 
     P = A P A^T - A P C^T (C P C^T + R)^-1 C P A^T + W, L = P C^T (C P C^T + R)^-1 (Anderson and Moore, Optimal
     Filtering, section 4.4).
@@ -89,15 +90,16 @@ def kalman_filter(A: Array, B: Array, C: Array, process: Array, noise: Array) ->
     Parameters
     ----------
     A, B, C : (n, n), (n, inputs) and (outputs, n) arrays
+        Matrices of the plant.
     process : (n, n) array
-        W, covariance of w_k.
+        Covariance W of w_k.
     noise : (outputs, outputs) array
-        R, covariance of e_k.
+        Covariance R of e_k.
 
     Raises
     ------
     InputError
-        There is none: something grows that readings do not show, or vibrates undamped unexcited.
+        No steady filter exists: a growing motion is not observable, or an undamped vibration is not excited.
     """
     try:
         P = riccati(A.T, C.T, process, noise)
@@ -110,17 +112,17 @@ def kalman_filter(A: Array, B: Array, C: Array, process: Array, noise: Array) ->
 
 
 def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
-    """Stabilising solution P (n, n) of P = A^T P A - A^T P B (R + B^T P B)^-1 B^T P A + Q, R diagonal.
+    """Return the stabilising solution P (n, n) of P = A^T P A - A^T P B (R + B^T P B)^-1 B^T P A + Q, R diagonal.
 
-    By doubling (Chu, Fan, Lin and Wang, Int. J. Control 77 (2004) 767), in states of one size: the k-th step is the
-    optimum over 2^k samples. Torques under way make A singular, with which the reordering of eigenvalues within
-    `scipy.linalg.solve_discrete_are` fails now and then. Where doubling loses too much to rounding, of vibrations that
-    decay over 10^5 samples say, that is tried as well.
+    The doubling algorithm (Chu, Fan, Lin and Wang, Int. J. Control 77 (2004) 767) is used in balanced states: its k-th
+    iterate is the optimum over 2^k samples. Delayed torques make A singular, for which the reordering of eigenvalues in
+    `scipy.linalg.solve_discrete_are` fails occasionally. Where doubling loses too much to rounding, for example with
+    vibrations that decay over 10^5 samples, SciPy's solver is tried as well.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        There is none.
+        No stabilising solution exists.
     """
     size = np.asarray(scipy.linalg.matrix_balance(A, permute=False, separate=True)[1][0])
     scaled, columns = A * size / size[:, None], B / size[:, None] / np.sqrt(np.diag(R))
@@ -142,7 +144,7 @@ def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
 
 
 def _radius(A: Array, B: Array, P: Array) -> float:
-    """Spectral radius of A with the feedback of a solution P, and R = 1; infinite if it is not finite."""
+    """Return the spectral radius of A with the feedback of a solution P and R = 1; infinite if P is not finite."""
     if not np.all(np.isfinite(P)):
         return np.inf
     gain = np.linalg.solve(np.eye(B.shape[1]) + B.T @ P @ B, B.T @ P @ A)
@@ -154,20 +156,21 @@ def _symmetric(matrix: Array) -> Array:
 
 
 class Differentiator:
-    """Values and rates of quantised readings: the steady Kalman filter of a motion whose acceleration is random.
+    """Steady-state Kalman filter for values and rates of quantised readings of a motion with random acceleration.
 
-    Between samples the acceleration is constant, with standard deviation `acceleration`; readings have the noise of
-    their resolution. The filter is the alpha-beta one (Kalata, IEEE Trans. Aerosp. Electron. Syst. 20 (1984) 174): the
-    larger acceleration T^2 / noise, the more it trusts the readings. Of steady motion the rate has no lag.
+    The acceleration is constant between samples, with standard deviation `acceleration`; readings have the quantisation
+    noise of their resolution. This is the alpha-beta filter (Kalata, IEEE Trans. Aerosp. Electron. Syst. 20 (1984)
+    174): the larger acceleration T^2 / noise, the more it trusts the readings. For a motion of constant rate the
+    estimated rate has no lag.
 
     Parameters
     ----------
     period : float
-        [s]
+        Sampling period T [s].
     resolution : float
-        Of the readings.
+        Resolution of the readings.
     acceleration : float
-        What is usual of the motion, in the unit of the readings [1/s^2].
+        Typical acceleration of the motion, in the unit of the readings [1/s^2].
 
     Raises
     ------
@@ -180,7 +183,7 @@ class Differentiator:
         positive(period, "period", "s")
         positive(acceleration, "acceleration", "the unit of the readings per s^2")
         A, G = np.array([[1.0, period], [0.0, 1.0]]), np.array([[0.5 * period**2], [period]])
-        # In units of T and of the resolution, as numbers far from one another blur the Riccati equation.
+        # The Riccati equation is solved in units of T and of the noise, as badly scaled numbers would cost accuracy.
         noise, size = quantisation_noise(resolution), np.array([1.0, 1.0 / period])
         unit = np.outer(1.0 / size, 1.0 / size) / noise**2
         found = kalman_filter(
@@ -193,15 +196,15 @@ class Differentiator:
 
     @property
     def alpha_beta(self) -> tuple[float, float]:
-        """The gains without units."""
+        """Dimensionless gains alpha and beta."""
         return float(self.gain[0]), float(self.gain[1]) * self.period
 
     def start(self) -> None:
-        """Forget what was read: the next reading begins at rest."""
+        """Reset the estimate: the next reading is taken to be at rest."""
         self._x = None
 
     def step(self, y: Array | float) -> tuple[Array, Array]:
-        """Estimated values and rates (readings,) after the readings (readings,) of a sample."""
+        """Return the estimated values and rates (readings,) from the readings (readings,) of a sample."""
         y = np.atleast_1d(np.asarray(y, dtype=float))
         before = np.array([y, np.zeros_like(y)]) if self._x is None else self._A @ self._x
         found = before + self.gain[:, None] * (y - before[0])
@@ -210,12 +213,12 @@ class Differentiator:
 
 
 def checked_cutoff(cutoff: float | None) -> float | None:
-    """The cut-off frequency of a low-pass of rates [Hz], or none.
+    """Return the cut-off frequency of a low-pass filter of rates [Hz] after checking it; None if there is no filter.
 
     Raises
     ------
     InputError
-        It is not positive.
+        A frequency that is not positive.
     """
     if cutoff is not None:
         positive(cutoff, "cutoff", "Hz")
@@ -223,17 +226,17 @@ def checked_cutoff(cutoff: float | None) -> float | None:
 
 
 class BackwardDifference:
-    """Rates of readings by backward differences and a low-pass of first order: r + a ((y - y_before) / T - r).
+    """Rates by backward differences and a first-order low-pass filter: r + a ((y - y_before) / T - r).
 
-    Resolution and period alone give steps of resolution / T; the low-pass, with a = 1 - exp(-2 pi cutoff T), spreads
-    them and lags by 1 / (2 pi cutoff), beside half a period of the difference.
+    Differences of readings have steps of resolution / T. The low-pass filter, with a = 1 - exp(-2 pi cutoff T), spreads
+    them, and lags by 1 / (2 pi cutoff) in addition to half a period of the difference.
 
     Parameters
     ----------
     period : float
-        [s]
+        Sampling period T [s].
     cutoff : float, optional
-        [Hz]; without one, differences as they are.
+        Cut-off frequency [Hz]; no filter by default.
 
     Raises
     ------
@@ -251,11 +254,11 @@ class BackwardDifference:
         self._rate: Array = np.zeros(0)
 
     def start(self) -> None:
-        """Forget what was read: the next reading begins at rest."""
+        """Reset the states: the next reading is taken to be at rest."""
         self._before = None
 
     def step(self, y: Array | float) -> tuple[Array, Array]:
-        """Readings (readings,) as they are, and their rates."""
+        """Return the readings (readings,) unchanged, and their rates."""
         y = np.atleast_1d(np.asarray(y, dtype=float))
         if self._before is None:
             self._rate = np.zeros_like(y)
@@ -265,7 +268,7 @@ class BackwardDifference:
         return y, self._rate.copy()
 
     def linear_law(self, readings: int) -> LinearLaw:
-        """From readings to rates: states are the readings before, then their rates."""
+        """Return the linear law from readings to rates; its states are the previous readings, then their rates."""
         none, one = np.zeros((readings, readings)), np.eye(readings)
         by = self.share / self.period * one
         left = (1.0 - self.share) * one

@@ -1,4 +1,4 @@
-"""Filters as users give them: a cut-off frequency or a transfer function."""
+"""Filters as users specify them: a cut-off frequency or a transfer function."""
 
 from __future__ import annotations
 
@@ -11,18 +11,26 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import positive
 
-# A transfer function: the time constant's inverse as a cut-off frequency [Hz] of first order, or coefficients of
-# numerator and denominator in descending powers of s.
+# Filter specification: cut-off frequency [Hz] of a first-order low-pass filter, or coefficients of numerator and
+# denominator in descending powers of s.
 Filter = float | tuple[Sequence[float], Sequence[float]]
 
 
 def transfer_function(value: Any, field: str) -> tuple[Array, Array]:
-    """Coefficients of numerator and denominator, in descending powers of s.
+    """Return the coefficients of numerator and denominator, in descending powers of s.
+
+    Parameters
+    ----------
+    value : Filter
+        Cut-off frequency [Hz] of a first-order low-pass filter, a pair (numerator, denominator), or a transfer function
+        with attributes `num` and `den`.
+    field : str
+        Name of the field for errors.
 
     Raises
     ------
     InputError
-        Neither of the two, one that is not proper, or not stable.
+        A value of none of these kinds, or a transfer function that is not proper or not stable.
     """
     if all(hasattr(value, name) for name in ("num", "den")):
         value = (np.ravel(value.num), np.ravel(value.den))

@@ -1,4 +1,4 @@
-"""Torques that are held from one instant to the next: as they are given, limited, written into signals and noted."""
+"""Torques held between instants: conversion of the given torques, limits, writing into input signals, and log."""
 
 from __future__ import annotations
 
@@ -23,36 +23,39 @@ Torques = Sequence[float] | Mapping[str, float] | Array
 
 
 class HeldTorques:
-    """Torques of a mechanism's motors that are held, besides those of a plan, behind amplifiers.
+    """Held torques of a mechanism's motors behind their amplifiers, in addition to planned torques.
 
     Parameters
     ----------
     system : System
+        Equations of motion of the mechanism.
     mechanism : Mechanism
-        As described.
+        Mechanism as described.
     motors : tuple of str
-        Those that torques are given for, in the order of the mechanism.
+        Motors whose torques are set, in the order of the mechanism.
     planned : FeedForward
-        Of all motors; without signals none act.
+        Planned torques of all motors; without signals none act.
     start, end : float
-        Of the run [s].
+        Start and end time of the run [s].
 
     Attributes
     ----------
     planned : FeedForward
-        With signals, of zero torques where there are none.
+        Planned torques, with signals of zero torque if there are none.
     signals : kernel signals
-        Which the integration reads.
+        Input signals that the integration reads.
     knots : (k,) array
-        Times at which signals are not smooth [s].
+        Times at which the signals are not smooth [s].
     amplifiers : Amplifiers
+        Limits and lags of the motors' amplifiers.
     limited : (motors,) array of bool
-        Whether an amplifier limits the torques that are given.
+        Whether an amplifier limits the torques that are set.
     base : (pieces,) array
         Planned torques at the starts of the signals' pieces [N m, N].
     held : (motors,) array
-        Of all motors [N m, N].
+        Held torques of all motors [N m, N].
     log : TorqueLog
+        Log of the commanded torques.
     """
 
     def __init__(
@@ -74,18 +77,18 @@ class HeldTorques:
         signals, knots = pack_signals(system.mechanism, several, end)
         self.signals: Signals = signals
         self.knots: Array = np.sort(np.concatenate([path_stops(planned.knots, mechanism), knots]))
-        # The first coefficients of signals are those of held torques as well.
+        # Held torques are added to the constant coefficients of the signals.
         self.base: Array = self.signals.coefficients[:, 0].copy()
         self.held: Array = np.zeros(len(own))
         self.log: TorqueLog = TorqueLog(lags, start, self.held)
 
     def given(self, torques: Torques) -> Array:
-        """Torques of all motors (all,) from those of `motors`, or of some of them by name.
+        """Return the torques of all motors (all,) from those of `motors`, or from values by name.
 
         Raises
         ------
         InputError
-            Unknown motors, other numbers of torques, none that are finite.
+            Unknown motors, a wrong number of torques, or torques that are not finite.
         """
         if isinstance(torques, Mapping):
             all_known(torques, self.motors, "torques", "motor")
@@ -97,21 +100,21 @@ class HeldTorques:
         return self.of_all(given)
 
     def of_all(self, torques: Array) -> Array:
-        """Torques of all motors (all,) from those of `motors`; zero for others."""
+        """Return the torques of all motors (all,) from those of `motors`; zero for others."""
         everything = np.zeros(len(self.held))
         everything[self._active] = torques
         return everything
 
     def planned_at(self, t: float) -> Array:
-        """Torques (all,) of the plan at a time [s]; zero without one."""
+        """Return the planned torques (all,) at a time [s]; zero without a plan."""
         return self.planned.evaluate(np.array([t]))[0]
 
     def acting(self, t: float) -> Array:
-        """Torques (all,) that act at the time reached [s], those of the plan included."""
+        """Return the torques (all,) that act at the time reached [s], planned torques included."""
         return self.log.now(t) + self.planned_at(t)
 
     def hold(self, torques: Array, t: float, state: Callable[[], State]) -> bool:
-        """Let torques (all,) act from a time on [s], as far as amplifiers can; whether any changes."""
+        """Hold torques (all,) from a time on [s], within the limits of amplifiers; return whether any changes."""
         if self.limited.any():
             torques = self._within_limits(torques, state())
         changed = not np.array_equal(torques, self.held)
@@ -122,33 +125,33 @@ class HeldTorques:
         return changed
 
     def begin(self, torques: Array, state: State) -> None:
-        """Let torques (all,) act from before the start on, as far as amplifiers can."""
+        """Hold torques (all,) from before the start on, within the limits of amplifiers."""
         self.held = self._within_limits(torques, state)
         self.log = TorqueLog(self.amplifiers.lags, state.time, self.held)
         self._write()
 
     def note(self, t: float, torques: Array) -> None:
-        """Note torques (all,) that act from a time on [s]."""
+        """Log torques (all,) that act from a time on [s]."""
         self.log.note(t, torques)
         self.held = torques
 
     def saved(self) -> tuple[Array, TorqueLog]:
-        """Torques held (motors,), and which acted before: what `restore` goes back to."""
+        """Return the held torques (motors,) and a copy of the log, for `restore`."""
         return self.held.copy(), self.log.copy()
 
     def restore(self, saved: tuple[Array, TorqueLog]) -> None:
-        """Go back to what `saved` gave."""
+        """Return to a state that `saved` returned."""
         self.held, self.log = saved[0].copy(), saved[1].copy()
         self._write()
 
     def _within_limits(self, torques: Array, now: State) -> Array:
-        """Torques (all,) that with those of the plan are within the limits of amplifiers at the speed now."""
+        """Return torques (all,) whose sum with the planned ones is within the amplifiers' limits at this speed."""
         low, high = self.amplifiers.limits(self.amplifiers.rates(self._system, now.q, now.v))
         planned = self.planned_at(now.time)
         return np.where(self.limited, np.clip(torques, low - planned, high - planned), torques)
 
     def _write(self) -> None:
-        """Write the torques held into the signals."""
+        """Write the held torques into the signals."""
         breaks, coefficients, start = self.signals.breaks, self.signals.coefficients, self.signals.start
         since, begun, given = self.log.last
         for k, lag in enumerate(self.amplifiers.lags):

@@ -1,4 +1,4 @@
-"""Controllers within the compiled time loop: one that samples alone, with a linear law or a compiled function."""
+"""Controllers in the compiled time loop: a single sampled controller with a linear law or a compiled function."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ from paraflex.kernel.sampled import NOT_FINITE, RAISED, SAMPLED, WRONG, SampledL
 
 
 class CompiledLaw:
-    """A law of one's own that runs in the compiled time loop: a law for `SampledController`.
+    """User-defined law that runs in the compiled time loop: a law for `SampledController`.
 
     Parameters
     ----------
     function : callable
-        Of (k, t, y, x, torques), compiled by Numba, or such that Numba can compile it: from the errors y (inputs,) of
-        sample k at time t [s] and its states x (states,), zero at the start, it writes torques (outputs,) [N m, N],
-        zero before, and changes x. It is compiled with bounds of arrays checked, and so are the functions it calls; an
-        exception ends the run.
+        Function of (k, t, y, x, torques), compiled by Numba or such that Numba can compile it. From the errors y
+        (inputs,) of sample k at time t [s] and the states x (states,), which start at zero, it writes the torques
+        (outputs,) [N m, N], which are zero before, and updates x. It is compiled with array bounds checked, and so are
+        the functions that it calls; an exception ends the run.
     states : int
-        Number of its states.
+        Number of states.
 
     Raises
     ------
     InputError
-        No function, or a number of states below zero or above `MOST_STATES`; as it starts, of a function that Numba
-        cannot compile.
+        An object that is not a function, or a number of states below zero or above `MOST_STATES`; when started, a
+        function that Numba cannot compile.
     """
 
     @checked_arguments()
@@ -60,24 +60,24 @@ class CompiledLaw:
         self._entry: Any = None
 
     def start(self, plant: Plant) -> None:
-        """See `Controller`."""
+        """Prepare for a run: see `Controller.start`."""
         self.x: Array = np.zeros(self.states)
         self._outputs = len(plant.outputs)
         self._entry = self._compiled.entry(len(plant.inputs), self.states, self._outputs)
 
     def step(self, k: int, t: float, y: Array) -> Array:
-        """See `Controller`."""
+        """Compute the torques of a sample: see `Controller.step`."""
         torques = np.zeros(self._outputs)
         self._compiled.function(k, t, np.array(y), self.x, torques)
         return torques
 
     @property
     def address(self) -> int:
-        """Of its machine code, once it has started."""
+        """Address of the machine code, available once started."""
         return int(self._entry.address)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> CompiledLaw:
-        """A copy with its own states and the same function."""
+        """Return a copy with its own states and the same function."""
         other = object.__new__(type(self))
         vars(other).update(vars(self))
         other.x = self.x.copy()
@@ -87,22 +87,24 @@ class CompiledLaw:
 def sampled_law(
     controller: Any, plant: Plant, readings: Readings, outputs: list[int], base: Array, held: Array, end: float
 ) -> SampledLaw | None:
-    """A controller that has started, for the time loop; None of one that has to stay outside.
+    """Return a started controller in the form of the time loop; None if it must run outside.
 
     Parameters
     ----------
     controller : Controller
+        Started controller.
     plant : Plant
+        Plant of the controller.
     readings : Readings
-        Of its inputs.
+        Readings of its inputs.
     outputs : list of int
-        Its motors, by their numbers among all of the mechanism.
+        Indices of its motors among all of the mechanism.
     base : (breaks,) array
-        First coefficients of signals without its torques.
+        Constant coefficients of the signals without its torques.
     held : (motors,) array
-        Torques of all motors that act at the start.
+        Torques of all motors that act at the start [N m, N].
     end : float
-        Of the run [s].
+        End time of the run [s].
     """
     law: Any = getattr(controller, "law", None)
     linear = _linear(law)
@@ -137,7 +139,7 @@ def sampled_law(
 
 
 def linear_model(controller: Any, plant: Plant) -> DiscreteModel | None:
-    """The law of a controller that has started, as it is at the first sample; None if not linear, or behind filters."""
+    """Return the law of a started controller at the first sample; None if it is not linear or readings are filtered."""
     if type(controller) is not SampledController or any(controller.filter_models):
         return None
     law = _linear(controller.law)
@@ -148,14 +150,14 @@ def linear_model(controller: Any, plant: Plant) -> DiscreteModel | None:
 
 
 def wrong_torques(law: SampledLaw) -> list[int]:
-    """Places among its outputs of torques that are not finite, where that ended a run."""
+    """Return the indices among the outputs of torques that are not finite, if these ended a run; else none."""
     if law.counts[WRONG] != NOT_FINITE:
         return []
     return np.flatnonzero(~np.isfinite(law.wanted[law.counts[SAMPLED]])).tolist()
 
 
 def exception_of(law: SampledLaw, controller: Any) -> Exception | None:
-    """Exception of a controller's compiled function that ended a run, by a repetition of the last sample; else None."""
+    """Return the exception of a compiled function that ended a run, by repeating the last sample; None without one."""
     if law.counts[WRONG] != RAISED:
         return None
     k, function = int(law.counts[SAMPLED]), controller.law
@@ -168,7 +170,7 @@ def exception_of(law: SampledLaw, controller: Any) -> Exception | None:
 
 
 def _linear(law: Any) -> LinearLaw | None:
-    """A law as a linear one, unless its steps are those of another class than its linear form."""
+    """Return a law in linear form; None if a class overrides its steps without its linear form."""
     if not hasattr(law, "linear_law") or "step" in vars(law):
         return None
     owners = [next((each for each in type(law).__mro__ if name in vars(each)), None)
@@ -189,7 +191,7 @@ def _law_arrays(linear: LinearLaw | None, law: Any, inputs: int, outputs: int) -
 
 
 def _read(readings: Readings) -> dict[str, np.ndarray]:
-    """Rows of readings that are linear, zero of others, and places."""
+    """Return the arrays of the readings: rows of the linear ones, zero for others, and point positions."""
     linear, count = readings.affine, len(readings.names)
     given = {"value": linear.value, "rows_q": linear.q, "rows_v": linear.v, "rows_a": linear.a,
              "turning": linear.turning, "angle": linear.angle.astype(np.int64)}  # fmt: skip
@@ -207,7 +209,7 @@ def _read(readings: Readings) -> dict[str, np.ndarray]:
 
 
 def _filters(controller: SampledController, inputs: int) -> dict[str, Array]:
-    """Matrices of all filters of readings together; none where there are no filters."""
+    """Return the matrices of all filters of readings together; empty without filters."""
     several = controller.filter_models
     if not any(several):
         shapes = {"A": (0, 0), "B": (0, inputs), "C": (inputs, 0), "D": 0, "start": (0, inputs)}
@@ -220,7 +222,7 @@ def _filters(controller: SampledController, inputs: int) -> dict[str, Array]:
 
 
 def _reference_table(controller: SampledController, times: Array) -> Array:
-    """References (samples, inputs) at times of samples."""
+    """Return the references (samples, inputs) at given sample times."""
     table = np.zeros((times.size, len(controller.found_references)))
     for i, reference in enumerate(controller.found_references):
         if isinstance(reference, AtSamples):
@@ -231,12 +233,12 @@ def _reference_table(controller: SampledController, times: Array) -> Array:
 
 
 def _rows(count: int, there: int) -> np.ndarray:
-    """Numbers of rows for samples: the last goes on."""
+    """Return row indices for samples; the last row is kept afterwards."""
     return np.minimum(np.arange(count), there - 1)
 
 
 def _apart(array: np.ndarray) -> Any:
-    """A copy in memory of its own: see `kernel.arrays`."""
+    """Return a copy in separate memory: see `kernel.arrays`."""
     copy = apart(array.shape, array.dtype.type)
     copy[...] = array
     return copy

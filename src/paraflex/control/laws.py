@@ -1,9 +1,9 @@
-"""Laws of joints: proportional, derivative and integral ones, projected where motors are redundant.
+"""Joint controllers: PD and PID control of motor angles, with projection of the torques where motors are redundant.
 
 With e the errors of the active motors' angles, tau = -P (Kp e + Kd e' + Ki integral of e). Encoders of redundant motors
-contradict one another, by deflections of links and by quantisation; without P = B^+ B, which keeps of torques what acts
-on the motion, each contradiction makes torques that only strain links against one another. B is the rigid actuation
-matrix on the planned motion.
+contradict one another, because of link deflections and quantisation. The projector P = B^+ B keeps the part of the
+torques that acts on the motion; without it, each contradiction causes torques that only strain links against one
+another. B is the rigid actuation matrix on the planned motion.
 """
 
 from __future__ import annotations
@@ -30,44 +30,43 @@ from paraflex.mechanism.measured import encoders_of
 from paraflex.mechanism.quantities import all_known, positive
 from paraflex.tracking import TrackingTask
 
-# Parts of torques below this are rounding.
+# Internal torques below this fraction of the largest torque are rounding errors.
 _ROUNDING = 1e-12
 
 Gain = float | Sequence[float] | Mapping[str, float] | Array
 
 
 class JointGains(NamedTuple):
-    """Gains of a PD law of joints: stiffness [N m/rad] and damping [N m s/rad]."""
+    """Gains of a PD joint controller: stiffness [N m/rad] and damping [N m s/rad]."""
 
     stiffness: float
     damping: float
 
 
 class JointPID:
-    """PID of the angles of a mode's motors: a law for `SampledController`.
+    """PID control of the angles of a mode's motors: a law for `SampledController`.
 
-    The rate is the difference of two readings over the period, low-pass filtered if a cut-off is given. Where torques
-    were limited, the integral is brought back towards what the limits leave, within the time Kp/Ki.
+    The rate is the difference of two readings over the period, low-pass filtered if a cut-off is given. Anti-windup:
+    where torques are limited, the integral is brought back towards the limited torques, with the time constant Kp/Ki.
 
     Parameters
     ----------
     stiffness : float, sequence or mapping of str to float
-        Kp, of all motors or each [N m/rad, N/m].
-    damping : likewise
-        Kd [N m s/rad, N s/m].
-    integral : likewise
-        Ki [N m/(rad s), N/(m s)].
+        Proportional gain Kp of all motors or of each [N m/rad, N/m].
+    damping : float, sequence or mapping of str to float
+        Derivative gain Kd [N m s/rad, N s/m].
+    integral : float, sequence or mapping of str to float
+        Integral gain Ki [N m/(rad s), N/(m s)].
     project : bool
-        Whether torques that do not act on the rigid motion are taken out, where there is a plan; else see
-        `internal_torques`.
+        Whether torques that do not act on the rigid motion are removed where there is a plan: see `internal_torques`.
     cutoff : float, optional
-        Of the low-pass filter of rates [Hz].
+        Cut-off frequency of the low-pass filter of rates [Hz]; no filter by default.
 
     Raises
     ------
     InputError
-        As it starts: gains that are negative or no numbers, gains of motors that it does not drive, or other numbers
-        of readings and motors.
+        When started: gains that are negative or not numbers, gains of motors that it does not drive, or different
+        numbers of readings and motors.
     """
 
     title = "PID of joints"
@@ -88,7 +87,7 @@ class JointPID:
         self._cutoff = checked_cutoff(cutoff)
 
     def start(self, plant: Plant) -> None:
-        """See `Controller`."""
+        """Prepare for a run: see `Controller.start`."""
         check_pairs(plant.inputs, plant.outputs)
         gains = (gains_of(gain, plant.outputs, field) for field, gain in self._gains.items())
         self._Kp, self._Kd, self._Ki = gains
@@ -98,21 +97,27 @@ class JointPID:
         self._wanted = np.zeros(len(plant.outputs))
         self._projector: AtSamples | None = None
         if self._project and plant.task is not None:
-            # P (outputs, outputs) of its motors on the planned motion, at its samples.
+            # Projectors P (outputs, outputs) of the motors on the planned motion, at the controller's samples.
             effort = required_effort(planned_motion(plant))
             self._projector = AtSamples(plant, torque_projectors(effort, plant.outputs))
 
     @checked_arguments()
     def sampled(self, period: float, mechanism: Mechanism, motors: Sequence[str] | None = None) -> DiscreteModel:
-        """The law without projection and limits as a model in state space, for `closed_loop` and `margins`.
+        """Return the law without projection and limits as a state-space model, for `closed_loop` and `margins`.
 
         Parameters
         ----------
         period : float
-            [s]
+            Sampling period [s].
         mechanism : Mechanism
+            Mechanism with the motors.
         motors : sequence of str, optional
-            Those it drives, all by default; its readings are the encoders of their joints.
+            Motors that it drives, all by default; its readings are the encoders of their joints.
+
+        Raises
+        ------
+        InputError
+            Motors that do not each have a joint of their own.
         """
         names = tuple(motor.name for motor in mechanism.motors) if motors is None else tuple(motors)
         joints = encoders_of(mechanism, names)
@@ -124,7 +129,7 @@ class JointPID:
         return DiscreteModel(law.A, law.B, law.C, law.D, period, joints, names)
 
     def step(self, k: int, t: float, y: Array) -> Array:
-        """See `Controller`; y are errors of angles."""
+        """Compute the torques of a sample from errors y of angles: see `Controller.step`."""
         self._sum = self._sum + self._Ki * self._period * y
         torques = -(self._Kp * y + self._Kd * self._rates.step(y)[1] + self._sum)
         if self._projector is not None:
@@ -133,19 +138,19 @@ class JointPID:
         return torques
 
     def limited(self, torques: Array) -> None:
-        """Bring the integral back where torques were limited."""
+        """Reduce the integral where torques were limited."""
         excess = self._wanted - torques
         if np.any(excess):
             self._sum = self._sum + self._pace * excess
 
     @property
     def _pace(self) -> Array:
-        """Share of an excess by which integrals are brought back in a period."""
+        """Fraction of the excess torque by which the integrals are brought back in a period."""
         pace = np.divide(self._Ki * self._period, self._Kp, out=np.ones_like(self._Kp), where=self._Kp > 0.0)
         return np.minimum(pace, 1.0) * (self._Ki > 0.0)
 
     def linear_law(self) -> LinearLaw:
-        """For the compiled time loop: states are the errors before, their rates and the integrals."""
+        """Return the law for the compiled time loop; its states are the previous errors, their rates and integrals."""
         law = _pid(self._Kp, self._Kd, self._Ki, self._rates)
         back = np.diag(self._pace)[self._Ki > 0.0]
         E = np.vstack([np.zeros((len(law.A) - len(back), len(self._Kp))), back])
@@ -153,7 +158,10 @@ class JointPID:
 
 
 def _pid(Kp: Array, Kd: Array, Ki: Array, rates: BackwardDifference) -> LinearLaw:
-    """-(Kp y + Kd y' + sum of Ki T y), with gains (motors,): states are those of the rates, and sums where Ki is."""
+    """Return the linear law -(Kp y + Kd y' + sum of Ki T y), with gains (motors,).
+
+    Its states are those of the rates, and the sums of motors with an integral gain.
+    """
     one, summed = rates.linear_law(len(Kp)), np.eye(len(Kp))[Ki > 0.0]
     gain = np.diag(Ki * rates.period)
     return LinearLaw(
@@ -166,7 +174,7 @@ def _pid(Kp: Array, Kd: Array, Ki: Array, rates: BackwardDifference) -> LinearLa
 
 
 def torque_projectors(effort: Effort, motors: Sequence[str]) -> Array:
-    """P = B^+ B (k, motors, motors) of some motors along a motion."""
+    """Return the projectors P = B^+ B (k, motors, motors) of some motors along a motion."""
     own = [motor.name for motor in effort.motion.mechanism.motors]
     B = effort.matrix[:, :, [own.index(name) for name in motors]]
     return np.linalg.pinv(B) @ B
@@ -174,14 +182,21 @@ def torque_projectors(effort: Effort, motors: Sequence[str]) -> Array:
 
 @checked_arguments()
 def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Array) -> Array:
-    """The part (I - P) tau (k, motors) of torques (k, motors) that only strains links, at the first samples of a task.
+    """Return the internal part (I - P) tau (k, motors) of torques, which only strains links against one another.
 
     Parameters
     ----------
     task : TrackingTask
+        Task along whose planned motion the projectors P are computed.
     mode : str or ActuationMode
+        Mode whose motors are active.
     torques : (k, motors) array
-        Of all motors, those outside of the mode zero [N m, N].
+        Torques of all motors at the first k samples of the task, zero for motors outside the mode [N m, N].
+
+    Raises
+    ------
+    InputError
+        Torques of another shape.
     """
     names = [motor.name for motor in task.mechanism.motors]
     active = [name for name in names if name in task.mode(mode).motors]
@@ -192,7 +207,7 @@ def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Arr
                          remedy=f"give at most {len(task.motion.t)} x {len(names)} numbers")  # fmt: skip
     out = np.zeros_like(torques)
     out[:, columns] = torques[:, columns] - np.einsum("kij,kj->ki", P, torques[:, columns])
-    # Of as many motors as degrees of freedom nothing is left but rounding.
+    # Where there are as many motors as degrees of freedom, only rounding errors remain.
     out[np.abs(out) < _ROUNDING * np.max(np.abs(torques), initial=0.0)] = 0.0
     return out
 
@@ -201,18 +216,21 @@ def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Arr
 def joint_gains(
     task: TrackingTask, mode: str | ActuationMode, frequency: float, damping_ratio: float = 0.7
 ) -> JointGains:
-    """Gains of a PD law of joints that give the rigid mechanism a natural frequency and a damping ratio.
+    """Compute PD joint gains that give the rigid mechanism a natural frequency and a damping ratio.
 
-    One stiffness k for all motors makes the task stiffness k B B^T; of M^-1 k B B^T, with M = Z^T M Z the rigid
-    mechanism's inertia, the mean of the eigenvalues over task coordinates and path is omega^2.
+    One stiffness k for all motors gives the task stiffness k B B^T. The mean of the eigenvalues of M^-1 k B B^T over
+    task coordinates and path equals omega^2, where M = Z^T M Z is the inertia of the rigid mechanism.
 
     Parameters
     ----------
     task : TrackingTask
+        Task with the planned motion.
     mode : str or ActuationMode
+        Mode whose motors are controlled.
     frequency : float
-        [Hz]
+        Natural frequency [Hz].
     damping_ratio : float
+        Damping ratio.
 
     Raises
     ------
@@ -229,14 +247,14 @@ def joint_gains(
 
 
 def task_inertia(effort: Effort) -> Array:
-    """Z^T M Z (k, tasks, tasks) of the rigid mechanism along a motion."""
+    """Return the task-space inertia Z^T M Z (k, tasks, tasks) of the rigid mechanism along a motion."""
     motion = effort.motion
     masses = np.array([mass_matrix(motion.system, q) for q in motion.q])
     return np.swapaxes(motion.basis, 1, 2) @ masses @ motion.basis
 
 
 def check_pairs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
-    """Raise an `InputError` unless there is a reading for each motor."""
+    """Raise an `InputError` unless there is one reading for each motor."""
     if len(inputs) != len(outputs):
         raise InputError(
             f"{len(inputs)} readings for {len(outputs)} motors", field="inputs", value=", ".join(inputs),
@@ -245,12 +263,12 @@ def check_pairs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
 
 
 def gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
-    """A gain for each motor (motors,), from one for all or by motor.
+    """Return one gain for each motor (motors,), from one for all, one for each, or values by motor.
 
     Raises
     ------
     InputError
-        Unknown motors, or no numbers from zero on.
+        Unknown motors, or gains that are not numbers or are negative.
     """
     if isinstance(given, Mapping):
         all_known(given, motors, field, "motor")

@@ -1,4 +1,4 @@
-"""Linear laws with limits, as the compiled time loop takes them."""
+"""Linear control laws with limits, in the form that the compiled time loop takes."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from paraflex.arrays import Array
 
 @dataclass(frozen=True)
 class LinearLaw:
-    """A law x' = A x + B e + E (w - g), w = P (h + C x + D e), with g what limits leave of the torques w wanted.
+    """Linear law x' = A x + B e + E (w - g), w = P (h + C x + D e), with g the torques w after limits.
 
     Attributes
     ----------
     A, B, C, D : (n, n), (n, inputs), (outputs, n) and (outputs, inputs) arrays
+        State, input, output and feed-through matrices; e are errors of readings.
     E : (n, outputs) array
-        None: limits tell it nothing.
+        Gain of the feedback from limiting; empty if the states do not depend on it (no anti-windup).
     first : (n, inputs) array
-        States before the first sample, by its errors; none for zero.
+        Matrix from the first errors to the states before the first sample; empty for zero states.
     holding : (outputs,) array
-        Constant torques h; none for zero.
+        Constant torques h; empty for zero.
     waiting : (n,) array
-        One for states that stay as they are while a torque is limited.
+        One for states that stay constant while a torque is limited, zero for others; empty if there are none.
     projector : (samples, outputs, outputs) array or None
-        P; its last goes on.
+        Projectors P by sample, the last one kept afterwards; None for the identity.
     """
 
     A: Array

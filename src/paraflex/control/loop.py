@@ -1,4 +1,4 @@
-"""Controllers that act on a simulation, each at its own instants."""
+"""Schedule of the sampled controllers of a simulation: sample times, delayed torques and records of each."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ from paraflex.mechanism.quantities import not_negative
 
 
 class Due(NamedTuple):
-    """Torques (outputs,) of a controller, by its number, that act from an instant on."""
+    """Torques (outputs,) of a controller, given by its index, that act from an instant on.
+
+    The instant is `tick` + `part` shortest periods after the start.
+    """
 
     tick: int
     part: float
@@ -39,32 +42,34 @@ class Due(NamedTuple):
 
 @dataclass(frozen=True)
 class ControllerRecord:
-    """What a controller did in a run.
+    """Record of a controller in a run.
 
     Attributes
     ----------
     name : str
+        Name of the controller.
     period, delay : float
-        [s]
+        Sampling period, and delay from a sample until its torques act [s].
     inputs, outputs : tuple of str
         Sensors and motors.
     input_units, output_units : tuple of str
+        Units of readings and torques.
     t : (k,) array
-        Of its samples [s].
+        Sample times [s].
     readings : (k, inputs) array
-        Quantised and filtered, where it has such a chain.
+        Readings, after quantisation and filters if the controller has such a chain.
     wanted : (k, outputs) array
-        Torques of the law.
+        Torques that the law returned [N m, N].
     given : (k, outputs) array
-        Those within the limits, which acted from t + delay on.
+        Torques after saturation and rate limiting, applied from t + delay on [N m, N].
     law : str
-        What it computes torques by, in a few words.
+        Short description of the law.
     limits : (outputs, 2) array
-        Lowest and highest torque [N m, N]; infinite without.
+        Lowest and highest torque [N m, N]; infinite without limits.
     rates : (outputs,) array
-        Largest change of torques in a second [N m/s, N/s]; infinite without.
+        Largest rate of the torques [N m/s, N/s]; infinite without limits.
     linear : DiscreteModel or None
-        Its law from readings to torques, as at the first sample, if that is linear and readings are not filtered.
+        Law from readings to torques, as at the first sample; None if it is not linear or readings are filtered.
     """
 
     name: str
@@ -85,35 +90,35 @@ class ControllerRecord:
 
     @property
     def limited(self) -> Array:
-        """At which samples (k,) a limit was met."""
+        """Whether a limit was active, for each sample (k,)."""
         return np.any(self.given != self.wanted, axis=1)
 
 
 class LawFailure(Exception):
-    """A controller that raised, or returned what cannot be torques; the cause in words."""
+    """Error of a controller that raised an exception or returned invalid torques, with the cause as its message."""
 
 
 class Loop:
-    """Controllers with their instants: multiples of the shortest period, and those plus delays.
+    """Schedule of controllers: samples at multiples of the shortest period, and actuation instants after their delays.
 
     Parameters
     ----------
     controllers : sequence
-        Each a `Controller`, or what `SampledController` takes for a law that says its period.
+        Controllers: each a `Controller`, or a law accepted by `SampledController` that has a period.
     plant : callable
-        Gives the `Plant` of a controller's inputs, outputs, period and delay.
+        Function that returns the `Plant` of a controller.
     sensors, motors : tuple of str
-        In the order of readings and of torques.
+        Names of all sensors and motors, in the order of readings and of torques.
     start : float
         Time of the first sample [s].
 
     Raises
     ------
     InputError
-        A period that is no multiple of the shortest one, unknown sensors or motors, a name twice, two laws each of
-        which gives the whole torque.
+        A period that is not a multiple of the shortest one, unknown sensors or motors, a name given twice, or two laws
+        each of which gives the whole torque.
     LawFailure
-        A controller that raises as it starts.
+        A controller that raised an exception when started.
     """
 
     def __init__(
@@ -137,7 +142,7 @@ class Loop:
                 raise error.within(name) from None
             except Exception as error:
                 raise _raised(name, error) from error
-        # Names of the sensors that controllers read, in the order of the readings that `act` needs.
+        # Sensors that the controllers read, in the order of the readings for `act`.
         self.read: tuple[str, ...] = tuple(dict.fromkeys(name for plant in self._plants for name in plant.inputs))
         self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self._plants]
         self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self._plants]
@@ -146,25 +151,25 @@ class Loop:
             multiple_of(name, each.period, self.period) for name, each in zip(self.names, self.controllers, strict=True)
         ]
         self._delays = [whole_and_part(each.delay / self.period) for each in self.controllers]
-        # Number of the next sample of each, torques to come, and those of each that act.
+        # Index of the next sample of each controller, delayed torques, and acting torques of each.
         self._next = [0] * len(self.controllers)
         self._due: list[Due] = []
         self.acting: Array = np.zeros((len(self.controllers), len(motors)))
         for k, each in enumerate(self.controllers):
             self.acting[k, self._outputs[k]] = getattr(each, "holding_torques", 0.0)
-        # Of each its samples: times, readings, torques wanted and given.
+        # Samples of each controller: times, readings, torques of the law and after limits.
         self.kept: list[list[tuple[float, Array, Array, Array]]] = [[] for _ in self.controllers]
-        # Where the compiled time loop runs the controller.
+        # Arrays of the compiled time loop, if that runs the controller.
         self.inside: SampledLaw | None = None
 
     @property
     def alone(self) -> tuple[Controller, Plant] | None:
-        """The controller with its plant, where there is but one."""
+        """Controller and its plant if there is only one; else None."""
         return (self.controllers[0], self._plants[0]) if len(self.controllers) == 1 else None
 
     @property
     def failure(self) -> LawFailure | None:
-        """What ended a run in the compiled time loop."""
+        """Failure that ended a run in the compiled time loop; None without one."""
         if self.inside is None:
             return None
         raised = exception_of(self.inside, self.controllers[0])
@@ -175,13 +180,13 @@ class Loop:
 
     @property
     def whole(self) -> list[str]:
-        """Names of controllers that give the whole torque."""
+        """Names of the controllers that give the whole torque."""
         pairs = zip(self.names, self.controllers, strict=True)
         return [name for name, each in pairs if getattr(each, "whole_torque", False)]
 
     @property
     def _instant(self) -> tuple[int, float]:
-        """The next instant, in shortest periods."""
+        """Next instant, as whole shortest periods and a fraction of one."""
         samples = min(every * number for every, number in zip(self._every, self._next, strict=True))
         return min([(samples, 0.0), *((due.tick, due.part) for due in self._due)])
 
@@ -192,17 +197,22 @@ class Loop:
         return self._start + (tick + part) * self.period
 
     def act(self, readings: Callable[[], Array]) -> Array | None:
-        """Take the samples of this instant, then let torques act; those of all motors, None where nothing changes.
+        """Take the samples due at this instant, then update the acting torques.
 
         Parameters
         ----------
         readings : callable
-            Gives readings of the sensors in `read`.
+            Function that returns the readings of the sensors in `read`.
+
+        Returns
+        -------
+        (motors,) array or None
+            Torques of all motors [N m, N]; None if none changes.
 
         Raises
         ------
         LawFailure
-            A controller that raises, or whose torques are no finite numbers, or too few or many.
+            A controller that raised an exception, or returned torques that are not finite or of a wrong number.
         """
         tick, part = self._instant
         sampled = [k for k, (every, number) in enumerate(zip(self._every, self._next, strict=True))
@@ -245,7 +255,7 @@ class Loop:
         return torques
 
     def keep_last(self) -> None:
-        """Let the controller in the compiled time loop have its last sample, as outside of it."""
+        """Give the controller in the compiled time loop its last sample, as it has outside of that loop."""
         law, controller = self.inside, self.controllers[0]
         if law is None or not law.counts[SAMPLED]:
             return
@@ -254,7 +264,13 @@ class Loop:
         controller.last = ChainSample(law.readings[k].copy(), law.wanted[k].copy(), law.given[k].copy())
 
     def torques_acted(self, after: int) -> Iterator[tuple[float, Array]]:
-        """Times at which torques (motors,) of all motors began to act in the compiled time loop, after so many."""
+        """Yield times and torques (motors,) of all motors that began to act in the compiled time loop.
+
+        Parameters
+        ----------
+        after : int
+            Number of changes to skip, which are known already.
+        """
         law = self.inside
         if law is None:
             return
@@ -264,7 +280,13 @@ class Loop:
             yield float(law.acted[k]), torques
 
     def records(self, units: Callable[[str], str]) -> tuple[ControllerRecord, ...]:
-        """What each controller has done."""
+        """Return the record of each controller.
+
+        Parameters
+        ----------
+        units : callable
+            Function that returns the unit of a motor's torque by name.
+        """
         return tuple(self._record(k, units) for k in range(len(self.controllers)))
 
     def _record(self, k: int, units: Callable[[str], str]) -> ControllerRecord:
@@ -295,16 +317,16 @@ class Loop:
         )
 
     def saved(self) -> Any:
-        """State of all controllers and of what is to come."""
+        """Return the states of all controllers and of the schedule."""
         state = [vars(each) for each in self.controllers]
         own = (self._next, self._due, self.acting, self.kept)
-        # Plants, with tasks and mechanisms, stay what they are.
+        # Plants, with tasks and mechanisms, are not copied.
         memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
         inside = None if self.inside is None else [array.copy() for array in self.inside]
         return copy.deepcopy((state, own), memo), inside
 
     def restore(self, saved: Any) -> None:
-        """Go back to what `saved` gave."""
+        """Return to a state that `saved` returned."""
         memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
         outside, inside = saved
         states, own = copy.deepcopy(outside, memo)
@@ -327,7 +349,7 @@ def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
 
 
 def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -> Controller:
-    """A controller from itself, or from a law that says all that it needs."""
+    """Return a controller as it is, or make one from a law that has the required attributes."""
     if all(hasattr(given, name) for name in ("period", "delay", "inputs", "outputs", "start", "step")):
         controller: Controller = given
     else:
@@ -344,19 +366,19 @@ def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -
 
 
 def _columns(rows: Sequence[Array] | Array, names: Sequence[str]) -> Array:
-    """Rows (k, names) of samples, which may be none."""
+    """Return rows (k, names) of samples; k may be zero."""
     return np.array(rows).reshape(len(rows), len(names))
 
 
 def _bounds(controller: Controller, outputs: int) -> tuple[str, Array, Array]:
-    """Words for a controller's law, limits (outputs, 2) and rates (outputs,) of its torques."""
+    """Return the description of a controller's law, and the limits (outputs, 2) and rates (outputs,) of its torques."""
     if isinstance(controller, SampledController):
         return controller.title, *controller.bounds
     return type(controller).__name__, np.tile([-np.inf, np.inf], (outputs, 1)), np.full(outputs, np.inf)
 
 
 def _names(controllers: Sequence[Controller]) -> list[str]:
-    """Names of controllers, with numbers where they have none of their own."""
+    """Return the names of controllers, numbered where names are equal."""
     given = [getattr(each, "name", "controller") for each in controllers]
     for name in given:
         check_name(name)

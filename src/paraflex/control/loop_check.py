@@ -1,4 +1,4 @@
-"""Whether the loop of a run's controllers is stable about its start."""
+"""Check of the sampled loop of a run's controllers for stability, linearised about the start of the run."""
 
 from __future__ import annotations
 
@@ -17,26 +17,31 @@ if TYPE_CHECKING:
     from paraflex.motion import MotionRun
     from paraflex.tracking import TrackingRun
 
-# Growth by less than this factor is not reported, of a run that is taken for at least so many samples: motions that no
-# motor holds drift.
+# Growth below this factor over the whole run is not reported, as rigid motions that no motor controls drift anyway. A
+# run counts as at least this many samples.
 _GROWS, _SAMPLES = 2.0, 1000
-# Up to so many states, torques under way among them, the poles are eigenvalues; beyond they are counted.
+# Up to this number of states, delayed torques included, the poles are computed as eigenvalues; above it, only counted.
 _STATES = 500
 
 
 def unstable_loop(
     run: TrackingRun | MotionRun, records: Sequence[ControllerRecord], start: float, place: str
 ) -> tuple[Finding, ...]:
-    """The finding that linear controllers of one period and delay make something grow, without limits.
+    """Return a finding if the run's linear controllers, of one period and delay, make the linearised loop unstable.
+
+    Limits of torques and rates are disregarded. Without a linear model, at a singular configuration for example, the
+    loop is not checked.
 
     Parameters
     ----------
     run : TrackingRun or MotionRun
+        Run under the controllers.
     records : sequence of ControllerRecord
+        Records of all controllers of the run.
     start : float
-        Of the run [s].
+        Time at which the run starts, about which it is linearised [s].
     place : str
-        Of the finding.
+        Place to which the finding refers, such as "mode ++".
     """
     if not records:
         return ()
@@ -45,7 +50,7 @@ def unstable_loop(
     first = records[0]
     together = all(same_period(one.period, first.period) and one.delay == first.delay for one in records)
     later, part = whole_and_part(first.delay / first.period)
-    # Torques that are later than the run never act.
+    # Torques delayed beyond the end of the run never act.
     if len(linear) < len(laws) or not together or later >= len(first.t):
         return ()
     radius = _GROWS ** (1.0 / max(len(first.t), _SAMPLES))
@@ -58,7 +63,7 @@ def unstable_loop(
             loop = now.later(first.delay)
             growing = unstable_poles(loop) if loop.spectral_radius >= radius else ""
     except ParaflexError:
-        # There is no linear model: at a singular pose, say.
+        # There is no linear model, for example at a singular configuration.
         return ()
     if not growing:
         return ()

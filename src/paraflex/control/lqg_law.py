@@ -1,4 +1,4 @@
-"""What a linear-quadratic design comes to: state feedback, and the law that acts on a filter's estimate."""
+"""Results of a linear-quadratic design: state feedback, and the control law that acts on a filter's estimate."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ class Regulator:
     Attributes
     ----------
     plant : SampledPlant
-        With torques under way among its states.
+        Plant, with delayed torques among its states.
     motors : tuple of str
-        Inputs that it acts on.
+        Inputs on which it acts.
     gain : (motors, n + integrated) array
-        K.
+        Feedback gain K.
     integrated : tuple of str
-        Outputs whose sums over time are fed back, too.
+        Outputs whose integrals are fed back as well.
     poles : (n + integrated,) array
-        Of the plant with this feedback, z.
+        Poles z of the plant with this feedback.
     """
 
     plant: SampledPlant
@@ -46,24 +46,26 @@ class Regulator:
 
     @property
     def spectral_radius(self) -> float:
-        """The largest magnitude of the poles."""
+        """Largest magnitude of the poles."""
         return float(np.max(np.abs(self.poles), initial=0.0))
 
 
 @dataclass(frozen=True)
 class LQGDesign:
-    """A regulator that acts on the estimate of a Kalman filter.
+    """Regulator that acts on the estimate of a Kalman filter.
 
     Attributes
     ----------
     regulator : Regulator
+        State feedback.
     filter : KalmanFilter
+        Steady-state Kalman filter.
     measured : tuple of str
-        Outputs that the filter is given, in this order.
+        Outputs that the filter reads, in this order.
     start : (n, measured) array
-        The first estimate from the first readings: at rest, displaced in what moves freely.
+        Matrix from the first readings to the first estimate: at rest, displaced in the free motions.
     holding_torques : (motors,) array
-        Torques that hold the equilibrium that the model is about [N m, N]; zero of a model about a motion.
+        Torques that hold the equilibrium about which the model is linearised [N m, N]; zero for a model about a motion.
     """
 
     regulator: Regulator
@@ -74,27 +76,27 @@ class LQGDesign:
 
     @property
     def K(self) -> Array:
-        """Gain (motors, n + integrated) of the feedback, u = -K [x; integrals]."""
+        """Feedback gain (motors, n + integrated), u = -K [x; integrals]."""
         return self.regulator.gain
 
     @property
     def L(self) -> Array:
-        """Gain (n, measured) of the filter."""
+        """Filter gain (n, measured)."""
         return self.filter.gain
 
     @property
     def poles(self) -> Complex:
-        """Of the closed loop on the plant of the design: those of the regulator and of the filter, z."""
+        """Poles z of the closed loop on the plant of the design: those of the regulator and of the filter."""
         return np.concatenate([self.regulator.poles, self.filter.poles])
 
     @property
     def spectral_radius(self) -> float:
-        """The largest magnitude of the poles."""
+        """Largest magnitude of the poles."""
         return float(np.max(np.abs(self.poles), initial=0.0))
 
     @property
     def period(self) -> float:
-        """Of sampling [s]."""
+        """Sampling period [s]."""
         return self.regulator.plant.period
 
     @property
@@ -109,14 +111,14 @@ class LQGDesign:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Motors, those of the regulator."""
+        """Motors of the regulator."""
         return self.regulator.motors
 
     @cached_property
     def state_space(self) -> StateSpace:
-        """The law without limits, from readings to torques: x_k+1 = A x_k + B y_k, u_k = C x_k + D y_k.
+        """Controller without limits, from readings to torques: x_k+1 = A x_k + B y_k, u_k = C x_k + D y_k.
 
-        States are the estimate before the reading, and integrals.
+        The states are the estimate before the reading, and the integrals.
         """
         one, L, n = self.filter, self.L, len(self.filter.A)
         rows = self._integrals
@@ -133,28 +135,30 @@ class LQGDesign:
         return self.period * np.eye(len(self.measured))[[self.measured.index(one) for one in self.regulator.integrated]]
 
     def law(self) -> LQGLaw:
-        """The law, at the beginning of a run, for `SampledController`."""
+        """Return the control law in its initial state, for `SampledController`."""
         return LQGLaw(self)
 
 
 class LQGLaw:
-    """A `LQGDesign` as a law: torques from errors of readings, with its estimate as its state.
+    """Control law of an `LQGDesign`: torques from errors of readings, with the estimate as its state.
 
-    `limited` takes note of limits: the estimate goes on with the torques that were given, and integrals stay while any
-    torque is limited.
+    `limited` accounts for limits: the estimate is propagated with the limited torques, and the integrals stay constant
+    while any torque is limited.
 
     Attributes
     ----------
     design : LQGDesign
+        Design of the law.
     period, delay : float
-        [s]
+        Sampling period, and delay from a sample until its torques act [s].
     inputs, outputs : tuple of str
         Sensors and motors.
     x : (n,) array
-        The estimate after the last reading.
+        Estimate after the last reading; None before the first one.
     integrals : (integrated,) array
+        Integrals of outputs.
     holding_torques : (motors,) array
-        Those of the design, part of its torques; zero where planned torques act besides [N m, N].
+        Holding torques of the design, part of its torques; zero where planned torques act as well [N m, N].
     """
 
     def __init__(self, design: LQGDesign) -> None:
@@ -175,11 +179,11 @@ class LQGLaw:
 
     @property
     def state_space(self) -> StateSpace:
-        """See `LQGDesign.state_space`."""
+        """Controller without limits: see `LQGDesign.state_space`."""
         return self.design.state_space
 
     def start(self, plant: Plant) -> None:
-        """Forget an earlier run.
+        """Reset the states for a new run.
 
         Raises
         ------
@@ -198,7 +202,7 @@ class LQGLaw:
         self._reset(np.zeros_like(self.holding_torques) if plant.feed_forward else self.design.holding_torques)
 
     def step(self, k: int, t: float, y: Array) -> Array:
-        """Torques (motors,) that follow from errors y (measured,) at sample k."""
+        """Return torques (motors,) from errors y (measured,) of the readings at sample k."""
         design = self.design
         if self.x is None:
             before = design.start @ y
@@ -213,7 +217,7 @@ class LQGLaw:
         return self._wanted.copy()
 
     def linear_law(self) -> LinearLaw:
-        """For the compiled time loop: states are the estimate before the reading, and integrals."""
+        """Return the law for the compiled time loop, with the states of `LQGDesign.state_space`."""
         design, states = self.design, self.state_space
         n, more = len(design.filter.A), len(self.integrals)
         return LinearLaw(
@@ -225,5 +229,5 @@ class LQGLaw:
         )
 
     def limited(self, torques: Array) -> None:
-        """Take note of the torques (motors,) that are given in place of those that were wanted."""
+        """Record the torques (motors,) that act in place of those that the law returned."""
         self._given = np.array(torques, dtype=float)

@@ -1,4 +1,4 @@
-"""How far a sampled loop is from instability, at each of its motors."""
+"""Stability margins of a sampled loop at each of its motors."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from paraflex.control.closed_loops import ClosedLoop, Complex, closed_loop, warn
 if TYPE_CHECKING:
     import pandas as pd
 
-# Lowest frequency of the grid, as a part of the slowest pole's and of the sampling frequency.
+# Lowest frequency of the grid: fraction of the slowest pole's frequency, but at least this fraction of the Nyquist
+# frequency.
 _LOWEST, _OF_NYQUIST = 1e-2, 1e-5
 _GRID = 1500
-# At zero a loop with free motions or integrals has no response; rounding leaves one that is larger.
+# At zero frequency a loop with free motions or integrators has no finite response; rounding gives one larger than this.
 _INFINITE = 1e7
-# About a resonance the grid has points at so many of its half widths.
+# Grid points about a resonance, in units of its half width.
 _ABOUT = np.array([0.0, 0.15, 0.4, 0.8, 1.5, 3.0, 6.0, 12.0, 25.0])
 
 
@@ -32,19 +33,20 @@ class MotorMargins:
     Attributes
     ----------
     gain_up, gain_down : float
-        The gain may be multiplied by less than the one, and by more than the other: inf and 0 where there is no limit.
+        Upper and lower bound of the factor on the gain; inf and 0 without limit.
     phase : float
-        The smaller of the phase that may be lost or gained [rad]; inf if the gain is nowhere one.
+        Phase margin, the smaller of the phase that may be lost or gained [rad]; inf if the gain is nowhere one.
     delay : float
-        How much later its torque may act [s], the phase that may be lost over frequency: exact for whole samples.
+        Delay margin: additional delay of the torque [s], the phase that may be lost over the frequency; exact for whole
+        samples.
     peak : float
-        Ms, the largest sensitivity |1 / (1 + L)|: 1 / Ms is the distance of L from -1.
+        Peak sensitivity Ms, the largest |1 / (1 + L)|: 1 / Ms is the distance of L from -1.
     peak_frequency : float
-        [rad/s]
+        Angular frequency of the peak [rad/s].
     crossovers : (k,) array
-        Where the gain is one [rad/s].
+        Gain crossover frequencies, at which the gain is one [rad/s].
     phase_crossovers : (k,) array
-        Where the phase is -180 degrees [rad/s].
+        Phase crossover frequencies, at which the phase is -180 degrees [rad/s].
     """
 
     gain_up: float
@@ -59,14 +61,16 @@ class MotorMargins:
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of a sampled loop at each motor, and of all together.
+    """Margins of a sampled loop at each motor, and at all motors together.
 
     Attributes
     ----------
     loop : ClosedLoop
+        Closed loop.
     motors : mapping of str to MotorMargins
+        Margins by motor.
     peak, peak_frequency : float
-        Largest singular value of the sensitivity at all motors, over frequencies, and where it is [rad/s].
+        Largest singular value of the sensitivity at all motors over frequencies, and its angular frequency [rad/s].
     """
 
     loop: ClosedLoop
@@ -75,7 +79,11 @@ class Margins:
     peak_frequency: float
 
     def to_frame(self) -> pd.DataFrame:
-        """A row a motor: gains, `phase` [deg], `delay` [ms], `samples`, `peak`, highest `crossover` [Hz], `stable`."""
+        """Return a table with one row per motor.
+
+        Its columns are `gain_up`, `gain_down`, `phase` [deg], `delay` [ms], `samples`, `peak`, highest `crossover` [Hz]
+        and `stable`.
+        """
         import pandas as pd
 
         period = self.loop.plant.period
@@ -93,17 +101,22 @@ class Margins:
 
 @checked_arguments()
 def margins(model: Any, controller: Any = None, **settings: Any) -> Margins:
-    """Gain, phase and delay margins and peak sensitivities of a sampled loop.
+    """Compute gain, phase and delay margins and peak sensitivities of a sampled loop.
 
-    The loop is opened at one motor at a time: 1 + L_i = 1 / S_ii. Crossovers and peaks are found on a grid that follows
-    resonances, then to rounding by Brent's methods; at a resonance far narrower than its neighbours' distance, too.
+    The loop is opened at one motor at a time: 1 + L_i = 1 / S_ii. Crossovers and peaks are bracketed on a grid that is
+    refined about resonances, even very narrow ones, and then solved to rounding by Brent's methods.
 
     Parameters
     ----------
     model : ClosedLoop, or a model
-        See `closed_loop`.
-    controller
-        See `closed_loop`, with its `settings`.
+        Closed loop, or model of the plant as for `closed_loop`.
+    controller : LQGDesign, law, SampledController, or state space, optional
+        Controller as for `closed_loop`, with its `settings`.
+
+    Returns
+    -------
+    Margins
+        Margins by motor.
 
     Raises
     ------
@@ -131,7 +144,7 @@ def margins(model: Any, controller: Any = None, **settings: Any) -> Margins:
 
 
 def _of_motor(loop: ClosedLoop, motor: int, grid: Array, S: Complex) -> MotorMargins:
-    """Margins at a motor from its sensitivity (k,) on a grid of frequencies."""
+    """Return the margins at a motor from its sensitivity (k,) on a grid of frequencies."""
 
     def response(omega: float) -> complex:
         return complex(loop.loop(omega)[0, motor])
@@ -139,7 +152,7 @@ def _of_motor(loop: ClosedLoop, motor: int, grid: Array, S: Complex) -> MotorMar
     L = 1.0 / S - 1.0
     gains = _roots(lambda omega: np.log(abs(response(omega))), grid, np.log(np.abs(L)))
     real = _roots(lambda omega: response(omega).imag / (1.0 + abs(response(omega))), grid, L.imag / (1.0 + np.abs(L)))
-    # At zero and at half the sampling frequency responses are real.
+    # Responses are real at zero and at half the sampling frequency.
     turned = np.array([0.0, *real[real < (1.0 - 1e-9) * grid[-1]], grid[-1]])
     at = np.array([response(omega).real for omega in turned])
     negative = (at < 0.0) & (at > -_INFINITE)
@@ -157,7 +170,7 @@ def _of_motor(loop: ClosedLoop, motor: int, grid: Array, S: Complex) -> MotorMar
 
 
 def _grid(loop: ClosedLoop) -> Array:
-    """Frequencies [rad/s] up to half the sampling frequency, dense about lightly damped poles."""
+    """Return a grid of frequencies [rad/s] up to half the sampling frequency, dense about lightly damped poles."""
     plant, law, period = loop.plant, loop.controller, loop.plant.period
     poles = np.concatenate([loop.poles, plant.poles, np.linalg.eigvals(law.A) if len(law.A) else []])
     s = np.log(poles[np.abs(poles) > 1e-6].astype(complex)) / period
@@ -172,7 +185,7 @@ def _grid(loop: ClosedLoop) -> Array:
 
 
 def _roots(function: Callable[[float], float], grid: Array, values: Array) -> Array:
-    """Where a function changes its sign between points of a grid (k,), to rounding."""
+    """Return the sign changes of a function between points of a grid (k,), solved to rounding."""
     good = np.isfinite(values)
     ends = [k for k in range(len(grid) - 1) if good[k] and good[k + 1] and values[k] * values[k + 1] < 0.0]
     return np.array([scipy.optimize.brentq(function, grid[k], grid[k + 1], xtol=1e-13 * grid[k], rtol=1e-13)
@@ -180,12 +193,12 @@ def _roots(function: Callable[[float], float], grid: Array, values: Array) -> Ar
 
 
 def _peak(function: Callable[[float], float], grid: Array, values: Array) -> tuple[float, float]:
-    """Where a function is largest, and how large: the highest points of a grid, refined."""
+    """Return the maximiser and the maximum of a function, from the highest points of a grid, refined."""
     best: tuple[float, float] = (float(grid[np.argmax(values)]), float(np.max(values)))
     inner = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])) + 1
     # The three highest local maxima.
     for k in inner[np.argsort(-values[inner])][:3]:
-        # Measured from the grid's point, as the search is no finer than 1e-8 of its variable.
+        # The variable is the offset from the grid point, as the search resolves it to a relative 1e-8 only.
         middle, width = grid[k], grid[k + 1] - grid[k - 1]
         found = scipy.optimize.minimize_scalar(
             lambda part, middle=middle, width=width: -function(middle + width * part),

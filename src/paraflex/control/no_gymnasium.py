@@ -1,4 +1,4 @@
-"""What stands in for Gymnasium's environment where it is not installed: modules are imported, none can be made."""
+"""Substitute for Gymnasium's base class if that is not installed: modules can be imported, but make no environments."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from paraflex.errors import InputError
 
 
 class Env:
-    """The base class of environments, of which none can be made.
+    """Substitute base class of environments, which cannot be instantiated.
 
     Raises
     ------
     InputError
-        As one is made.
+        Gymnasium is not installed; raised when an environment is made.
     """
 
     def __new__(cls, *args: Any, **settings: Any) -> Env:
-        """See the class."""
+        """Raise the error that Gymnasium is not installed."""
         raise InputError(
             "environments need Gymnasium, which is not installed", field=cls.__name__,
             remedy="pip install 'paraflex[gym]'",
         )  # fmt: skip
 
     def __class_getitem__(cls, types: Any) -> type:
-        """The class itself, whatever it observes."""
+        """Return the class itself for any type parameters."""
         return cls

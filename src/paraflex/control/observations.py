@@ -1,4 +1,4 @@
-"""What an agent observes: readings at the instants of its actions, less those of the plan, and the plan ahead."""
+"""Observations of an agent: readings, optionally less the planned readings, and a preview of the plan."""
 
 from __future__ import annotations
 
@@ -16,38 +16,40 @@ from paraflex.mechanism.measured import encoders_of
 from paraflex.mechanism.quantities import all_known, known
 from paraflex.tracking import TrackingTask
 
-# Observations beyond are cut off there: spaces are to be bounded, and no run that goes on comes near.
+# Observations are clipped to this magnitude, as observation spaces must be bounded; readings of a run that has not
+# diverged stay far below.
 WIDEST = 1e6
 
 
 class Observer:
-    """Observations at the instants of an environment.
+    """Observation function of an environment.
 
     Parameters
     ----------
     mechanism : Mechanism
+        Mechanism whose sensors are observed.
     task : TrackingTask or None
-        The plan.
+        Plan; None without a path.
     names : tuple of str
-        Sensors.
+        Names of the sensors.
     times : (k,) array
-        Instants [s].
+        Times of the observations [s].
     errors : bool
-        Whether readings on the planned motion are taken off, those that it tells.
+        Whether the planned readings are subtracted, for sensors whose readings follow from the plan.
     ahead : sequence of float
-        So much later [s] the plan is shown as well.
+        Preview times [s]: the change of the planned readings over each of them is observed as well.
     noise, quantise, scales : mapping of str to float
-        By sensor, in its unit: standard deviation, resolution, and what is observed as one.
+        Standard deviation of noise, resolution, and reading that is observed as one, by sensor and in its unit.
 
     Attributes
     ----------
     names : tuple of str
-        Of what is observed: sensors, then those of the plan with the time ahead, "x+0.01".
+        Names of the observed values: sensors, then the planned readings with their preview time, such as "x+0.01".
 
     Raises
     ------
     InputError
-        A look ahead without a plan, or to times that are not positive; numbers of other sensors.
+        A preview without a plan, preview times that are not positive, or values for sensors that are not observed.
     """
 
     def __init__(
@@ -86,7 +88,17 @@ class Observer:
         self._scale = scale
 
     def __call__(self, k: int, readings: Mapping[str, float], random: np.random.Generator) -> Array:
-        """The observation (names,) at instant k, from readings of all sensors."""
+        """Return the observation (names,) at instant k.
+
+        Parameters
+        ----------
+        k : int
+            Index of the instant.
+        readings : mapping of str to float
+            Readings of all sensors by name.
+        random : Generator
+            Generator of the noise.
+        """
         y = np.array([readings[name] for name in self._sensors])
         if np.any(self._deviations):
             y += self._deviations * random.standard_normal(y.size)
@@ -96,12 +108,19 @@ class Observer:
 
 
 def observed_sensors(given: Sequence[str] | None, simulation: Simulation) -> tuple[str, ...]:
-    """Names of sensors to observe; by default encoders of the motors and the end-effector's place.
+    """Return the names of the observed sensors.
+
+    Parameters
+    ----------
+    given : sequence of str or None
+        Names of sensors. By default the encoders of the motors and the coordinates x and y of the end-effector.
+    simulation : Simulation
+        Simulation with these sensors.
 
     Raises
     ------
     InputError
-        Unknown ones.
+        Unknown sensors.
     """
     if given is not None:
         all_known(given, simulation.sensors_read, "sensors", "sensor")
@@ -113,13 +132,13 @@ def observed_sensors(given: Sequence[str] | None, simulation: Simulation) -> tup
 
 
 def _planned(task: TrackingTask, mechanism: Mechanism, names: tuple[str, ...], times: Array) -> dict[str, Array]:
-    """Planned readings (k,) at times (k,), those of the end after it."""
+    """Return planned readings (k,) at times (k,) by sensor; after the end of the plan, those at its end."""
     motion = task.plan.follow(np.minimum(times, task.motion.t[-1]))
     return readings_of(motion, mechanism, names)
 
 
 def _by_sensor(given: Mapping[str, float] | None, names: tuple[str, ...], field: str, otherwise: float) -> Array:
-    """Positive numbers (names,) by sensor, a default for the others."""
+    """Return one positive number for each sensor (names,), with a default for sensors that are not given."""
     for name, value in (given or {}).items():
         known(name, names, field, "observed sensor")
         if not (np.isfinite(value) and value > 0.0):

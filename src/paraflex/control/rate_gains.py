@@ -1,4 +1,4 @@
-"""Gains of rate feedback that damp vibrations most, by the sampled closed loop."""
+"""Design of rate feedback gains that maximise the damping of vibrations in the sampled closed loop."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ from paraflex.linear import LinearModel, ReducedModel
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import known, positive
 
-# A pole this near to z = 1 is that of a free motion, which feedback of strains leaves as it is.
+# A pole within this distance of z = 1 belongs to a free motion, which strain feedback does not affect.
 _FREE = 1e-5
-# Poles on the unit circle are found that near to it; vibrations whose decay differs by less part are as slow.
+# Accuracy of poles on the unit circle; relative difference below which two decay rates count as equal.
 _ON_CIRCLE, _AS_SLOW = 1e-9, 1e-3
-# Gains that are tried in one direction: parts of those that would damp critically if damping were linear.
+# Gains that are tried in one direction: fractions of the gains for critical damping if damping were linear in them.
 _TRIED = np.geomspace(1e-4, 30.0, 70)
-# A pole is followed in steps so small that it is found this near to where its derivative says, as a part of the
-# distance of the next one; steps are halved so often.
+# A step in following poles is accepted if each is found this close to its prediction, as a fraction of the distance to
+# the next pole; largest number of times that a step is halved.
 _NEAR, _HALVED = 0.25, 12
-# Rounds over all pairs, while the damping ratio grows by more than this part.
+# Largest number of rounds over all pairs, and relative growth of the damping ratio below which they end.
 _ROUNDS, _GROWS = 4, 1e-4
 
 
 @dataclass(frozen=True)
 class RateGains:
-    """Gains of rate feedback, and what they do to the vibrations they were chosen for.
+    """Rate feedback gains, and the vibrations for which they were designed.
 
     Attributes
     ----------
     gains : mapping of str to mapping of str to float
-        By motor and sensor, for `RateFeedback` [N m s by the sensor's unit].
+        Gains by motor and sensor, for `RateFeedback` [N m s per unit of the sensor].
     frequencies, frequencies_without : (k,) arrays
-        Natural frequencies of the vibrations, with them and without [Hz].
+        Natural frequencies of the vibrations, with the gains and without [Hz].
     damping, damping_without : (k,) arrays
-        Damping ratios of them, with gains and without.
+        Damping ratios of the vibrations, with the gains and without.
     spectral_radius : float
-        Largest magnitude of the loop's poles but for free motions, which strains do not see.
+        Largest magnitude of the loop's poles, except those of free motions, which strains do not measure.
     bound : str
-        What keeps gains from being larger: "optimum", "largest" or "margin".
+        Condition that prevents larger gains: "optimum", "largest" or "margin".
     loop : ClosedLoop
-        With them.
+        Closed loop with the gains.
     cutoff : float or None
-        Of the low-pass filter of rates [Hz].
+        Cut-off frequency of the low-pass filter of rates [Hz]; None without filter.
     """
 
     gains: Mapping[str, Mapping[str, float]]
@@ -66,7 +66,7 @@ class RateGains:
     cutoff: float | None
 
     def law(self) -> RateFeedback:
-        """The law, for `SampledController` with the period and delay of the design."""
+        """Return the control law, for `SampledController` with the period and delay of the design."""
         return RateFeedback(self.gains, cutoff=self.cutoff)
 
 
@@ -83,39 +83,46 @@ def rate_feedback_gains(
     largest: float | None = None,
     margin: float = 2.0,
 ) -> RateGains:
-    """Gains of `RateFeedback` with which vibrations have most damping, in the sampled loop with its delay.
+    """Design gains of `RateFeedback` that maximise the damping of vibrations, in the sampled loop with its delay.
 
-    What is largest is the least of their damping ratios, while no pole becomes slower than the slowest is without
-    gains. Poles are followed from no gains on, in steps by their derivatives dz = w^H dA v / (w^H v). A common factor
-    of all pairs is sought first, along the derivatives of the damping ratios, then each gain by itself, in turn.
+    The least of their damping ratios is maximised, while no pole becomes slower than the slowest one without gains.
+    Poles are followed from zero gains on, in steps by their derivatives dz = w^H dA v / (w^H v). First a common factor
+    of all pairs is sought, along the derivatives of the damping ratios, then each gain by itself, in turn.
 
     Parameters
     ----------
     model : LinearModel, ReducedModel, state space, (A, B, C, D) or SampledPlant
-        Of all states, or the loop checked with them: feedback may make vibrations unstable that few states leave out.
+        Model of all states; for a reduced model, check the loop with the full one, as feedback may destabilise
+        vibrations that are left out.
     period : float
-        Of sampling [s].
+        Sampling period [s].
     pairs : mapping of str to str or sequence of str, optional
-        Sensors whose rate each motor feeds back. By default, of a mechanism's model, the strain gauge on a link at the
-        motor's joint that is nearest to it.
+        Sensors whose rate each motor feeds back. By default, for a model of a mechanism, the nearest `StrainGauge` on
+        a link at the motor's joint.
     delay : float
-        From a sample until torques act [s].
+        Delay from a sample until its torques act [s].
     cutoff : float, optional
-        Of the low-pass filter of rates [Hz].
+        Cut-off frequency of the low-pass filter of rates [Hz]; no filter by default.
     beside : optional
-        A linear controller that acts as well, with the same period and delay: a joint controller (`JointPID.sampled`),
-        a design of `lqg`, or what else `closed_loop` takes, with names of its sensors and motors.
+        Linear controller that acts as well, with the same period and delay: a joint controller (`JointPID.sampled`), a
+        design of `lqg`, or anything else that `closed_loop` accepts, with names of its sensors and motors.
     frequencies : sequence of float, optional
-        About those of the vibrations [Hz]. By default those that decay slowest, as many as there are pairs.
+        Approximate frequencies of the vibrations [Hz]. By default the vibrations that decay slowest, as many as there
+        are pairs.
     largest : float, optional
-        Of the gains' magnitudes [N m s by the sensor's unit].
+        Largest magnitude of the gains [N m s per unit of the sensor]; no limit by default.
     margin : float
-        So many times as large, all of them together, gains still leave the loop stable; 1 for the limit itself.
+        Gain margin: the loop stays stable with all gains multiplied by this factor; 1 for the stability limit itself.
+
+    Returns
+    -------
+    RateGains
+        Gains, vibrations and closed loop.
 
     Raises
     ------
     InputError
-        Unknown names, numbers that make no sense, no such pair, no vibration, one that rates do not damp, or a loop
+        Unknown names, numbers out of range, no pair, no vibration, a vibration that the rates do not damp, or a loop
         that is unstable without gains.
     """
     positive(period, "period", "s")
@@ -149,7 +156,7 @@ class _Tried(NamedTuple):
 
 
 class _Search:
-    """The search for gains: A = A_0 + sum of g_i A_i, of the loop with unit gains one at a time."""
+    """Search for the gains, with A = A_0 + sum of g_i A_i from the loops with one unit gain at a time."""
 
     def __init__(self, made: Callable[[Array], ClosedLoop], count: int, margin: float, largest: float) -> None:
         none = made(np.zeros(count))
@@ -168,12 +175,12 @@ class _Search:
         return self._A + np.tensordot(gains, self._each, 1)
 
     def radius(self, gains: Array) -> float:
-        """Largest magnitude of poles that are not of free motions."""
+        """Return the largest magnitude of the poles that do not belong to free motions."""
         z = np.linalg.eigvals(self._of(gains))
         return float(np.max(np.abs(z[np.abs(z - 1.0) > _FREE]), initial=0.0))
 
     def _stable(self, gains: Array) -> bool:
-        """Whether no pole is slower than without gains, and none grows with gains so many times as large."""
+        """Whether no pole is slower than without gains, and the loop with gains multiplied by the margin is stable."""
         slow = self.radius(gains) > self._slowest + _ON_CIRCLE
         return not slow and self.radius(self._margin * gains) <= 1.0 + _ON_CIRCLE
 
@@ -181,7 +188,7 @@ class _Search:
         return bool(np.max(np.abs(gains)) <= self._largest) and self._stable(gains)
 
     def vibrations(self, frequencies: Sequence[float] | None) -> Complex:
-        """Poles without gains: nearest to frequencies [Hz], or of the vibrations that decay slowest, one a pair."""
+        """Return poles without gains: nearest to frequencies [Hz], or those that decay slowest, one for each pair."""
         z = np.linalg.eigvals(self._A)
         z = z[(z.imag > _FREE) & (np.abs(z) > _FREE)].astype(complex)
         if not z.size:
@@ -190,16 +197,16 @@ class _Search:
         if frequencies is not None:
             return z[_nearest(each, frequencies)]
         decay = -np.log(np.abs(z))
-        # Those as slow as one another by their frequencies: without damping rounding alone tells them apart.
+        # Equally slow poles are ordered by frequency: without damping, only rounding distinguishes their decay rates.
         steps = np.round(np.log(np.maximum(decay, _ON_CIRCLE)) / _AS_SLOW)
         return z[np.lexsort([each, steps])[: len(self._each)]]
 
     def least(self, tried: _Tried) -> float:
-        """The least damping ratio of the vibrations."""
+        """Return the least damping ratio of the vibrations."""
         return min(damped_frequency(complex(z), self._period)[1] for z in tried.poles)
 
     def _derivatives(self, at: _Tried) -> tuple[Complex, Array]:
-        """dz/dg (k, pairs) of simple poles, and how far the next pole is from each."""
+        """Return dz/dg (k, pairs) of simple poles, and the distance of each from the nearest other pole."""
         z, left, right = scipy.linalg.eig(self._of(at.gains), left=True)
         slopes, room = [], []
         for pole in at.poles:
@@ -210,7 +217,7 @@ class _Search:
         return np.array(slopes), np.array(room)
 
     def _follow(self, start: _Tried, gains: Array, halved: int = 0) -> _Tried:
-        """The poles with other gains."""
+        """Return the poles at other gains, followed continuously; a step that is too large is halved."""
         slopes, room = self._derivatives(start)
         expected = start.poles + slopes @ (gains - start.gains)
         z = np.linalg.eigvals(self._of(gains))
@@ -222,14 +229,14 @@ class _Search:
         return self._follow(middle, gains, halved + 1)
 
     def directions(self, at: _Tried) -> Array:
-        """Derivatives (k, pairs) of the damping ratios -Re s / |s|, with s = ln z / T."""
+        """Return the derivatives (k, pairs) of the damping ratios -Re s / |s|, with s = ln z / T."""
         slopes, _ = self._derivatives(at)
         s = (np.log(at.poles) / self._period)[:, None]
         ds = slopes / (at.poles[:, None] * self._period)
         return -ds.real / np.abs(s) + s.real * (s.conj() * ds).real / np.abs(s) ** 3
 
     def best(self, start: _Tried) -> _Tried:
-        """Gains of most damping."""
+        """Return the gains of largest damping."""
         slopes = self.directions(start)
         if not np.all(np.max(np.abs(slopes), axis=1) > 0.0):
             raise InputError("do not see a vibration, or their motors do not move it", field="pairs",
@@ -250,7 +257,7 @@ class _Search:
         return best
 
     def _anew(self, best: _Tried, k: int) -> _Tried:
-        """The gain of one pair sought anew, from zero on, in both directions."""
+        """Search the gain of one pair again, from zero on, in both directions."""
         without = best.gains.copy()
         without[k] = 0.0
         if not self._allowed(without):
@@ -261,7 +268,7 @@ class _Search:
         return max([best, *(self._along(start, sign * one) for sign in (1.0, -1.0) if slope)], key=self.least)
 
     def _along(self, start: _Tried, direction: Array) -> _Tried:
-        """The most damping that is allowed with gains in one direction."""
+        """Return the largest admissible damping with gains in one direction."""
         tried = [start]
         for part in _TRIED:
             gains = start.gains + part * direction
@@ -284,7 +291,7 @@ class _Search:
         return max([tried[k], between(part)], key=self.least)
 
     def _border(self, base: Array, direction: Array, beyond: float) -> float:
-        """The largest part of a direction that is allowed, below one that is not."""
+        """Return the largest admissible multiple of a direction, by bisection below one that is not admissible."""
         low, high = 0.0, beyond
         while high - low > 1e-9 * high:
             middle = 0.5 * (low + high)
@@ -292,7 +299,7 @@ class _Search:
         return low
 
     def bound(self, best: _Tried) -> str:
-        """What keeps gains from being larger."""
+        """Return the condition that prevents larger gains."""
         more = (1.0 + 1e-6) * best.gains
         if np.max(np.abs(more)) > self._largest:
             return "largest"
@@ -300,7 +307,7 @@ class _Search:
 
 
 def _nearest(each: Array, frequencies: Sequence[float]) -> list[int]:
-    """Numbers of the vibrations nearest to frequencies [Hz]."""
+    """Return the indices of the vibrations nearest to frequencies [Hz]."""
     found = []
     for wanted in frequencies:
         positive(wanted, "frequencies", "Hz")
@@ -312,7 +319,7 @@ def _nearest(each: Array, frequencies: Sequence[float]) -> list[int]:
 
 
 def _pairs(model: Any, plant: SampledPlant, given: Mapping[str, str | Sequence[str]] | None) -> list[tuple[str, str]]:
-    """Motors and sensors, each pair once."""
+    """Return the pairs of motors and sensors, each once."""
     if given is None:
         given = _collocated(model, plant)
     found = []
@@ -327,7 +334,7 @@ def _pairs(model: Any, plant: SampledPlant, given: Mapping[str, str | Sequence[s
 
 
 def _collocated(model: Any, plant: SampledPlant) -> dict[str, str]:
-    """Of each motor the strain gauge on a link at its joint that is nearest to it."""
+    """Return, by motor, the nearest `StrainGauge` on a link at its joint."""
     linear = model.full if isinstance(model, ReducedModel) else model
     found = {}
     if isinstance(linear, LinearModel):

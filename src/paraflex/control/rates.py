@@ -1,4 +1,4 @@
-"""Feedback of rates of readings."""
+"""Feedback of the rates of readings."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from paraflex.mechanism.quantities import all_known, finite
 
 
 class RateFeedback:
-    """tau = -K y': damping by strain rates, say. A law for `SampledController`.
+    """Rate feedback tau = -K y', for example damping by strain rates: a law for `SampledController`.
 
-    Of the strain at a beam's root the rate is nearly collocated with the motor there: such feedback takes energy out of
-    the vibration as long as the delay is short against it.
+    The rate of the strain at a beam's root is nearly collocated with the motor there: its feedback removes energy from
+    a vibration as long as the delay is short compared with the period of the vibration.
 
     Parameters
     ----------
     gains : mapping of str to mapping of str to float
-        By motor and sensor: torque by rate of the reading [N m s by the sensor's unit].
+        Gains K by motor and sensor: torque per rate of the reading [N m s per unit of the sensor].
     cutoff : float, optional
-        Of the low-pass filter of rates [Hz].
+        Cut-off frequency of the low-pass filter of rates [Hz]; no filter by default.
 
     Raises
     ------
     InputError
-        No gains, or such that are no finite numbers.
+        No gains, or gains that are not finite numbers.
     """
 
     title = "rate feedback"
@@ -50,7 +50,7 @@ class RateFeedback:
         self._cutoff = checked_cutoff(cutoff)
 
     def start(self, plant: Plant) -> None:
-        """See `Controller`."""
+        """Prepare for a run: see `Controller.start`."""
         for names, own, what in ((plant.inputs, self.inputs, "inputs"), (plant.outputs, self.outputs, "outputs")):
             all_known(names, own, what, "name")
         self._K = self._gains[np.ix_([self.outputs.index(name) for name in plant.outputs],
@@ -59,16 +59,16 @@ class RateFeedback:
 
     @checked_arguments()
     def sampled(self, period: float) -> DiscreteModel:
-        """The law at a period [s] as a model in state space, for `closed_loop` and `margins`."""
+        """Return the law at a period [s] as a state-space model, for `closed_loop` and `margins`."""
         one = BackwardDifference(period, self._cutoff).linear_law(len(self.inputs))
         K = self._gains
         return DiscreteModel(one.A, one.B, -K @ one.C, -K @ one.D, period, self.inputs, self.outputs)
 
     def step(self, k: int, t: float, y: Array) -> Array:
-        """See `Controller`."""
+        """Compute the torques of a sample: see `Controller.step`."""
         return -self._K @ self._rates.step(y)[1]
 
     def linear_law(self) -> LinearLaw:
-        """For the compiled time loop: states are readings before and their rates."""
+        """Return the law for the compiled time loop; its states are the previous readings and their rates."""
         rates = self._rates.linear_law(self._K.shape[1])
         return LinearLaw(rates.A, rates.B, -self._K @ rates.C, -self._K @ rates.D, first=rates.first)

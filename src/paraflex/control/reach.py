@@ -1,4 +1,4 @@
-"""Which motions of a sampled plant its motors do not reach, or its readings do not show."""
+"""Reachability and observability of a sampled plant: motions that motors do not reach or readings do not show."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from paraflex.arrays import Array
 from paraflex.control.sampled import SampledPlant
 from paraflex.errors import InputError
 
-# Poles further inside the unit circle decay by themselves.
+# Poles further inside the unit circle than this decay without control.
 _LASTING = 1e-9
-# Of [A - z, B], in states and inputs of one size, the least singular value below which a motion is not reached.
+# Least singular value of the balanced [A - z, B] below which a motion is not reached.
 _NOT_REACHED = 1e-11
 _NAMED = 4
 
@@ -19,21 +19,23 @@ _NAMED = 4
 def check_reach(
     plant: SampledPlant, columns: Array, field: str, problem: str, remedy: str, *, transposed: bool = False
 ) -> None:
-    """Raise an error that names motions which last, and which some columns do not reach (Hautus' test).
+    """Check that given columns reach all motions that do not decay (Hautus test).
 
     Parameters
     ----------
     plant : SampledPlant
+        Sampled plant.
     columns : (n, m) array
-        Of inputs; or rows of outputs as columns, with `transposed`.
+        Input columns; or output rows as columns, with `transposed`.
     field, problem, remedy : str
-        Of the error.
+        Parts of the error.
     transposed : bool
-        Whether to test which motions outputs show.
+        Whether observability by outputs is tested in place of reachability.
 
     Raises
     ------
     InputError
+        Motions that are not reached, named by their frequencies.
     """
     n = plant.own
     size = np.asarray(scipy.linalg.matrix_balance(plant.A[:n, :n], permute=False, separate=True)[1][0])
@@ -60,5 +62,5 @@ def check_reach(
 
 
 def frequency_of(z: complex, period: float) -> float:
-    """Frequency of a sampled pole [Hz]: |angle| / (2 pi T)."""
+    """Return the frequency of a sampled pole [Hz], |angle| / (2 pi T)."""
     return float(abs(np.angle(z))) / (2.0 * np.pi * period)

@@ -1,4 +1,4 @@
-"""Readings of sensors at one instant, as controllers need them: a thousand times a second of simulated time."""
+"""Fast evaluation of sensor readings at single instants, for controllers that sample at about 1 kHz."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from paraflex.dynamics.sensors import SensorReader, sensor_rows
 from paraflex.integrators.run import Instant
 from paraflex.mechanism import GROUND, Sensor
 
-# A reading is taken for a product with constant rows where it agrees to this part at random states.
+# A reading is regarded as a product with constant rows if it agrees to this relative accuracy at random states.
 _SAME = 1e-9
 _TRIALS = 3
 
 
 class Affine(NamedTuple):
-    """Readings y = value + rows_q q + rows_v v + rows_a a + w^2 (turning q), w the rate of a body's angle.
+    """Readings y = value + rows_q q + rows_v v + rows_a a + w^2 (turning q), with w the rate of a body's angle.
 
     Attributes
     ----------
     value : (sensors,) array
+        Readings at zero coordinates, velocities and accelerations.
     q, v, a, turning : (sensors, n) arrays
+        Rows of coordinates, velocities and accelerations, and rows of the coordinates by w^2.
     angle : (sensors,) array of int
         Index of the angle.
     """
@@ -39,24 +41,27 @@ class Affine(NamedTuple):
     angle: np.ndarray
 
     def at(self, q: Array, v: Array, a: Array) -> Array:
-        """Readings (sensors,) at a state (n,)."""
+        """Return the readings (sensors,) at a state (n,)."""
         return self.value + self.q @ q + self.v @ v + self.a @ a + v[self.angle] ** 2 * (self.turning @ q)
 
 
 class Place(NamedTuple):
-    """Place of a material point along an axis of the ground, e . (r + R (x0 + N u - (u . B u / 2, 0))).
+    """Position of a material point along an axis of the ground, e . (r + R (x0 + N u - (u . B u / 2, 0))).
 
     Attributes
     ----------
     sensor : int
-        Its number.
+        Index of the sensor.
     offset, angle, first : int
-        Where r (2,), the angle of R and u (nf,) begin among the coordinates.
+        Indices of r (2,), of the angle of R, and of u (nf,) among the coordinates.
     axis : (2,) array
-        e.
+        Direction e of the axis.
     x0 : (2,) array
+        Position in the undeformed body [m].
     N : (2, nf) array
+        Shape rows of the point.
     B : (nf, nf) array
+        Matrix of the second-order axial displacement.
     """
 
     sensor: int
@@ -69,7 +74,7 @@ class Place(NamedTuple):
     B: Array
 
     def at(self, q: Array) -> float:
-        """The reading at coordinates (n,) [m]."""
+        """Return the reading at coordinates (n,) [m]."""
         u = q[self.first : self.first + len(self.B)]
         x, y = self.x0 + self.N @ u
         x -= 0.5 * float(u @ self.B @ u)
@@ -79,24 +84,28 @@ class Place(NamedTuple):
 
 
 class Readings:
-    """Readings of some sensors of a system, one instant after another.
+    """Readings of some sensors of a system at one instant after another.
 
-    Angles, their rates and strains are linear in coordinates, velocities and accelerations, but for what the turning of
-    a beam adds to its strain; places of points are read as they are, others one by one.
+    Angles, their rates and strains are linear in coordinates, velocities and accelerations, except for the contribution
+    of a beam's rotation to its strain. Positions of points are computed directly, and other readings one by one.
 
     Parameters
     ----------
     system : System
+        Equations of motion of the mechanism.
     sensors : sequence of Sensor
+        Sensors to be read.
     found : sequence of Affine or None, optional
-        Rows of the sensors, where they are known.
+        Rows of the sensors, None for readings that are not linear; computed by default.
 
     Attributes
     ----------
     names : tuple of str
+        Names of the sensors.
     units : tuple of str
+        Units of the readings.
     of_torques : bool
-        Whether some are of torques as well.
+        Whether some readings depend on torques as well.
     """
 
     def __init__(self, system: System, sensors: Sequence[Sensor], found: Sequence[Affine | None] | None = None) -> None:
@@ -117,16 +126,16 @@ class Readings:
 
     @property
     def simple(self) -> bool:
-        """Whether all are linear or places."""
+        """Whether all readings are linear or positions."""
         return not self._others
 
     def only(self, names: Sequence[str]) -> Readings:
-        """Readings of some of the sensors."""
+        """Return the readings of some of the sensors."""
         places = [self.names.index(name) for name in names]
         return Readings(self._system, [self.sensors[k] for k in places], [self._found[k] for k in places])
 
     def __call__(self, now: Instant, torques: Array) -> Array:
-        """Readings (sensors,) at an instant, under torques (motors,)."""
+        """Return the readings (sensors,) at an instant, under torques (motors,)."""
         found = np.empty(len(self.sensors))
         found[self.linear] = self.affine.at(now.q, now.v, now.a)
         for place in self.places:
@@ -138,7 +147,7 @@ class Readings:
 
 
 def _place(system: System, sensor: Sensor, number: int) -> Place | None:
-    """A sensor as the place of a point of a body along an axis of the ground; None where it is none."""
+    """Return a sensor as a point's position along an axis of the ground; None if it measures something else."""
     if sensor.fixed_point is None:
         return None
     point, axis = sensor.fixed_point
@@ -153,7 +162,7 @@ def _place(system: System, sensor: Sensor, number: int) -> Place | None:
 
 
 def _affine(system: System, sensor: Sensor) -> Affine | None:
-    """The reading as a product with constant rows; None where it is none."""
+    """Return the reading as a product with constant rows; None if it is not of that form."""
     if sensor.fixed_point is not None:
         return None
     n, m, motors = system.n, system.m, len(system.mechanism.motors)

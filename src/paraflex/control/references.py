@@ -1,4 +1,4 @@
-"""What readings are compared with: numbers, functions of time, or the planned motion."""
+"""References that are subtracted from readings: numbers, functions of time, the planned motion, or another run."""
 
 from __future__ import annotations
 
@@ -21,17 +21,25 @@ from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
 Reference = Callable[[float], float]
-# Words for the planned motion, and for what sensors read where the plan's torques alone drive the flexible mechanism.
+# Names of the references: the planned motion, and the readings where the planned torques alone drive the flexible
+# mechanism.
 PLAN, OPEN_LOOP = "plan", "open-loop"
 
 
 def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, plant: Plant) -> list[Reference | None]:
-    """A reference for each of a plant's inputs; None for those that have none.
+    """Return the reference of each of a plant's inputs; None for inputs without one.
+
+    Parameters
+    ----------
+    given : mapping of str to float or callable, "plan", "open-loop", TrackingRun, MotionRun or None
+        References as for `SampledController`.
+    plant : Plant
+        Plant with the inputs.
 
     Raises
     ------
     InputError
-        An unknown sensor, a plan where there is none, neither a number nor a function.
+        An unknown sensor, "plan" or "open-loop" without a plan, or a value that is neither a number nor a function.
     """
     if given is None:
         return [None] * len(plant.inputs)
@@ -59,25 +67,25 @@ def _reference(given: Any, field: str) -> Reference:
 
 
 class AtSamples:
-    """Values (k, ...) at the samples of a controller from its start on, found by their time; the last goes on."""
+    """Values (k, ...) at the samples of a controller from its start on, looked up by time; the last value is kept."""
 
     def __init__(self, plant: Plant, values: Array) -> None:
         self._start, self._period = plant.state.time, plant.period
         self.values: Array = values
 
     def __call__(self, t: float) -> Any:
-        """The value at a time [s]."""
+        """Return the value at a time [s]."""
         sample = round((t - self._start) / self._period)
         return self.values[min(max(sample, 0), len(self.values) - 1)]
 
 
 def planned_motion(plant: Plant) -> RigidMotion:
-    """The rigid motion of a plan at the samples of a controller.
+    """Return the rigid motion of a plan at the samples of a controller.
 
     Raises
     ------
     InputError
-        There is no plan.
+        No plan.
     """
     task = plant.task
     if task is None:
@@ -90,21 +98,21 @@ def planned_motion(plant: Plant) -> RigidMotion:
 
 
 def planned_readings(plant: Plant) -> list[AtSamples | None]:
-    """Readings on the planned motion at a controller's samples; None of sensors that it says nothing of."""
+    """Return planned readings at a controller's samples; None for sensors that the plan does not cover."""
     motion = planned_motion(plant)
     found = readings_of(motion, plant.mechanism, plant.inputs)
     return [AtSamples(plant, found[name]) if name in found else None for name in plant.inputs]
 
 
 def open_loop(plant: Plant) -> TrackingRun:
-    """The run of a plan's torques without controllers, at the samples of one, by the default method.
+    """Run the plan's torques without controllers by the default method, with results at the samples of a controller.
 
     Raises
     ------
     InputError
-        There is no plan.
+        No plan.
     IntegrationError
-        The run cannot go on.
+        The integration cannot continue.
     """
     motion = planned_motion(plant)
     assert plant.task is not None
@@ -113,7 +121,7 @@ def open_loop(plant: Plant) -> TrackingRun:
 
 
 def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:
-    """What a controller's sensors read in another run, at its samples: on straight lines between those of the run.
+    """Return the readings of a controller's sensors in another run at its samples, by linear interpolation.
 
     Raises
     ------
@@ -131,7 +139,7 @@ def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:
 
 
 def readings_of(motion: RigidMotion, mechanism: Mechanism, names: Sequence[str]) -> dict[str, Array]:
-    """Readings (k,) on a rigid motion of those sensors of a mechanism that it says something of, by name."""
+    """Return the readings (k,) on a rigid motion by name, of encoders, tachometers and point sensors only."""
     sensors = {sensor.name: sensor for sensor in measured_sensors(mechanism)}
     told = [sensors[name] for name in names if sensors[name].rigid]
     system = motion.system

@@ -1,4 +1,4 @@
-"""Linear-quadratic design of sampled controllers: state feedback (LQR), and from readings by a filter (LQG)."""
+"""Linear-quadratic design of sampled controllers: state feedback (LQR), and feedback of a Kalman filter (LQG)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from paraflex.errors import InputError
 from paraflex.linear import LinearModel
 from paraflex.mechanism.quantities import not_negative
 
-# Random torques by default, as a part of the largest ones.
+# Default standard deviation of random torques, as a fraction of the largest torques.
 _OF_EFFORT = 0.1
 
 
@@ -36,34 +36,42 @@ def lqr(
     integrators: Mapping[str, float] | None = None,
     state_weights: ArrayLike | None = None,
 ) -> Regulator:
-    """State feedback that minimises sum (y / deviation)^2 + (u / effort)^2 over all samples.
+    """Design the state feedback that minimises sum (y / deviation)^2 + (u / effort)^2 over all samples.
 
-    The Riccati equation of the sampled plant with torques under way as states (Franklin, Powell and Workman, Digital
-    Control of Dynamic Systems, section 9.3), so that the delay is part of the design.
+    It solves the Riccati equation of the sampled plant with delayed torques as states (Franklin, Powell and Workman,
+    Digital Control of Dynamic Systems, section 9.3), so that the delay is part of the design.
 
     Parameters
     ----------
     model : LinearModel, ReducedModel, state space, (A, B, C, D) or SampledPlant
+        Model of the plant.
     period : float
-        [s]
+        Sampling period [s].
     deviations : mapping of str to float
-        Largest that are allowed of outputs, in their units: an output's weight is one over its square (Bryson's rule).
+        Largest allowed deviations of outputs, in their units: the weight of an output is one over the square (Bryson's
+        rule).
     effort : float or mapping of str to float
-        Largest torques or forces, of all motors or by input [N m, N]. Inputs that are not named are not used, nor are
-        forces at points, "link.tip.x", where one number is given.
+        Largest torques or forces, of all motors or by input [N m, N]. Inputs that a mapping does not name are not used,
+        nor are forces at points, such as "link.tip.x", where one number is given.
     delay : float
-        From a sample until its torques act [s].
+        Delay from a sample until its torques act [s].
     integrators : mapping of str to float, optional
-        Outputs whose errors are to vanish under constant loads, with the time constant of that [s], of a loop that is
-        faster: the integral's largest deviation is that of the output times this. Longer where others are tighter.
+        Outputs whose errors are to vanish under constant loads, each with the time constant of that decay [s], valid if
+        the rest of the loop is faster: the largest deviation of the integral is that of the output times this. The
+        decay is slower where other deviations are tighter.
     state_weights : (n, n) array, optional
-        Added to the weights, of the model's own states or of all.
+        Weights added for the model's own states or for all states; none by default.
+
+    Returns
+    -------
+    Regulator
+        State feedback.
 
     Raises
     ------
     InputError
-        Unknown names, numbers that are not positive, a free motion or undamped vibration that the motors do not reach
-        or the weights do not see.
+        Unknown names, numbers that are not positive, or a free motion or undamped vibration that the motors do not
+        reach or the weights do not include.
     """
     plant = as_sampled(model, period, delay)
     return _regulator(plant, deviations, effort, integrators or {}, state_weights)
@@ -85,33 +93,38 @@ def lqg(
     state_noise: ArrayLike | None = None,
     coloured: Mapping[str, Any] | None = None,
 ) -> LQGDesign:
-    """A regulator as `lqr` makes it, acting on what a Kalman filter estimates from readings.
+    """Design a regulator as `lqr` does, acting on the states that a Kalman filter estimates from readings.
 
     Parameters
     ----------
     model, period, deviations, effort, delay, integrators, state_weights
-        See `lqr`; outputs of integrators are among the measured ones.
+        See `lqr`; outputs of integrators must be among the measured ones.
     measured : sequence of str
         Outputs that the controller reads.
     noise : float or mapping of str to float
         Standard deviations of readings, of all or by sensor, in their units: see `quantisation_noise`.
     disturbance : float or mapping of str to float, optional
-        Standard deviations of random efforts at inputs, constant from sample to sample [N m, N], of all motors or by
-        input, points of `forces` among them. By default a tenth of the `effort` of each motor. More makes the filter
-        faster and the loop more robust at the motors (loop transfer recovery), and lets it reach vibrations that the
-        model does not have.
+        Standard deviations of random efforts at inputs, constant between samples [N m, N], of all motors or by input,
+        points of `forces` included. By default a tenth of the `effort` of each motor. Larger values make the filter
+        faster and the loop more robust at the motors (loop transfer recovery), and extend its bandwidth to vibrations
+        that are not in the model.
     state_noise : (n, n) array, optional
         Covariance added to that of the disturbances, of the model's own states or of all, for one sample.
     coloured : mapping of str to (float, Filter), optional
-        Disturbances that last, besides, by input: their standard deviation [N m, N], and a cut-off frequency [Hz] or
-        coefficients (numerator, denominator) in descending powers of s of the filter that noise comes through. The
-        Kalman filter estimates them, and the torques act against them (Anderson and Moore, Optimal Control, section
-        9.4). The filters' states follow the model's.
+        Additional coloured disturbances by input: standard deviation [N m, N], and the filter that shapes the noise, a
+        cut-off frequency [Hz] or coefficients (numerator, denominator) in descending powers of s. The Kalman filter
+        estimates them, and the torques act against them (Anderson and Moore, Optimal Control, section 9.4). The
+        filters' states follow the model's.
+
+    Returns
+    -------
+    LQGDesign
+        Regulator and filter.
 
     Raises
     ------
     InputError
-        See `lqr`; readings that do not show a motion without friction or a vibration, which it names.
+        See `lqr`; a free motion or undamped vibration, named by its frequency, that the readings do not show.
     """
     plant, lasting = disturbed_plant(model, period, delay, coloured or {})
     regulator = _regulator(plant, deviations, effort, integrators or {}, state_weights)
@@ -136,7 +149,7 @@ def lqg(
 
 
 def _holding(model: Any, motors: Sequence[str]) -> Array:
-    """Torques (motors,) of the equilibrium that a linear model is about; zero of other models."""
+    """Return the torques (motors,) of the equilibrium about which a model is linearised; zero for other models."""
     full = getattr(model, "full", model)
     if not isinstance(full, LinearModel) or not full.at_rest:
         return np.zeros(len(motors))
@@ -145,7 +158,7 @@ def _holding(model: Any, motors: Sequence[str]) -> Array:
 
 
 def _is_force(name: str) -> bool:
-    """Whether an input is a force at a point of a linear model, and no motor."""
+    """Whether an input is a force at a point of a linear model, as opposed to a motor."""
     return name.count(".") > 1 and name.endswith((".x", ".y"))
 
 
@@ -185,7 +198,7 @@ def _regulator(
 
 
 def _of_all(gain: Array, plant: SampledPlant, used: SampledPlant) -> Array:
-    """A gain for the states of a plant, of which those of inputs that are not used count for nothing."""
+    """Return a gain for all states of a plant, with zeros for the delayed torques of inputs that are not used."""
     found = np.zeros((len(gain), len(plant.states) + gain.shape[1] - len(used.states)))
     kept = [plant.states.index(name) for name in used.states]
     found[:, kept] = gain[:, : len(used.states)]
@@ -194,7 +207,7 @@ def _of_all(gain: Array, plant: SampledPlant, used: SampledPlant) -> Array:
 
 
 def _with_integrals(plant: SampledPlant, names: Sequence[str]) -> tuple[Array, Array]:
-    """A and B of a plant with sums of outputs times the period."""
+    """Return A and B of a plant augmented by integrals of outputs, sums times the period."""
     rows = plant.period * plant.rows(names)
     n, more = len(plant.states), len(names)
     A = np.block([[plant.A, np.zeros((n, more))], [rows, np.eye(more)]])
@@ -202,11 +215,11 @@ def _with_integrals(plant: SampledPlant, names: Sequence[str]) -> tuple[Array, A
 
 
 def _disturbances(plant: SampledPlant, regulator: Regulator, given: Any, effort: Any) -> Array:
-    """Covariance (n, n) of what disturbs the states from sample to sample."""
+    """Return the covariance (n, n) of the disturbances of the states from sample to sample."""
     if given is None:
         efforts = numbers_by_name(effort, regulator.motors, "effort", "N m or N")
         given = {name: _OF_EFFORT * value for name, value in efforts.items()}
-    # By name also of points of forces; one number is for the motors.
+    # A mapping may name forces at points as well; one number applies to the motors.
     names = plant.inputs if isinstance(given, Mapping) else regulator.motors
     sizes = numbers_by_name(given, names, "disturbance", "N m or N", not_negative)
     G = plant.G[:, [plant.inputs.index(name) for name in sizes]] * np.array(list(sizes.values()))
@@ -214,7 +227,10 @@ def _disturbances(plant: SampledPlant, regulator: Regulator, given: Any, effort:
 
 
 def _first_estimate(plant: SampledPlant, C: Array, spread: Array) -> Array:
-    """States (n, measured) from first readings, least squares: at rest without torques, displaced in free motions."""
+    """Return the matrix (n, measured) from the first readings to the first estimate, by weighted least squares.
+
+    The estimate is at rest without torques, displaced in the free motions.
+    """
     n = plant.own
     own = plant.A[:n, :n]
     balanced, (size, _) = scipy.linalg.matrix_balance(own, permute=False, separate=True)
@@ -227,7 +243,7 @@ def _first_estimate(plant: SampledPlant, C: Array, spread: Array) -> Array:
 
 
 def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
-    """A positive semidefinite matrix (n, n) of all states from one of all, or of the model's own."""
+    """Return a positive semidefinite matrix (n, n) for all states, from one for all or for the model's own."""
     size = len(plant.states)
     whole = np.zeros((size, size))
     if given is None:

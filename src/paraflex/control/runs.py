@@ -1,4 +1,4 @@
-"""Runs under controllers: those of a plan, and those of a mechanism without a path."""
+"""Runs under controllers, along a plan or without a path."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from paraflex.tracking import TrackingRun
 
 @dataclass(frozen=True)
 class Controlled:
-    """What runs under torques have that were given from one instant to the next.
+    """Common part of runs under torques that were set at discrete instants.
 
     Attributes
     ----------
     acting : (k, motors) array
-        Torques of all motors at the samples reached, before they change where they do so just then [N m, N].
+        Torques of all motors at the sample times reached, before a change at the same time [N m, N].
     commanded : (k, motors) array
-        Those given, which act with the lag of actuators.
+        Commanded torques, which the acting torques follow with the lag of the actuators [N m, N].
     controllers : tuple of ControllerRecord
-        What each controller did; none where torques were given by `Simulation.step`.
+        Records of the controllers; empty where torques were set by `Simulation.step`.
     """
 
     acting: Array | None = None
@@ -38,7 +38,7 @@ class Controlled:
 
     @property
     def applied(self) -> Array:
-        """Torques (k, motors) at the samples reached [N m, N]."""
+        """Torques (k, motors) at the sample times reached [N m, N]."""
         assert self.acting is not None
         return self.acting
 
@@ -46,11 +46,11 @@ class Controlled:
 @given_as("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
 class ControlledTracking(Controlled, TrackingRun):
-    """A run of a plan under torques that were given from one instant to the next."""
+    """Run of a plan under torques that were set at discrete instants."""
 
     @property
     def follows(self) -> bool:
-        """Whether torques drive it along the path."""
+        """Whether torques drive the mechanism along the path."""
         return True
 
     @cached_property
@@ -62,7 +62,7 @@ class ControlledTracking(Controlled, TrackingRun):
 @given_as("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
 class ControlledMotion(Controlled, MotionRun):
-    """A run without a path under torques that were given from one instant to the next."""
+    """Run without a path under torques that were set at discrete instants."""
 
     open_loop: ClassVar[bool] = False
 
@@ -78,31 +78,31 @@ class ControlledMotion(Controlled, MotionRun):
 
 
 class TorqueLog:
-    """Torques of all motors as they were given, one after another.
+    """Log of the torques of all motors, as they were commanded one after another.
 
     Parameters
     ----------
     lags : (motors,) array
-        Time constants with which they follow what is given; zero where they do at once [s].
+        Time constants with which torques follow their commands [s]; zero where they follow at once.
     start : float
-        Of the run [s].
+        Start time of the run [s].
     before : (motors,) array
-        Torques before anything is given.
+        Torques before the first command [N m, N].
     """
 
     def __init__(self, lags: Array, start: float, before: Array) -> None:
         self._lags, self._start = lags, start
         self._times: list[float] = []
-        # Those given, and those that acted then.
+        # Commanded torques, and torques that acted at the time of each command.
         self._given: list[Array] = [before]
         self._begun: list[Array] = [before]
 
     def __len__(self) -> int:
-        """How often something was given."""
+        """Return the number of commands."""
         return len(self._times)
 
     def note(self, t: float, torques: Array) -> None:
-        """Add torques (motors,) that are given from a time on."""
+        """Add torques (motors,) that are commanded from a time on."""
         acting = self.now(t)
         self._times.append(t)
         self._given.append(torques)
@@ -110,32 +110,32 @@ class TorqueLog:
 
     @property
     def last(self) -> tuple[float, Array, Array]:
-        """When torques changed last, those that acted then and those given from then on (motors,)."""
+        """Time of the last command, torques that acted then, and torques commanded from then on (motors,)."""
         return self._times[-1] if self._times else 0.0, self._begun[-1], self._given[-1]
 
     def copy(self) -> TorqueLog:
-        """The same so far, to go on from apart."""
+        """Return a copy that can be continued independently."""
         other = TorqueLog(self._lags, self._start, self._given[0])
         other._times, other._given, other._begun = self._times.copy(), self._given.copy(), self._begun.copy()
         return other
 
     def now(self, t: float) -> Array:
-        """Torques (motors,) that act at a time after the last change."""
+        """Return the torques (motors,) that act at a time after the last command."""
         since, begun, given = self.last
         return self._relaxed(np.array([t - since]), begun[None], given[None])[0]
 
     def at(self, times: Array, slack: float) -> Array:
-        """Torques (k, motors) that act at times (k,), those before a change within a slack [s]."""
+        """Return the torques (k, motors) that act at times (k,), those before a change within a slack [s]."""
         number = self._number(times, slack)
         since = np.array([0.0, *self._times])[number]
         return self._relaxed(times - since, np.array(self._begun)[number], np.array(self._given)[number])
 
     def given(self, times: Array, slack: float) -> Array:
-        """Torques (k, motors) that are given at times (k,), those before a change within a slack [s]."""
+        """Return the torques (k, motors) that are commanded at times (k,), those before a change within a slack [s]."""
         return np.array(self._given)[self._number(times, slack)]
 
     def _number(self, times: Array, slack: float) -> NDArray[np.int64]:
-        """Of the torques given at times (k,); the first at the start."""
+        """Return the indices of the commands that hold at times (k,); the first one holds at the start."""
         changes = np.array(self._times)
         number = np.searchsorted(changes, times - slack, side="left")
         if changes.size and changes[0] <= self._start + slack:
@@ -143,7 +143,7 @@ class TorqueLog:
         return number
 
     def _relaxed(self, since: Array, begun: Array, given: Array) -> Array:
-        """Torques (k, motors) at times (k,) after changes."""
+        """Return the torques (k, motors) at times (k,) after their commands."""
         if not np.any(self._lags):
             return given
         lags = np.where(self._lags > 0.0, self._lags, 1.0)

@@ -1,4 +1,4 @@
-"""Exact sampling of linear models whose inputs are held from sample to sample and act after a delay."""
+"""Exact sampling of linear models with zero-order hold and input delay."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from paraflex.mechanism.quantities import not_negative, positive
 
 
 class NamedMatrices(NamedTuple):
-    """A model's matrices with the names of its states, inputs and outputs."""
+    """Matrices of a model with the names of its states, inputs and outputs."""
 
     matrices: StateSpace
     states: tuple[str, ...]
@@ -32,23 +32,28 @@ class NamedMatrices(NamedTuple):
 
 @dataclass(frozen=True)
 class SampledPlant:
-    """x_k+1 = A x_k + B u_k, readings y_k = C x_k: a linear model between a digital controller's samples.
+    """Sampled linear plant x_k+1 = A x_k + B u_k with readings y_k = C x_k, as seen by a digital controller.
 
     Torques u_k, computed at sample k, act from k `period` + `delay` on until the next ones do. Readings are taken
-    before torques change: the feed-through of the model is with those before, so that no loop is algebraic.
+    before torques change: the feed-through of the model acts on the previous torques, so that there is no algebraic
+    loop.
 
     Attributes
     ----------
     A : (n, n) array
+        State matrix.
     B : (n, inputs) array
+        Input matrix.
     C : (outputs, n) array
+        Output matrix.
     G : (n, inputs) array
-        What efforts at the inputs lead to that act over the whole period, without delay: disturbances.
+        Disturbance matrix: effect of efforts at the inputs that act over the whole period, without delay.
     states : tuple of str
-        Those of the model, then torques under way, the oldest first: "tau1(k-2)".
+        Names of the states: those of the model, then delayed torques, the oldest first: "tau1(k-2)".
     inputs, outputs : tuple of str
+        Names of inputs and outputs.
     period, delay : float
-        [s]
+        Sampling period and input delay [s].
     own : int
         Number of states of the model itself, which come first.
     """
@@ -70,39 +75,39 @@ class SampledPlant:
 
     @property
     def D(self) -> Array:
-        """Feed-through (outputs, inputs): none."""
+        """Feed-through matrix (outputs, inputs), which is zero."""
         return np.zeros((len(self.outputs), len(self.inputs)))
 
     @property
     def dt(self) -> float:
-        """The period [s], as python-control and SciPy call it."""
+        """Sampling period [s], by the name of python-control and SciPy."""
         return self.period
 
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
-        """Eigenvalues z (n,) of A; torques under way have zeros."""
+        """Eigenvalues z (n,) of A; those of delayed torques are zero."""
         own = np.linalg.eigvals(self.A[: self.own, : self.own])
         return np.concatenate([own, np.zeros(len(self.states) - self.own)]).astype(complex)
 
     @checked_arguments()
     def rows(self, names: Sequence[str], field: str = "outputs") -> Array:
-        """Rows of C (names, n) of some outputs.
+        """Return the rows of C (names, n) of some outputs.
 
         Raises
         ------
         InputError
-            A name that is no output.
+            An unknown output.
         """
         return self.C[places(names, self.outputs, field, "output")]
 
     @checked_arguments()
     def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> SampledPlant:
-        """The plant with some outputs, and with torques of some inputs; the others are zero.
+        """Return the plant with some inputs and outputs only; the torques of other inputs are zero.
 
         Raises
         ------
         InputError
-            A name that is none of them.
+            An unknown input or output.
         """
         columns = places(self.inputs if inputs is None else inputs, self.inputs, "inputs", "input")
         rows = places(self.outputs if outputs is None else outputs, self.outputs, "outputs", "output")
@@ -119,24 +124,30 @@ class SampledPlant:
 
 @checked_arguments()
 def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
-    """A linear model as a digital controller sees it: sampled, with torques that are held and act after a delay.
+    """Sample a linear model with torques that are held and act after a delay, as a digital controller sees it.
 
-    Exact, by exponentials of [A, B; 0, 0]: of a delay of d periods and a part f, x_k+1 = Phi x_k + Phi(T - f) Gamma(f)
-    u_k-d-1 + Gamma(T - f) u_k-d (Åström and Wittenmark, Computer-Controlled Systems, section 2.3).
+    The sampling is exact, by exponentials of [A, B; 0, 0]: for a delay of d periods and a fraction f, x_k+1 = Phi x_k +
+    Phi(T - f) Gamma(f) u_k-d-1 + Gamma(T - f) u_k-d (Åström and Wittenmark, Computer-Controlled Systems, section 2.3).
 
     Parameters
     ----------
     model : LinearModel, ReducedModel, state space or (A, B, C, D)
-        Of paraflex, python-control or SciPy; continuous. Names of states, inputs and outputs are kept.
+        Continuous model of paraflex, python-control or SciPy. Names of states, inputs and outputs are kept.
     period : float
-        Of sampling [s].
+        Sampling period T [s].
     delay : float
-        From a sample until its torques act [s]: any number of periods, fractions too.
+        Delay from a sample until its torques act [s]: any number of periods, fractions included.
+
+    Returns
+    -------
+    SampledPlant
+        Sampled model, with delayed torques as additional states.
 
     Raises
     ------
     InputError
-        A period that is not positive, a negative delay, a model that is sampled already, matrices that do not fit.
+        A period that is not positive, a negative delay, a model that is sampled already, or matrices of inconsistent
+        sizes.
     """
     named = named_matrices(model)
     positive(period, "period", "s")
@@ -148,7 +159,7 @@ def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
     old, new = (back @ each for each in (early[0] @ late[1], early[1]))
     n, m, p = len(named.states), len(named.inputs), len(named.outputs)
     feeds = bool(np.any(named.matrices.D))
-    # Inputs under way: of the samples k - d, ..., k - 1, and that of k - d - 1 where it acts in this period or is read.
+    # Delayed inputs: those of samples k - d, ..., k - 1, and that of k - d - 1 if it acts in this period or is read.
     oldest = whole + (1 if part or feeds else 0)
     size = n + m * oldest
     at_most(size, PLANT_STATES, "delay", "too long for the period: torques under way are too many states")
@@ -171,7 +182,7 @@ def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
 
 
 def as_sampled(model: Any, period: float, delay: float) -> SampledPlant:
-    """A plant as it is, or a linear model sampled so.
+    """Return a sampled plant as it is, or sample a linear model.
 
     Raises
     ------
@@ -187,12 +198,12 @@ def as_sampled(model: Any, period: float, delay: float) -> SampledPlant:
 
 
 def named_matrices(model: Any) -> NamedMatrices:
-    """Matrices and names of a continuous model.
+    """Return the matrices and names of a continuous model.
 
     Raises
     ------
     InputError
-        What is no model, or a sampled one; matrices that do not fit or are not finite.
+        An object that is not a linear model, a sampled model, or matrices that are of inconsistent sizes or not finite.
     """
     if isinstance(model, NamedMatrices):
         return model
@@ -219,7 +230,7 @@ def named_matrices(model: Any) -> NamedMatrices:
 
 
 def names_of(model: Any, what: str, letter: str, count: int) -> tuple[str, ...]:
-    """Names of a model's states, inputs or outputs: x1, x2 of one that has none."""
+    """Return the names of a model's states, inputs or outputs; x1, x2, ... for a model without names."""
     have = getattr(model, f"{what}_labels", None) or getattr(model, f"{what}s", None)
     if isinstance(have, Sequence) and not isinstance(have, str) and len(have) == count:
         return tuple(str(getattr(one, "name", one)) for one in have)
@@ -227,21 +238,21 @@ def names_of(model: Any, what: str, letter: str, count: int) -> tuple[str, ...]:
 
 
 def places(names: Sequence[str], among: Sequence[str], field: str, what: str) -> list[int]:
-    """Numbers of names among others.
+    """Return the indices of names among others.
 
     Raises
     ------
     InputError
-        One that is not among them, or that is given twice.
+        An unknown name, or one given twice.
     """
     check_distinct(names, among, field, what)
     return [list(among).index(name) for name in names]
 
 
 def _scaled(model: Any, matrices: StateSpace) -> tuple[StateSpace, Array]:
-    """The model in states of one size, and how its own follow from them (n, n).
+    """Return the model in balanced states, and the transformation (n, n) back to its own.
 
-    Axial vibrations of links at tens of kHz, in metres beside rates, would cost exponentials their accuracy.
+    Axial vibrations of links at tens of kHz, in metres beside rates, would cost the exponentials their accuracy.
     """
     if isinstance(model, LinearModel):
         return model.scaled, model.modal_states[1]
@@ -252,7 +263,7 @@ def _scaled(model: Any, matrices: StateSpace) -> tuple[StateSpace, Array]:
 
 
 def _held(matrices: StateSpace, time: float) -> tuple[Array, Array]:
-    """Phi (n, n) and Gamma (n, m) over a time with inputs held."""
+    """Return Phi (n, n) and Gamma (n, m) over a time [s] with inputs held."""
     n, m = matrices.B.shape
     both = np.zeros((n + m, n + m))
     both[:n, :n], both[:n, n:] = matrices.A, matrices.B

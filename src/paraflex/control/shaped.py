@@ -16,26 +16,27 @@ from paraflex.kinematics import Path, PathFollower, PathMotion, turning_of
 from paraflex.mechanism import ActuationMode
 from paraflex.tracking import TrackingTask, path_knots
 
-# A run that ends this part of it before the shaped torques do still has all of them.
+# A run may end before the shaped torques do by this fraction of their duration, a rounding error.
 _SAME_END = 1e-9
 
 
 @dataclass(frozen=True)
 class ShapedPath(CheckedFields):
-    """A path whose motion is shaped: p(t) = sum A_i r(t - t_i), and so its velocity, acceleration and angle.
+    """Path with shaped motion: p(t) = sum A_i r(t - t_i), and likewise its velocity, acceleration and angle.
 
-    It begins and ends where the path r does, later by the shaper's duration, and cuts corners between.
+    It begins and ends where the path r does, its end is delayed by the shaper's duration, and it cuts corners between.
 
     Attributes
     ----------
     path : Path
-        At rest before its start.
+        Path r, at rest before its start.
     shaper : Shaper
+        Input shaper.
 
     Raises
     ------
     InputError
-        What is no path, or no shaper.
+        An object that is not a path, or not a shaper.
     """
 
     path: Path
@@ -43,26 +44,26 @@ class ShapedPath(CheckedFields):
 
     @property
     def duration(self) -> float:
-        """Duration of the motion [s]: of the path and the shaper."""
+        """Duration of the motion, the sum of those of path and shaper [s]."""
         return self.path.duration + self.shaper.duration
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Those of the path after each impulse [s]."""
+        """Knots of the path, delayed by the time of each impulse [s]."""
         return tuple(np.unique(np.add.outer(self.shaper.times, np.array(self.path.knots))))
 
     def evaluate(self, t: Array) -> PathMotion:
-        """The motion at times t."""
+        """Return the motion at times t."""
         return PathMotion(*self._shaped(lambda at: np.stack(self.path.evaluate(at)), t))
 
     def turning(self, t: Array) -> Array | None:
-        """Angle [rad] of the end-effector, its rate and acceleration at times t (3, k); None without angles."""
+        """Return the end-effector's angle [rad], rate and acceleration at times t (3, k); None without angles."""
         if turning_of(self.path, np.zeros(1)) is None:
             return None
         return self._shaped(lambda at: np.stack(self.path.turning(at)), t)  # type: ignore[attr-defined]
 
     def _shaped(self, motion: Callable[[Array], Array], t: Array) -> Array:
-        """Weighted sum of a motion (3, k, ...) at earlier times."""
+        """Return the weighted sum of delayed copies of a motion (3, k, ...)."""
         t, total = np.atleast_1d(t) * 1.0, np.zeros(())
         for delay, weight in zip(self.shaper.times, self.shaper.amplitudes, strict=True):
             begun = np.real(t - delay) >= 0.0
@@ -74,36 +75,39 @@ class ShapedPath(CheckedFields):
 
 @dataclass(frozen=True)
 class ShapedTorquePlan(TorquePlan):
-    """Torques of another plan, shaped, beside the rigid motion along its shaped path.
+    """Shaped torques of another plan, together with the rigid motion along its shaped path.
 
     Attributes
     ----------
     unshaped : TorquePlan
+        Plan whose torques are shaped.
     shaper : Shaper
+        Input shaper.
     """
 
     unshaped: TorquePlan = field(kw_only=True)
     shaper: Shaper = field(kw_only=True)
 
     def feed_forward(self, mode: ActuationMode) -> FeedForward:
-        """The shaped torques of a mode: see `TorquePlan.feed_forward`."""
+        """Return the shaped torques of a mode: see `TorquePlan.feed_forward`."""
         return self.unshaped.feed_forward(mode).shaped(self.shaper.times, self.shaper.amplitudes)
 
 
 @checked_arguments()
 def shape_torques(task: TrackingTask, shaper: Shaper) -> TrackingTask:
-    """The same task driven by shaped torques: tau(t) = sum A_i tau_0(t - t_i), with tau_0 those of the task.
+    """Return the task driven by shaped torques: tau(t) = sum A_i tau_0(t - t_i), with tau_0 its planned torques.
 
-    Before the start of the path its first torque holds, so that weight stays balanced. The desired motion is that along
-    the shaped path, which a linear mechanism takes under these torques; a mechanism whose inertia changes on the way
+    Before the start of the path the first torque holds, so that weight stays balanced. The desired motion is that along
+    the shaped path, which a linear mechanism follows under these torques; a mechanism whose inertia changes on the way
     departs from it. Where the path matters, plan along a `ShapedPath` instead. Torques against loads that change in
     time are delayed with the rest.
 
     Parameters
     ----------
     task : TrackingTask
-        With a duration of at least that of its path and of the shaper.
+        Task with a duration of at least that of its path plus the shaper.
     shaper : Shaper
+        Input shaper.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Input shapers: few impulses, with which a command is convolved so that it leaves modes of known frequency at rest."""
+"""Input shapers: short impulse sequences whose convolution with a command leaves modes of known frequency at rest."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from paraflex.errors import InputError
 from paraflex.limits import SHAPER_IMPULSES, at_most
 from paraflex.mechanism.quantities import finite, positive
 
-# Impulses nearer than this part of the shaper's duration are one: those of two modes of one frequency.
+# Impulses closer than this fraction of the shaper's duration are merged, as for two modes of equal frequency.
 _SAME_TIME = 1e-12
-# The EI conditions are solved from no damping upwards, with steps of damping and a residual of this size.
+# The EI conditions are solved by continuation from zero damping: step of the damping ratio, and residual that is
+# accepted.
 _DAMPING_STEP, _SOLVED = 0.02, 1e-10
-# Damping up to which there are published EI shapers.
+# Damping ratio up to which EI shapers are published.
 _EI_DAMPING = 0.3
-# A residual is looked at in steps of this part of the frequency over which impulses change their phase by a turn, up to
-# so many times the modelled frequency, and is within its tolerance to rounding.
+# The residual is scanned in steps of this fraction of the frequency change that turns the phase of the last impulse by
+# 2 pi, up to this multiple of the modelled frequency; it may exceed the tolerance by this rounding error.
 _SCAN_STEP, _SCAN_END, _ROUNDING = 0.005, 5.0, 1e-9
 
 
@@ -33,13 +34,14 @@ class ShaperKind(Enum):
     """Conditions on the residual vibration of a shaper at the modelled frequency.
 
     ZV
-        Zero: two impulses.
+        Zero vibration: two impulses.
     ZVD
-        Zero, and its first derivative by frequency: three.
+        Zero vibration and zero first derivative by frequency: three impulses.
     ZVDD
-        Zero, and its first two derivatives: four.
+        Zero vibration and zero first and second derivatives by frequency: four impulses.
     EI
-        The tolerance there, zero at a frequency on either side: three, the extra-insensitive shaper.
+        Extra-insensitive shaper: residual equal to the tolerance there and zero at a frequency on either side, three
+        impulses.
     """
 
     ZV = "zv"
@@ -54,26 +56,27 @@ _ORDERS = {ShaperKind.ZV: 1, ShaperKind.ZVD: 2, ShaperKind.ZVDD: 3}
 @given_as("a shaper", "a shaper, as paraflex.shaper makes it")
 @dataclass(frozen=True)
 class Shaper(CheckedFields):
-    """Impulses at `times` of `amplitudes` whose sum is one: a command convolved with them keeps its final value.
+    """Input shaper: impulses at `times` with `amplitudes` of sum one, so that a shaped command keeps its final value.
 
-    Of n frequencies it is the convolution of n shapers, each for its own.
+    For n frequencies it is the convolution of n shapers, one for each frequency.
 
     Attributes
     ----------
     kind : ShaperKind or str
-        "zv", "zvd", "zvdd" or "ei".
+        Kind of shaper: "zv", "zvd", "zvdd" or "ei".
     frequencies : float or sequence of float
         Undamped natural frequencies of the modes [Hz].
     damping : float or sequence of float
         Damping ratio of all modes, or of each.
     tolerance : float
-        Residual of an EI shaper at its frequency, as a fraction of that without shaper.
+        Residual of an EI shaper at its frequency, as a fraction of the vibration without shaper.
 
     Raises
     ------
     InputError
-        A frequency that is not positive, a damping ratio outside [0, 1), of EI above 0.3, another number of them than
-        of frequencies, a tolerance that no EI shaper has or that another kind is given, or too many impulses.
+        A frequency that is not positive, a damping ratio outside [0, 1) or above 0.3 for EI, a number of damping ratios
+        other than one or that of the frequencies, a tolerance for which there is no EI shaper or that is given for
+        another kind, or too many impulses.
 
     References
     ----------
@@ -130,7 +133,7 @@ class Shaper(CheckedFields):
 
     @property
     def duration(self) -> float:
-        """Time of the last impulse, by which it delays the end of a motion [s]."""
+        """Time of the last impulse, by which the end of a motion is delayed [s]."""
         return self.times[-1]
 
     @cached_property
@@ -141,9 +144,9 @@ class Shaper(CheckedFields):
 
     @checked_arguments()
     def residual(self, frequency: float | Sequence[float] | Array, damping: float | None = None) -> Array:
-        """Vibration that the impulses leave in a mode, as a fraction of what one impulse at the end would.
+        """Return the residual vibration of a mode, as a fraction of that after one impulse at the end.
 
-        With omega = 2 pi f, omega_d = omega sqrt(1 - zeta^2), t_n the last time:
+        With omega = 2 pi f, omega_d = omega sqrt(1 - zeta^2) and t_n the time of the last impulse,
         V = exp(-zeta omega t_n) |sum A_i exp((zeta omega + j omega_d) t_i)|.
 
         Parameters
@@ -151,12 +154,12 @@ class Shaper(CheckedFields):
         frequency : float or (k,) array
             Undamped natural frequency of the mode [Hz].
         damping : float, optional
-            Its damping ratio; that of the first modelled mode by default.
+            Damping ratio of the mode; that of the first modelled mode by default.
 
         Returns
         -------
         Array
-            Of the shape of the frequencies.
+            Residual, with the shape of `frequency`.
         """
         ratio = self.damping[0] if damping is None else damping
         finite(np.ravel(frequency).tolist(), "frequency")
@@ -165,10 +168,11 @@ class Shaper(CheckedFields):
 
     @checked_arguments()
     def insensitivity(self, tolerance: float = 0.05) -> float:
-        """Width of the band of frequencies about the first modelled one in which the residual is within a tolerance.
+        """Return the width of the band about the first modelled frequency where the residual is within tolerance.
 
-        The width is relative to that frequency; the mode has the modelled damping ratio. Zero if the residual exceeds
-        the tolerance at the modelled frequency, infinite if it does not up to five times that.
+        The width is relative to that frequency; the mode has the modelled damping ratio. It is zero if the residual
+        exceeds the tolerance at the modelled frequency, infinite if it does not exceed it up to five times that
+        frequency.
         """
         _check_fraction(tolerance)
         step = _SCAN_STEP / (self.frequencies[0] * self.duration)
@@ -178,7 +182,7 @@ class Shaper(CheckedFields):
         return above - below
 
     def _edge(self, tolerance: float, places: Array) -> float:
-        """The first of ascending or descending relative frequencies beyond which the residual exceeds a tolerance."""
+        """Return the first of ordered relative frequencies beyond which the residual exceeds a tolerance."""
 
         def excess(place: Any) -> Any:
             return self.residual(place * self.frequencies[0]) - tolerance
@@ -194,14 +198,14 @@ class Shaper(CheckedFields):
 
     @checked_arguments()
     def shaped(self, values: Callable[[Any], Any], start: float = 0.0) -> Callable[[Any], Any]:
-        """A function of time, shaped: sum A_i f(t - t_i), where f holds its value at the start before it.
+        """Return a shaped function of time, sum A_i f(t - t_i), where f keeps its initial value before the start.
 
         Parameters
         ----------
         values : callable
-            Gives a number or an array at a time, or arrays (k, ...) at times (k,).
+            Function f that returns a number or an array at a time, or arrays (k, ...) at times (k,).
         start : float
-            [s]
+            Time at which f starts [s].
         """
         finite(start, "start")
         impulses = list(zip(self.times, self.amplitudes, strict=True))
@@ -219,28 +223,28 @@ def shaper(
     damping: float | Sequence[float] | Array = 0.0,
     tolerance: float = 0.05,
 ) -> Shaper:
-    """A shaper for one mode or several: for a path, see `ShapedPath`, or for torques, see `shape_torques`.
+    """Return a shaper for one mode or several: for a path, see `ShapedPath`, or for torques, see `shape_torques`.
 
     With K = exp(-zeta pi / sqrt(1 - zeta^2)) and T_d = 1 / (f sqrt(1 - zeta^2)):
 
     - ZV: [1, K] / (1 + K) at 0, T_d/2;
     - ZVD: [1, 2K, K^2] / (1 + K)^2 at 0, T_d/2, T_d;
     - ZVDD: [1, 3K, 3K^2, K^3] / (1 + K)^3 at 0, T_d/2, T_d, 3T_d/2;
-    - EI of tolerance V without damping: [(1 + V)/4, (1 - V)/2, (1 + V)/4] at 0, T/2, T; with damping from the
+    - EI of tolerance V without damping: [(1 + V)/4, (1 - V)/2, (1 + V)/4] at 0, T/2, T; with damping it solves the
       conditions that the residual has the maximum V at f and is zero at a frequency on either side.
 
     Parameters
     ----------
     kind : str
-        "zv", "zvd", "zvdd" or "ei".
+        Kind of shaper: "zv", "zvd", "zvdd" or "ei".
     frequencies : float or sequence of float
-        Undamped natural frequencies f of the modes [Hz]. `LinearModel.frequencies`, of a mechanism that torques drive,
-        and `held_frequencies()`, of one whose motors follow a motion whatever the torque, are in rad/s: divide them by
+        Undamped natural frequencies f of the modes [Hz]. `LinearModel.frequencies`, for a mechanism driven by torques,
+        and `held_frequencies()`, for one whose motors follow a motion whatever the torque, are in rad/s: divide them by
         2 pi.
     damping : float or sequence of float
         Damping ratio zeta of all modes, or of each.
     tolerance : float
-        Residual V of an EI shaper at f, as a fraction of that without shaper.
+        Residual V of an EI shaper at f, as a fraction of the vibration without shaper.
 
     Raises
     ------
@@ -257,14 +261,14 @@ def _check_fraction(tolerance: float) -> None:
 
 
 def _vibration(omega: Any, damping: float, times: Array, amplitudes: Array) -> tuple[Any, Any]:
-    """Complex amplitude after the last impulse, and its derivative by omega; see `Shaper.residual`."""
+    """Return the complex amplitude after the last impulse, and its derivative by omega: see `Shaper.residual`."""
     pole = (damping + 1j * np.sqrt(1.0 - damping**2)) * times - damping * times[-1]
     terms = amplitudes * np.exp(pole * omega)
     return np.sum(terms, axis=-1), np.sum(pole * terms, axis=-1)
 
 
 def _impulses(kind: ShaperKind, frequency: Any, damping: Any, tolerance: Any) -> tuple[Numbers, Numbers]:
-    """Times and amplitudes for one mode."""
+    """Return the times and amplitudes of the impulses for one mode."""
     if kind is ShaperKind.EI:
         if np.iscomplexobj([damping, tolerance]):
             raise InputError(
@@ -280,9 +284,9 @@ def _impulses(kind: ShaperKind, frequency: Any, damping: Any, tolerance: Any) ->
 
 
 def _extra_insensitive(damping: float, tolerance: float) -> tuple[Array, Array]:
-    """Times and amplitudes of the EI shaper of a mode of one radian per second.
+    """Return the times and amplitudes of the EI shaper for a mode of one radian per second.
 
-    Unknown are the amplitudes A_1 and A_3, the times t_2 and t_3 and the two frequencies without residual.
+    The unknowns are the amplitudes A_1 and A_3, the times t_2 and t_3, and the two frequencies of zero residual.
     """
     # Without damping the residual is |(1 - V) + (1 + V) cos(pi omega)| / 2, with omega = 1 at the mode.
     off = np.arccos((1.0 - tolerance) / (1.0 + tolerance)) / pi
@@ -305,7 +309,11 @@ def _ei_impulses(unknown: Array) -> tuple[Array, Array]:
 
 
 def _ei_conditions(unknown: Array, damping: float, tolerance: float) -> Array:
-    """Zero at two frequencies; at the mode the tolerance, and no slope: the residual is largest there."""
+    """Return the residuals of the EI conditions.
+
+    They are: zero vibration at two frequencies; at the mode, the tolerance and zero slope, as the residual is largest
+    there.
+    """
     impulses = _ei_impulses(unknown)
     low, high = (_vibration(omega, damping, *impulses)[0] for omega in unknown[4:])
     here, slope = _vibration(1.0, damping, *impulses)
@@ -315,7 +323,7 @@ def _ei_conditions(unknown: Array, damping: float, tolerance: float) -> Array:
 
 
 def _convolved(one: tuple[Numbers, Numbers], other: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
-    """The sequence of impulses that both make together, in order of time."""
+    """Return the convolution of two impulse sequences, in order of time."""
     times, amplitudes = (one[0][:, None] + other[0]).ravel(), (one[1][:, None] * other[1]).ravel()
     order = np.argsort(np.real(times), kind="stable")
     times, amplitudes = times[order], amplitudes[order]

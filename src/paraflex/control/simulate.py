@@ -26,14 +26,29 @@ def simulate_controlled(
     balanced: bool = False,
     on_progress: OnTime | None = None,
 ) -> ControlledTracking:
-    """Run a mode of a task under controllers, beside the torques planned for it; without warnings.
+    """Run a mode of a task under controllers and the torques planned for it, without issuing warnings.
 
-    Where a law gives the whole torque the planned ones do not act.
+    If a control law gives the whole torque, the planned torques do not act.
+
+    Parameters
+    ----------
+    task : TrackingTask
+        Task to be run.
+    mode : str or ActuationMode
+        Mode to be run.
+    controllers : sequence of ControllerDescription
+        Controllers.
+    options : IntegrationOptions, optional
+        Integration options.
+    balanced : bool
+        Whether the run starts with the deflections that the planned motion causes.
+    on_progress : callable, optional
+        Function called with the time reached [s].
 
     Raises
     ------
     InputError
-        Brakes after the motion, a method by another program, controllers that do not fit the mode.
+        Brakes after the motion, a method of another program, or controllers that do not fit the mode.
     ControllerError, IntegrationError
         See `Simulation.run`.
     """
@@ -55,7 +70,24 @@ def simulate_controlled_motion(
     options: IntegrationOptions | None = None,
     on_progress: OnTime | None = None,
 ) -> ControlledMotion:
-    """Run a mechanism without a path under controllers; without warnings.
+    """Run a mechanism without a path under controllers, without issuing warnings.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Mechanism to be run.
+    duration : float
+        Duration of the run [s].
+    controllers : sequence of ControllerDescription
+        Controllers.
+    samples : int
+        Number of sample times at which results are kept.
+    start : State or str, optional
+        Start, as for `simulate_motion`.
+    options : IntegrationOptions, optional
+        Integration options.
+    on_progress : callable, optional
+        Function called with the time reached [s].
 
     Raises
     ------
@@ -67,7 +99,7 @@ def simulate_controlled_motion(
 
 
 def _run(sim: Simulation, controllers: Sequence[ControllerDescription], on_progress: OnTime | None) -> Any:
-    """The run; errors name the controller in its file."""
+    """Return the run; errors name the controller as in its file."""
     names = [one.name for one in controllers]
     try:
         return sim.run(list(controllers), on_progress=on_progress, warning=False)

@@ -1,4 +1,4 @@
-"""A simulation one can step: torques that stay from one instant to the next, sensors read between, states kept."""
+"""Simulation that is advanced in steps: torques held from one instant to the next, sensor readings, saved states."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask
 from paraflex.validity import warn, with_blame
 
-# Samples this much later than a change of torques, as a part of the run, are those just before it.
+# Samples within this fraction of the run after a change of torques show the state just before it.
 _ROUNDING = 1e-12
 
 
 @given_as("a saved simulation", "what Simulation.save returned")
 @dataclass(frozen=True)
 class Saved:
-    """The whole state of a simulation: see `Simulation.save`.
+    """Complete state of a simulation: see `Simulation.save`.
 
     Attributes
     ----------
     time : float
-        [s]
+        Time at which the state was saved [s].
     """
 
     time: float
@@ -60,51 +60,58 @@ class Saved:
 
 
 class Simulation:
-    """A mechanism under torques that are given from one instant to the next, as a digital controller gives them.
+    """Simulation of a mechanism whose torques are set at discrete instants, as by a digital controller.
 
-    The same kernels, methods and error control as a run. Steps end at every instant; where torques change nothing
-    reaches across: accelerations and multipliers are made consistent with the new ones, while the size of steps and the
-    factor of the iteration matrix are kept.
+    It uses the same kernels, methods and error control as a run. A step of the integration ends at every instant. Where
+    torques change, accelerations and multipliers are made consistent with the new ones, and neither error estimate,
+    dense output nor starting guess uses values from before; the step size and the factorised iteration matrix are kept.
 
     Parameters
     ----------
     source : TrackingTask, Mechanism or Model
-        A plan, from its start; or a mechanism without a path, from a start.
+        Plan, simulated from its start; or a mechanism without a path, simulated from `start`.
     mode : str or ActuationMode, optional
-        Motors that torques are given for; the others turn freely. All by default.
+        Motors whose torques are set; the others turn freely. All motors by default.
     feed_forward : bool
-        Of a plan, whether its torques act by themselves, smooth in time, beside those that are given.
+        Whether the planned torques act as well, smooth in time, added to the torques that are set. Only with a plan.
     duration : float, optional
-        Of a mechanism: up to when it runs [s]; that of a model's study by default. The tolerance is of the whole.
+        Duration of a run without a path [s], to the whole of which the tolerance refers; that of the model's study by
+        default.
     samples : int
-        Of a mechanism: times at which results are kept; of a plan they are those of the task.
+        Number of sample times at which results are kept, without a path; with a plan they are those of the task.
     start : State, Start or str, optional
-        Of a mechanism, as for `simulate_motion`.
+        Start of a run without a path, as for `simulate_motion`.
     balanced : bool
-        Whether it starts in equilibrium, or in the deflections of the plan's motion.
+        Whether the run starts in equilibrium, or with the deflections that the planned motion causes.
     method : Method or str, optional
-        One of paraflex's own.
+        Integration method, one of paraflex's own.
     options : IntegrationOptions, optional
-        With a fixed `step` constraints are kept by projection, where the method can, unless `constraints` says
-        otherwise: torques that jump let joints come apart faster than Baumgarte's coefficients bring them together.
+        Integration options. With a fixed `step`, constraints are enforced by projection where the method can, unless
+        `constraints` chooses otherwise: where torques jump, Baumgarte's coefficients correct the constraint drift of
+        joints too slowly.
 
     Attributes
     ----------
     mechanism : Mechanism
+        Mechanism as described.
     system : System
+        Equations of motion of the mechanism.
     mode : ActuationMode
+        Motors whose torques are set.
     motors : tuple of str
-        Those that torques are given for, in the order of the mechanism.
+        Names of these motors, in the order of the mechanism.
     sensors_read : tuple of str
-        Encoders of motors by the names of their joints, coordinates of the end-effector, the mechanism's own sensors.
+        Names of all sensors: encoders of motors by the names of their joints, coordinates of the end-effector, and the
+        mechanism's own sensors.
     task : TrackingTask or None
+        Plan; None without a path.
     end : float
-        [s]
+        End time of the run [s].
 
     Raises
     ------
     InputError
-        A mode, motor or sensor that the mechanism does not have, a method by another program, no duration.
+        A mode, motor or sensor that the mechanism does not have, a method of another program, or no duration.
     ActuationError
         The mode cannot drive the mechanism along the plan's path.
     """
@@ -135,7 +142,7 @@ class Simulation:
             for name, value in (("duration", duration), ("start", start)):
                 if value is not None:
                     raise InputError("a plan says it itself", field=name, value=value, remedy="leave it out")
-            # Brakes are not for motors under control.
+            # Brakes do not apply to motors under control.
             task = replace(source, after=Ending.FREE)
             self.task = task.balanced(self.mode) if balanced else task
             self.system: System = task.system
@@ -161,16 +168,16 @@ class Simulation:
             options=self._options, samples=self._times.size,
         )  # fmt: skip
         self._loop: Loop | None = None
-        # Taken by the call that runs it: a law, or another thread, finds none.
+        # Lock: the running call takes its element, so that a nested call by a control law or another thread finds none.
         self._turn = [None]
         self._integration.start()
         self._fresh = self.save()
 
-    # --- Step by step ---
+    # --- Stepping ---
 
     @property
     def time(self) -> float:
-        """The time reached [s]."""
+        """Time reached [s]."""
         return self._integration.time
 
     @property
@@ -180,31 +187,34 @@ class Simulation:
         return State(now.t, now.q, now.v)
 
     def sensors(self) -> dict[str, float]:
-        """Readings of all sensors at the time reached, by name and in their units, before torques change there."""
+        """Return the readings of all sensors by name, in their units, before torques change at the time reached."""
         return dict(zip(self.sensors_read, self._read(self._readings).tolist(), strict=True))
 
     def reset(self) -> dict[str, float]:
-        """Go back to the start, without torques and controllers; the readings there."""
+        """Return to the start, without torques and controllers, and return the readings there."""
         with self._alone():
             self._restore(self._fresh)
         return self.sensors()
 
     def step(self, torques: Torques, until: float) -> dict[str, float]:
-        """Let torques act from now until a time; the readings then.
+        """Apply torques from the time reached until a later one, and return the readings then.
 
         Parameters
         ----------
         torques : (motors,) array or mapping of str to float
-            Of the motors of the mode, in the order of `motors`, or of some by name; zero for others [N m, N].
+            Torques of the mode's motors, in the order of `motors`; or of some of them by name, zero for the others [N
+            m, N].
         until : float
-            [s]
+            End time of the step [s].
 
         Raises
         ------
         InputError
-            Other numbers of torques, none that are finite, unknown motors, a time that is past or beyond the end.
+            A wrong number of torques, torques that are not finite, unknown motors, or a time that is past or beyond the
+            end.
         IntegrationError
-            It cannot go on; it carries the run so far. An event of the options that ends it does as well.
+            The integration cannot continue, or an event of the options has ended the run; the error carries the run so
+            far.
         """
         given = self._torques.given(torques)
         if not is_number(until) or not self.time < until <= self.end * (1.0 + SAME):
@@ -221,23 +231,23 @@ class Simulation:
 
     @property
     def ended(self) -> bool:
-        """Whether it has come to its end, or to an event that ends it."""
+        """Whether the run has reached its end or was ended by an event."""
         return self._integration.status == "stopped" or self.time >= self.end
 
     def save(self) -> Saved:
-        """The whole state, controllers included: a run restored from it continues bit for bit."""
+        """Return the complete state, controllers included: a run restored from it continues bit for bit."""
         loop = self._loop
         controllers = None if loop is None else loop.saved()
         return Saved(self.time, self._identity, self._integration.saved(), self._torques.saved(), loop, controllers)
 
     @checked_arguments()
     def restore(self, saved: Saved) -> None:
-        """Go back to what `save` gave, of this simulation or one that was made of the same.
+        """Return to a state that `save` returned, of this simulation or of one made from the same arguments.
 
         Raises
         ------
         InputError
-            It is of another simulation.
+            A state of another simulation.
         """
         if saved.identity != self._identity:
             raise InputError("the state of another simulation", field="saved",
@@ -247,7 +257,7 @@ class Simulation:
 
     @cached_property
     def _identity(self) -> str:
-        """A digest of all that a state goes on with."""
+        """Digest of everything on which the continuation of a saved state depends."""
         signals, start = self._integration.run.problem.signals, self._initial
         found = hashlib.blake2b(repr((self.mechanism, self.mode, self._options, self._fed_forward)).encode())
         for array in (*self.system.packed, *signals, self._times, start.q, start.v):
@@ -256,7 +266,7 @@ class Simulation:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Let one call at a time run it."""
+        """Lock the simulation during one call."""
         try:
             self._turn.pop()
         except IndexError:
@@ -285,33 +295,37 @@ class Simulation:
         on_progress: Callable[[float], None] | None = None,
         warning: bool = True,
     ) -> ControlledTracking | ControlledMotion:
-        """Run under controllers from the start; without any go on under those there are.
+        """Run under controllers from the start; without `controllers`, continue under the present ones.
 
         Parameters
         ----------
         controllers : Controller, ControllerDescription, law or sequence of them, optional
-            See `Controller` and `SampledController`; torques of several for one motor add up. An empty list starts
-            anew without any.
+            Controllers: see `Controller` and `SampledController`. Torques of several for one motor add up. An empty
+            list restarts the run without controllers.
         until : float, optional
-            Up to when [s]; to the end by default.
+            Time at which to stop [s]; the end by default.
         on_progress : callable, optional
-            Called with the time reached [s]. A KeyboardInterrupt ends the run with what is there, marked "interrupted".
+            Function called with the time reached [s]. A KeyboardInterrupt ends the run, which is returned as far as
+            computed and marked "interrupted".
         warning : bool
-            Whether a run that is doubtful issues warnings, as of `simulate`.
+            Whether a doubtful run issues warnings, as `simulate` does.
 
         Returns
         -------
         ControlledTracking or ControlledMotion
+            Run with a plan, or without a path.
 
         Raises
         ------
         InputError
-            A time that is not finite; controllers with unknown sensors or motors, one named twice, or with periods that
-            are no multiples of the shortest; a law that gives the whole torque beside another or feed-forward.
+            A time that is not finite; controllers with unknown sensors or motors, a name given twice, or periods that
+            are not multiples of the shortest one; a law that gives the whole torque beside another such law or
+            feed-forward.
         ControllerError
-            One raised an error, or returned what cannot be torques; it carries the run so far.
+            A controller that raised an error, or returned something other than finite torques; the error carries the
+            run so far.
         IntegrationError
-            It cannot go on; it carries the run so far.
+            The integration cannot continue; the error carries the run so far.
         """
         finite(self.end if until is None else until, "until")
         end = self.end if until is None else min(until, self.end)
@@ -336,7 +350,7 @@ class Simulation:
         return made
 
     def _begin(self, controllers: Sequence[Any]) -> None:
-        """Start anew under controllers; in open loop under none."""
+        """Restart under controllers, or in open loop if there are none."""
         self._restore(self._fresh)
         several = [each.made(self.mechanism, self.motors) if isinstance(each, ControllerDescription) else each
                    for each in controllers]  # fmt: skip
@@ -351,7 +365,7 @@ class Simulation:
         self._use(loop)
 
     def _go_on(self, end: float, on_progress: Callable[[float], None] | None) -> None:
-        """To the next instant of the controllers, or to the end."""
+        """Advance to the next instant of the controllers, or to the end."""
         loop = self._loop
         if loop is None or loop.inside is not None:
             self._march(end, on_progress=on_progress)
@@ -366,12 +380,12 @@ class Simulation:
             self._march(until, slack)
 
     def result(self) -> ControlledTracking | ControlledMotion:
-        """The run so far.
+        """Return the run so far.
 
         Raises
         ------
         IntegrationError
-            It cannot go on; it carries the run so far.
+            The integration cannot continue; the error carries the run so far.
         """
         try:
             solution = self._integration.solution()
@@ -384,10 +398,10 @@ class Simulation:
             solution = replace(solution, status="interrupted", message=message)
         return self._made(solution)
 
-    # --- Within ---
+    # --- Internals ---
 
     def _made(self, solution: Solution) -> ControlledTracking | ControlledMotion:
-        """The run with a solution."""
+        """Return the run with a solution."""
         k = solution.t.size - bool(solution.event)
         slack = _ROUNDING * (self.end - self._initial.time)
         log = self._torques.log
@@ -406,7 +420,7 @@ class Simulation:
                                   controllers=records)  # fmt: skip
 
     def _use(self, loop: Loop | None) -> None:
-        """Let these controllers act."""
+        """Let the given controllers act from now on."""
         if loop is self._loop:
             return
         if loop is not None:
@@ -417,8 +431,8 @@ class Simulation:
         self._integration.under(None if loop is None else loop.inside)
 
     def _inside(self, loop: Loop) -> SampledLaw | None:
-        """A loop for the compiled time loop; None where it stays outside."""
-        # What amplifiers do to torques is not known there.
+        """Return the sampled law of a loop that runs in the compiled time loop; None if it must run outside."""
+        # The compiled time loop does not model amplifiers.
         if loop.alone is None or self._torques.limited.any() or np.any(self._torques.amplifiers.lags):
             return None
         controller, plant = loop.alone
@@ -436,13 +450,13 @@ class Simulation:
         )  # fmt: skip
 
     def _read(self, readings: Readings) -> Array:
-        """Readings now."""
+        """Return the readings at the time reached."""
         now = self._integration.run.now()
         torques = self._torques.acting(now.t) if readings.of_torques else np.zeros(len(self._torques.held))
         return readings(now, torques)
 
     def _apply(self, torques: Array) -> None:
-        """Let torques (motors,) of all motors act from now on."""
+        """Apply torques (motors,) of all motors from now on."""
         if not self._torques.hold(torques, self.time, lambda: self.state):
             return
         if self._integration.run.attempts == 0:
@@ -453,7 +467,7 @@ class Simulation:
     def _march(
         self, until: float, slack: float | None = None, on_progress: Callable[[float], None] | None = None
     ) -> None:
-        """March to a time, or to a stop of the run that is the same but for rounding."""
+        """Integrate up to a time, or to a stop of the run that equals it to rounding."""
         stops = self._integration.run.problem.stops
         near = stops[int(np.argmin(np.abs(stops - until)))]
         if abs(near - until) <= (SAME * (until - self.time) if slack is None else slack):
@@ -461,7 +475,7 @@ class Simulation:
         try:
             self._integration.march(until, on_progress=on_progress)
         finally:
-            # Note which torques acted in the compiled time loop.
+            # Log the torques that acted in the compiled time loop.
             if self._loop is not None:
                 self._loop.keep_last()
                 for t, torques in self._loop.torques_acted(len(self._torques.log)):
@@ -474,7 +488,7 @@ class Simulation:
 
 
 def _projecting(options: IntegrationOptions) -> IntegrationOptions:
-    """Options of which constraints are kept by projection with fixed steps, which no error control shortens."""
+    """Return options that enforce constraints by projection for a fixed step, which no error control shortens."""
     chosen = options.constraints is not None or options.automatic_gains or options.step is None
     able = Treatment.PROJECTION in options.method.treatments
     return replace(options, constraints=Treatment.PROJECTION) if able and not chosen else options

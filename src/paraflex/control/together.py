@@ -14,25 +14,34 @@ from paraflex.errors import InputError
 from paraflex.limits import SAMPLES
 from paraflex.mechanism.quantities import all_known, known, positive
 
-# One number, or one for each of some names.
+# One number for all names, or numbers by name.
 Numbers = float | Mapping[str, float]
-# Instants closer than this part of the shortest period are one.
+# Instants closer than this fraction of the shortest period are regarded as equal.
 SAME = 1e-9
 _MOST_PERIODS = 10 * SAMPLES
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a real number, not NaN."""
+    """Whether a value is a real number other than NaN."""
     return isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool) and value == value
 
 
 def checked_number(value: Any, field: str, unit: str, check: Callable[..., None] = positive) -> float:
-    """A number in a unit that passes a check, such as `positive`.
+    """Return a number as a float after a check, such as `positive`.
+
+    Parameters
+    ----------
+    value : any
+        Value to be checked.
+    field, unit : str
+        Field and unit for errors.
+    check : callable
+        Function of value, field and unit that raises an `InputError`.
 
     Raises
     ------
     InputError
-        It is missing, is no number, or does not pass.
+        A value that is missing, is not a number, or does not pass the check.
     """
     if value is None or not is_number(value):
         raise InputError("is missing" if value is None else "is no number", field=field, value=value,
@@ -44,21 +53,23 @@ def checked_number(value: Any, field: str, unit: str, check: Callable[..., None]
 def by_name(
     given: Any, names: Sequence[str], field: str, what: str, take: Callable[[Any, str], Any]
 ) -> dict[str, Any]:  # fmt: skip
-    """What is given by name, or of every name where one value is given for all.
+    """Return values by name, from a mapping or from one value for all names.
 
     Parameters
     ----------
     given : any or mapping of str to any
+        One value for all names, or values by name.
     names : sequence of str
+        Known names.
     field, what : str
-        For errors: the field, and what is named.
+        Field for errors, and the kind of object that is named.
     take : callable
-        Of a value and its field gives what it stands for, or raises.
+        Function of a value and its field that returns the converted value, or raises.
 
     Raises
     ------
     InputError
-        A name that is none of them.
+        An unknown name.
     """
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, take(given, field))
@@ -69,17 +80,17 @@ def by_name(
 def numbers_by_name(
     given: Any, names: Sequence[str], field: str, unit: str, check: Callable[..., None] = positive
 ) -> dict[str, float]:
-    """Numbers by name, of every name where one number is given for all: see `by_name` and `checked_number`."""
+    """Return numbers by name, from a mapping or from one number for all: see `by_name` and `checked_number`."""
     return by_name(given, names, field, "name", partial(checked_number, unit=unit, check=check))
 
 
 def check_distinct(names: Sequence[str], among: Collection[str], field: str, what: str) -> None:
-    """Check that names are some of others, each named once.
+    """Check that names are among others, and that none is given twice.
 
     Raises
     ------
     InputError
-        One that is not among them, or that is given twice.
+        An unknown name, or one given twice.
     """
     for k, name in enumerate(names):
         known(name, among, field, what)
@@ -88,7 +99,7 @@ def check_distinct(names: Sequence[str], among: Collection[str], field: str, wha
 
 
 def whole_and_part(periods: float) -> tuple[int, float]:
-    """A number of periods as whole ones, and what is left as a part of one: none to rounding."""
+    """Split a number of periods into whole periods and a fraction, which is zero if within rounding."""
     nearest = round(periods)
     if abs(periods - nearest) <= SAME * max(1.0, nearest):
         return nearest, 0.0
@@ -96,17 +107,17 @@ def whole_and_part(periods: float) -> tuple[int, float]:
 
 
 def same_period(one: float, other: float) -> bool:
-    """Whether two periods are the same but for rounding."""
+    """Whether two periods are equal to rounding."""
     return abs(one - other) <= SAME * other
 
 
 def multiple_of(name: str, period: float, shortest: float) -> int:
-    """How many shortest periods [s] the period of a controller is [s].
+    """Return the period of a controller as a multiple of the shortest period, both in [s].
 
     Raises
     ------
     InputError
-        It is no multiple of them.
+        A period that is not a multiple of the shortest one.
     """
     times = period / shortest
     if abs(times - round(times)) > SAME * times:
@@ -118,12 +129,12 @@ def multiple_of(name: str, period: float, shortest: float) -> int:
 
 
 def check_name(name: Any) -> None:
-    """Check that a controller's name can stand in files of results, and in names of fields.
+    """Check that a controller's name can be used in result files and in names of fields.
 
     Raises
     ------
     InputError
-        It cannot.
+        A name that is not a text, is empty, or contains dots or slashes.
     """
     if not isinstance(name, str) or not name or set(name) & set("./"):
         raise InputError("is no name of a controller", field="name", value=name,
@@ -131,12 +142,12 @@ def check_name(name: Any) -> None:
 
 
 def check_whole(names: Sequence[str]) -> None:
-    """Check that no more than one controller gives the whole torque, by the names of those that do.
+    """Check that at most one controller gives the whole torque, given the names of those that do.
 
     Raises
     ------
     InputError
-        Two of them, which would drive the mechanism twice.
+        Two such controllers, which would drive the mechanism twice.
     """
     if len(names) > 1:
         raise InputError(
@@ -146,12 +157,12 @@ def check_whole(names: Sequence[str]) -> None:
 
 
 def periods_in(duration: float, period: float) -> int:
-    """Number of periods in a duration [s], at least one; a last one of less than `SAME` of one does not count.
+    """Return the number of periods in a duration [s], at least one; a last one shorter than `SAME` of one is dropped.
 
     Raises
     ------
     InputError
-        More than memory holds samples of.
+        More samples than memory can hold.
     """
     if duration / period > _MOST_PERIODS:
         raise InputError("is too short for the duration: more samples than memory holds", field="period", value=period,
@@ -160,7 +171,7 @@ def periods_in(duration: float, period: float) -> int:
 
 
 def real_numbers(given: Any) -> Array | None:
-    """An array of what a law or user gives as torques; None of what are no real numbers."""
+    """Return torques of a law or user as an array of floats; None if they are not real numbers."""
     try:
         return None if np.iscomplexobj(given) else np.asarray(given, dtype=float)
     except (TypeError, ValueError, OverflowError):
