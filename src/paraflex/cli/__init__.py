@@ -1,4 +1,4 @@
-"""The command line: thin commands over the library."""
+"""Command line of paraflex: thin commands over the library."""
 
-# Exit codes; that of what was interrupted is a matter of the signal: see `signals.exit_code`.
+# Exit codes; that of an interrupted command depends on the signal: see `signals.exit_code`.
 COMPLETE, TROUBLE, BAD_INPUT = 0, 1, 2

@@ -1,4 +1,4 @@
-"""What `paraflex verify` prints of one mode."""
+"""Tables that `paraflex verify` prints for one mode."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rich.console import Console
 from paraflex.cli.tables import number, plain_table, print_titled
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 
-# Names that fit above a column, of models that are printed by others than their own.
+# Names short enough for a column head, of models that are not shown under their own names.
 _SHORT = {"ked": "KED", "second-order": "2nd-ord.", "exudyn": "Exudyn", "mujoco": "MuJoCo"}
 _ERRORS = ("error\n[m]", "largest\n[m]", "RMS\n[m]", "wall\n[s]")
 _SOUND = {
@@ -23,7 +23,7 @@ _LINKS = {"angle": "angle [rad]", "angular_velocity": "angular velocity [rad/s]"
 
 
 def print_agreement(console: Console, summary: dict[str, Any], mode: str) -> None:
-    """How the models of a mode agree, the evidence that each is converged, and the differences of every link."""
+    """Print how the models of a mode agree, the evidence that each is converged, and the differences of every link."""
     models, distances = summary["modes"][mode]["models"], summary["modes"][mode]["distances"]
     finished = {name: values for name, values in models.items() if "tracking_error" in values}
     reference = summary["reference"]

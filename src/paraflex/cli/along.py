@@ -1,4 +1,4 @@
-"""`paraflex run` along paths: each in every mode asked for, each with a folder of its own."""
+"""`paraflex run` along paths: each path in every requested mode, with a results folder of its own."""
 
 from __future__ import annotations
 
@@ -49,7 +49,10 @@ from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 @dataclass(frozen=True)
 class _Along:
-    """What is to be run along a path, and where its results go; `whose` begins its lines where it is not alone."""
+    """Study planned along a path, and the folder of its results.
+
+    Its lines of output begin with `whose`, which is empty for a single path.
+    """
 
     path: str
     study: TrackingStudy
@@ -66,9 +69,9 @@ def run_along(
     options: IntegrationOptions,
     how: dict[str, Any],
 ) -> int:
-    """Run along paths and write results into the folders held for them; the exit code.
+    """Run along paths and write results into the folders held for them; return the exit code.
 
-    How the runs are integrated is kept with the results.
+    The integration settings `how` are stored with the results.
     """
     console = plain_console(stderr=True)
     if request.segments is None:
@@ -78,7 +81,7 @@ def run_along(
     compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
     began = time.perf_counter()
     planned = []
-    # A path that cannot be followed is refused before the first is run.
+    # All paths are planned first, so that one that cannot be followed is refused before any run.
     for name, (path, folder) in paths.items():
         task, full = asked_tasks(request, model, mechanism, (path, name), modes)
         if request.segments is not None:
@@ -96,7 +99,10 @@ def run_along(
 def asked_tasks(
     request: RunRequest, model: Model, mechanism: Mechanism, along: tuple[Path, str], modes: Sequence[ActuationMode]
 ) -> tuple[TrackingTask, TrackingTask | None]:
-    """The plan of a path as it is run, in finite segments or with few coordinates; of the latter that with all too."""
+    """Plan a path as it is run: with all coordinates, in finite segments, or with few coordinates.
+
+    The second task is the plan with all coordinates if the first has few, otherwise None.
+    """
     task = plan_study(model, mechanism, *along, request.plan, request.after)
     if request.segments is not None:
         return task.in_segments(proportional_segments(mechanism, request.segments)), None
@@ -105,7 +111,10 @@ def asked_tasks(
 
 
 def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity: str, began: float) -> int:
-    """Run along one path after the other; what there is of the first ones stays, and is shown, if a later one fails."""
+    """Run along one path after the other; return the exit code.
+
+    If a later path fails, the results of earlier ones are kept and printed.
+    """
     console, alone, done, places = plain_console(stderr=True), len(planned) == 1, {}, []
 
     def show(out: Console) -> None:
@@ -135,7 +144,7 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
 
 
 def _show(out: Console, results: Mapping[str, StudyResult], task: TrackingTask, fidelity: str) -> None:
-    """Tables of the paths along which something ran, and lines on all of these runs; a single path has no name."""
+    """Print tables of the paths with results, and lines on all of these runs; the name of a single path is empty."""
     ran = {path: result.to_dict() for path, result in results.items() if result.data is not None}
     if not ran:
         return
@@ -154,7 +163,7 @@ def _show(out: Console, results: Mapping[str, StudyResult], task: TrackingTask, 
 
 
 def _simulated(console: Console, model: Model, along: _Along) -> StudyResult:
-    """Results of all modes, which are written; of none where none could start."""
+    """Run all modes along a path and write their results; nothing is written if no mode could start."""
     try:
         with _progress(console, along) as report:
             result = along.study.run(on_progress=report)
@@ -171,7 +180,7 @@ def _simulated(console: Console, model: Model, along: _Along) -> StudyResult:
 
 
 def _draw(console: Console, request: RunRequest, along: _Along, result: StudyResult, began: float) -> str:
-    """Add figures and report to the numbers, and say which modes failed; a line that says where all is."""
+    """Add figures and report to the numbers, and print which modes failed; return a line with time and folder."""
     assert result.data is not None
     try:
         return write_drawn_run(result.data, along.folder, request, began)
@@ -182,7 +191,7 @@ def _draw(console: Console, request: RunRequest, along: _Along, result: StudyRes
 def own_method(
     request: RunRequest, options: IntegrationOptions, controllers: Sequence[ControllerDescription]
 ) -> Simulator | None:
-    """How each mode is run where it is not by the study's own way."""
+    """Return the simulator of each mode; None for the study's default."""
     if request.ked:
         return simulate_ked
     if controllers:
@@ -228,7 +237,7 @@ def _parameters(
 
 @contextmanager
 def _progress(console: Console, along: _Along) -> Iterator[OnProgress]:
-    """A bar of each mode."""
+    """Show a progress bar for each mode; yield the callback that updates them."""
     task = along.study.task
     end = float(task.motion.t[-1])
     with bars(console, "{task.completed:.3f}/{task.total:.3f} s", TimeElapsedColumn()) as progress:

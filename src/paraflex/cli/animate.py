@@ -1,4 +1,4 @@
-"""`paraflex animate`: a film of a run."""
+"""`paraflex animate`: a film, or pictures, of a run."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from paraflex.results import open_results
 if TYPE_CHECKING:
     from paraflex.plots.film import Film
 
-# Fields of `FilmOptions` that are given as they are.
+# Fields of `FilmOptions` that are passed on unchanged.
 _OPTIONS = ("magnify", "fps", "speed", "theme", "at", "model", "point")
 
 
 def animate_command(request: AnimateRequest) -> int:
-    """Draw the film; the exit code."""
-    # Before Matplotlib, which takes its time: what is wrong is said at once.
+    """Draw the film; return the exit code."""
+    # These checks come before the slow import of Matplotlib, so that errors are reported at once.
     data = open_results(request.results)
     output = Path(request.output)
     refuse_existing(output, request.force)
@@ -57,7 +57,7 @@ def animate_command(request: AnimateRequest) -> int:
 
 
 def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film]) -> Film:
-    """Draw, telling how far that is."""
+    """Draw the film with a progress bar."""
     progress = bars(console, TaskProgressColumn(), TimeRemainingColumn())
     bar = progress.add_task("pictures", total=None)
 
@@ -77,7 +77,7 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _at_fault(error: InputError, request: AnimateRequest) -> InputError:
-    """The same error, naming the option or file it came from."""
+    """Return the same error, naming the option or file it came from."""
     field = {"results": request.results, "output": request.output}.get(error.field, error.field)
     if error.field in (*_OPTIONS, "size", "mode"):
         field = f"--{error.field}"

@@ -1,4 +1,4 @@
-"""The `paraflex` command."""
+"""Entry point of the `paraflex` command."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ for _group, _commands in _groups.items():
 
 
 def all_commands(group: Any) -> dict[str, Any]:
-    """Commands of Click by name, in the order of the help; those of a group in it have its name before theirs."""
+    """Return the Click commands by name, in the order of the help; a command in a group is named "group command"."""
     found = {}
     for name, command in group.commands.items():
         inner = all_commands(command) if hasattr(command, "commands") else None
@@ -67,7 +67,7 @@ def _options(
 
 
 def main() -> None:
-    """Run the command line; every error that is ours becomes one line."""
+    """Run the command line; errors of paraflex and interrupts are printed as one line and set the exit code."""
     _start_quickly()
     try:
         app()
@@ -78,13 +78,13 @@ def main() -> None:
         _complain(error)
         sys.exit(TROUBLE)
     except OSError as error:
-        # Wherever a name is first looked for.
+        # A file name that is too long raises this error wherever the file is first looked up.
         if error.errno != errno.ENAMETOOLONG:
             raise
         _complain(InputError("too long a name", field="file", value=error.filename, remedy="choose a shorter one"))
         sys.exit(BAD_INPUT)
     except Exception as error:
-        # Whatever it leads to: of what paraflex wrote a traceback is wanted.
+        # An unsealed file may hold anything and so lead to any error; otherwise the traceback is wanted.
         if not unsealed:
             raise
         why = f"holds something else than what paraflex writes ({type(error).__name__})"
@@ -96,10 +96,10 @@ def main() -> None:
 
 
 def _start_quickly() -> None:
-    """Settings of the process that commands start faster with; before NumPy is imported."""
-    # Imports make a hundred thousand objects that stay: looking among them for garbage takes a tenth of the time.
+    """Set process options that make commands start faster; to be called before NumPy is imported."""
+    # Imports create a hundred thousand persistent objects: collecting garbage among them takes a tenth of the time.
     gc.set_threshold(100_000, 20, 100)
-    # Dense matrices are small here, and threads on them wait for one another where cores are busy.
+    # Dense matrices are small here, and BLAS threads wait for one another if cores are busy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 

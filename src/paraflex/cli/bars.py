@@ -1,4 +1,4 @@
-"""Bars of progress on stderr; of one that is no terminal nothing stays."""
+"""Progress bars on stderr; they are removed at the end if stderr is not a terminal."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from paraflex.campaign import OnProgress
 
 
 def bars(console: Console, *columns: str | ProgressColumn) -> Progress:
-    """Bars with a description, and columns or texts of theirs."""
+    """Return progress bars with a description, followed by the given columns or texts."""
     shown = [TextColumn(each, markup=False) if isinstance(each, str) else each for each in columns]
     return Progress(
         TextColumn("{task.description}", markup=False), BarColumn(), *shown, console=console,
@@ -22,7 +22,7 @@ def bars(console: Console, *columns: str | ProgressColumn) -> Progress:
 
 @contextmanager
 def counting(console: Console) -> Iterator[OnProgress]:
-    """A bar of runs one after the other."""
+    """Show a progress bar for consecutive runs; yield the callback that updates it."""
     with bars(console, "{task.completed}/{task.total}", TimeElapsedColumn()) as progress:
         bar = progress.add_task("", total=None)
         yield lambda at: progress.update(bar, description=at.doing, completed=at.done, total=at.total)
@@ -30,7 +30,10 @@ def counting(console: Console) -> Iterator[OnProgress]:
 
 @contextmanager
 def begun_late(progress: Progress) -> Iterator[None]:
-    """Bars that whoever tells of progress starts when there is something to tell: an error before is one line."""
+    """Stop progress bars at the end of the context, if they were started.
+
+    The first report of progress starts them, so that an error before it prints one line only.
+    """
     try:
         yield
     finally:

@@ -1,4 +1,4 @@
-"""Warnings of a command, collected: each is printed once, when the command ends or before its numbers."""
+"""Collected warnings of a command: each is printed once, when the command ends or before its numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _printed: set[str] = set()
 
 @contextmanager
 def collecting() -> Iterator[None]:
-    """Keep warnings of ours until the command ends; those of others go where they went."""
+    """Collect paraflex warnings and print them when the command ends; other warnings are shown as before."""
     _found.clear()
     _elsewhere.clear()
     _others.clear()
@@ -46,13 +46,13 @@ def collecting() -> Iterator[None]:
 
 
 def collected(more: Iterable[Finding] = ()) -> Verdict:
-    """What has been warned of until now, and more that is found."""
+    """Return the findings of all warnings so far, together with `more`."""
     return Verdict([*_found, *more])
 
 
 @contextmanager
 def apart() -> Iterator[None]:
-    """What is warned of meanwhile belongs to one of several results: `collected` gives it to no other."""
+    """Assign the warnings within the context to one of several results: afterwards `collected` omits them."""
     before = len(_found)
     try:
         yield
@@ -62,5 +62,5 @@ def apart() -> Iterator[None]:
 
 
 def printed(findings: Iterable[Finding]) -> None:
-    """Note that these need not be printed when the command ends."""
+    """Mark findings as printed, so that they are not printed again when the command ends."""
     _printed.update(map(str, findings))

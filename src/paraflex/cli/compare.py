@@ -22,12 +22,12 @@ from paraflex.results.metrics import metric_label
 from paraflex.units import printed_unit
 from paraflex.writing import write_json
 
-# Settings that are printed, and letters of each; compare.json has all.
+# Largest number of settings printed, and of characters of each value; compare.json has all.
 _MOST_SETTINGS, _MOST_LETTERS = 20, 40
 
 
 def compare_command(request: CompareRequest) -> int:
-    """Compare two runs, print what differs, and write it where that is asked for; the exit code."""
+    """Compare two runs, print the differences and, with --out, write them to files; return the exit code."""
     began = time.perf_counter()
     with flagged(request):
         found = compare(request.first, request.second, request.modes)
@@ -35,7 +35,7 @@ def compare_command(request: CompareRequest) -> int:
         with hold_results(request.out, RUN_COMPARISON, force=request.force) as folder:
             from paraflex.plots.compare import save_overlays
 
-            # Numbers first, then figures.
+            # The numbers are written first: a failure while figures are drawn does not lose them.
             with folder.replaced() as new:
                 write_json(new / "compare.json", found.to_dict())
             with folder.amended() as new:
@@ -47,7 +47,7 @@ def compare_command(request: CompareRequest) -> int:
 
 
 def print_compared(console: Console, found: RunComparison) -> None:
-    """What differs: settings, then of each mode the numbers and the motions."""
+    """Print the differences: settings, then the numbers and motions of each mode."""
     console.print(f"first: {found.names[0]}\nsecond: {found.names[1]}", soft_wrap=True)
     for note in found.notes:
         console.print(note, soft_wrap=True)
@@ -87,7 +87,7 @@ def _numbers(pairs: Iterable[NumberPair]) -> Table:
 
 
 def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
-    """Of each variable the part that differs most."""
+    """Return a table with the part of each variable that differs most."""
     most: dict[str, MotionPair] = {}
     for pair in pairs:
         if pair.mode == mode and (pair.name not in most or pair.difference > most[pair.name].difference):
@@ -101,7 +101,7 @@ def _motions(pairs: Iterable[MotionPair], mode: str) -> Table:
 
 
 def _shown(pair: NumberPair | MotionPair) -> list[str]:
-    """Unit, both values and their difference."""
+    """Return unit, both values and their difference as texts."""
     unit, factor = printed_unit(pair.unit)
     return [unit, *(_number(factor * value) for value in (pair.first, pair.second, pair.difference))]
 

@@ -1,4 +1,4 @@
-"""`paraflex compare-methods`: time, work and error of every method of integration on one motion."""
+"""`paraflex compare-methods`: time, work and error of every integration method on one motion."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_ca
 
 
 def compare_methods_command(request: CompareMethodsRequest) -> int:
-    """Run all methods, write what they took and how far off they are; the exit code."""
+    """Run all methods, write their time, work and errors; return the exit code."""
     model = asked_model(request.model)
     options = _options(request)
     with renamed("--method"):
         methods = [find_method(name).name for name in request.methods or METHODS]
-    # Every check that needs no computing comes before the first minute is spent.
+    # All checks that need no computation come before the long runs.
     mode = _mode(model, request)
     with hold_results(request.out, COMPARISON, force=request.force) as folder:
         return _compare(request, model, mode, methods, options, folder)
@@ -45,7 +45,7 @@ def _compare(
     options: ComparisonOptions,
     folder: ResultsFolder,
 ) -> int:
-    """Run all methods in a mode, None without a path; write results into a folder that is held."""
+    """Run all methods in a mode, None without a path; write results into the held folder and return the exit code."""
     console = plain_console(stderr=True)
     compile_kernels_for(model.mechanism, console.print)
     began = time.perf_counter()
@@ -75,7 +75,7 @@ def _options(request: CompareMethodsRequest) -> ComparisonOptions:
     default = ComparisonOptions()
     with flagged(request):
         return ComparisonOptions(
-            # A step alone asks for fixed steps alone.
+            # With --step and without --tol, only fixed steps are compared.
             tolerances=tuple(request.tolerances) or (() if request.steps else default.tolerances),
             steps=tuple(request.steps),
             limit=default.limit if request.limit is None else request.limit,
@@ -83,7 +83,7 @@ def _options(request: CompareMethodsRequest) -> ComparisonOptions:
 
 
 def _mode(model: Model, request: CompareMethodsRequest) -> str | None:
-    """The one mode to compare in: that asked for, or the study's with most motors; None for a model without a path."""
+    """Return the mode to compare in: the requested one, or the study's with most motors; None without a path."""
     if model.paths or request.path is not None:
         return find_mode(model, [] if request.mode is None else [request.mode]).name
     if request.mode is not None:

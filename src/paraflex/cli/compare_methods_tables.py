@@ -1,4 +1,4 @@
-"""What `paraflex compare-methods` prints."""
+"""Tables that `paraflex compare-methods` prints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SETTING = "tol. [m],\nstep [s]"
 
 
 def print_comparison(console: Console, summary: dict[str, Any]) -> None:
-    """Work of every run, what it kept, time of every method for an error, and the fastest."""
+    """Print errors and work of every run, time of every method to reach an error, failures, and the fastest method."""
     reference = summary["reference"]
     if reference is None:
         return
@@ -48,7 +48,7 @@ def print_comparison(console: Console, summary: dict[str, Any]) -> None:
 
 
 def _print_tables(console: Console, summary: dict[str, Any], done: list[tuple[str, dict[str, Any]]]) -> None:
-    """Tables of the complete runs, each with its method's name."""
+    """Print the tables of the complete runs, each of which comes with the name of its method."""
     uncertainty = summary["reference"]["uncertainty"]
     precision = (
         [

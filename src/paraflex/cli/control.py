@@ -1,4 +1,4 @@
-"""`paraflex control compare`: control laws in several actuation modes."""
+"""`paraflex control compare`: comparison of control laws in several actuation modes."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ Paths = dict[str, Path]
 
 
 def compare_laws_command(request: CompareLawsRequest) -> int:
-    """Run every law in every mode, write the table and its figure; the exit code."""
+    """Run every control law in every mode, write the table and its figure; return the exit code."""
     model = asked_model(request.model)
     with blaming(model):
         laws = laws_of(model, request.controllers)
     paths, modes = find_paths(model, request.paths), find_modes(model, request.modes)
-    # Every check that needs no computing comes before the first minute is spent.
+    # All checks that need no computation come before the long runs.
     with hold_results(request.out, LAW_COMPARISON, force=request.force, field="--output") as folder:
         return _compare(request, model, laws, paths, modes, folder)
 
@@ -65,7 +65,7 @@ def _compare(
 
 
 def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> LawStudy:
-    """The study, planned along every path; errors name the option or the field at fault."""
+    """Return the study, planned along every path; errors name the option or field at fault."""
     tasks = {name: plan_study(model, model.mechanism, path, name, request.plan) for name, path in paths.items()}
     with flagged(request):
         chosen = {name: getattr(request, name) for name in ("tolerance", "method", "step")}

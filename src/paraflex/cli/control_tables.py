@@ -1,4 +1,4 @@
-"""What `paraflex control compare` prints."""
+"""Tables that `paraflex control compare` prints."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from paraflex.cli.tables import plain_table, print_titled
 from paraflex.results.metrics import VALIDITY, metric_label
 from paraflex.studies.law_comparison import LawComparison, unit_shown
 
-# Letters of a line of a heading, and room between two columns.
+# Width of a line of a heading, and gap between two columns [characters].
 _HEAD, _BETWEEN = 9, 2
-# Internal torques below this share of the peak torque are rounding.
+# Internal torques below this share of the peak torque are rounding errors.
 _ROUNDING = 1e-8
 
 
 def print_laws(console: Console, result: LawComparison) -> None:
-    """A block of rows for each mode, a row for each law; of columns as many side by side as there is room for."""
+    """Print a row for each law in each mode; columns that do not fit the console continue in further tables."""
     data = result.data
     metrics = [name for name in result.metrics if name != VALIDITY]
     columns = {_heading(data, name): _column(data, name) for name in metrics}
@@ -45,7 +45,7 @@ def _heading(data: xr.Dataset, name: str) -> str:
 
 
 def _column(data: xr.Dataset, name: str) -> dict[tuple[int, int], str]:
-    """Texts by place of mode and law; that of a cell without numbers is its status, in the first column alone."""
+    """Return texts by indices of mode and law; incomplete runs have their status instead, in the first column only."""
     values = unit_shown(data, name).factor * _unless_rounding(data, name).transpose("mode", "law").values
     status = data["status"].transpose("mode", "law").values
     first = name == next(iter(data.data_vars))
@@ -64,13 +64,13 @@ def _unless_rounding(data: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _level(heads: Sequence[str]) -> list[str]:
-    """Headings of as many lines each, units on the last."""
+    """Return headings padded to the same number of lines, with units on the last."""
     most = max(head.count("\n") for head in heads)
     return ["\n" * (most - head.count("\n")) + head for head in heads]
 
 
 def _fitting(columns: dict[str, dict[tuple[int, int], str]], room: int) -> Iterator[list[str]]:
-    """Headings of columns that stand side by side in so many letters, one at least."""
+    """Yield the headings of columns that fit side by side into `room` characters, at least one at a time."""
     heads: list[str] = []
     left = room
     for head, texts in columns.items():
@@ -84,7 +84,7 @@ def _fitting(columns: dict[str, dict[tuple[int, int], str]], room: int) -> Itera
 
 
 def _reasons(result: LawComparison) -> Iterator[str]:
-    """Why laws did not run to the end in a mode, or how they are doubtful; once where it is the same of several."""
+    """Yield the reasons why laws failed or are doubtful in a mode; cases with the same reason share a line."""
     said = dict[tuple[str, str], list[str]]()
     for name, cell in _cells(result):
         if reason := str(cell["reason"].item()):
@@ -94,7 +94,7 @@ def _reasons(result: LawComparison) -> Iterator[str]:
 
 
 def _doubtful(result: LawComparison) -> Iterator[str]:
-    """Which laws bend links beyond what the model can describe, in which mode."""
+    """Yield a line with the laws and modes that bend links beyond what the model can describe, if any."""
     if names := [name for name, cell in _cells(result) if cell[VALIDITY] > 1.0]:
         yield f"beyond what the model can describe ({VALIDITY} above 1): {'; '.join(names)}"
 

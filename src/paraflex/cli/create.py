@@ -1,4 +1,4 @@
-"""`paraflex new` and `paraflex schema`: a file to start from, and what editors need to complete and check it."""
+"""`paraflex new` and `paraflex schema`: a model file to start from, and the schema for editors to check it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from paraflex.writing import write_text
 
 
 def new_command(request: NewRequest) -> None:
-    """Write a commented model file of this name, to edit."""
+    """Write a commented model file of the requested name, to be edited."""
     name, template = request.name, request.template
     with renamed("--from"):
         text = library_text(template)

@@ -1,4 +1,4 @@
-"""Commands that make one dataset: it is printed, and written with figures and a report where that is asked for."""
+"""Commands that produce one dataset: it is printed and, if requested, written with figures and a report."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from paraflex.findings import Finding
 
 @dataclass(frozen=True)
 class DatasetCommand:
-    """Forms of the dataset of a command.
+    """Output of a command that produces one dataset.
 
     Attributes
     ----------
     kind : str
-        Of its folder of results: see `folders`.
+        Kind of the results folder: see `paraflex.folders.KINDS`.
     files : (str, str)
-        Of the data and of their summary.
+        Names of the data file and of the summary file.
     summary : callable
-        The dataset as plain numbers.
+        Function that returns the dataset as plain numbers.
     show : callable
-        Prints tables of it.
+        Function that prints tables of the dataset to a console.
     doubts : iterable of Finding, optional
-        Those of the summary by default.
+        Findings printed before the tables; by default those of the summary's verdict.
     """
 
     kind: str
@@ -41,7 +41,7 @@ class DatasetCommand:
     doubts: Iterable[Finding] | None = None
 
     def run(self, chosen: FilesChoice, make: Callable[[], xr.Dataset]) -> xr.Dataset:
-        """Make the dataset, the folder for it held before; print and write it."""
+        """Make the dataset, print it and, if a folder is given, write it there; the folder is held beforehand."""
         began = time.perf_counter()
         if chosen.out is None:
             return self._tell(chosen, make())

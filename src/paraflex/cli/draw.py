@@ -1,4 +1,4 @@
-"""`paraflex draw`: a mechanism drawn before anything runs."""
+"""`paraflex draw`: a drawing of a mechanism, before anything runs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from paraflex.results.posed import Posed
 
 FORMATS = (".html", ".svg", ".png", ".pdf")
-# Dots an inch of PNG, and rows of a table that are worth reading.
+# Resolution of PNG [dots per inch], and largest number of rows of a table.
 _DPI, _LISTED = 200.0, 12
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>{name}</title>
@@ -46,7 +46,7 @@ svg {{ width: 100%; height: auto; max-height: 92vh }} p.open {{ color: #c8102e }
 
 
 def draw_command(request: DrawRequest) -> int:
-    """Draw the mechanism and say where the file is; the exit code."""
+    """Draw the mechanism and print the name of the file; return the exit code."""
     output = None if request.output is None else Path(request.output)
     if output is not None:
         if output.suffix.lower() not in FORMATS:
@@ -59,7 +59,7 @@ def draw_command(request: DrawRequest) -> int:
     shown = pose_of(model, assembly=request.assembly, path=request.path)
     if output is None:
         output = Path(tempfile.mkdtemp(prefix="paraflex-")) / f"{portable_name(model.mechanism.name)}.html"
-    # Only now: Matplotlib takes longer to import than all until here.
+    # Matplotlib takes longer to import than everything up to here, so it is imported only now.
     from paraflex.plots.model_drawing import model_drawing
 
     _write(model_drawing(shown, theme_name=request.theme), shown, output)
@@ -88,13 +88,13 @@ def _write(figure: Figure, shown: Posed, output: Path) -> None:
 
 
 def _has_screen() -> bool:
-    """Whether somebody sits in front of a terminal with a screen beside it."""
+    """Return whether stdout is a terminal and a graphical display is available."""
     screen = sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
     return screen and sys.stdout.isatty()
 
 
 def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
-    """Bodies, joints, drives and loads, what is open, where the drawing is and how to go on."""
+    """Print joints, bodies, drives, loads, sensors, open joints, the name of the drawing and the next commands."""
     mechanism = model.mechanism
     console.print(f"{mechanism.name} ({model.source})", soft_wrap=True)
     console.print(_joints(mechanism, shown))
@@ -116,7 +116,7 @@ def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, ou
 
 
 def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:
-    """Prescribed motions: which way they begin, and how fast."""
+    """Return a line for each prescribed motion: its initial direction and its speed."""
     lines = []
     for drive in mechanism.prescribed[:_LISTED]:
         joint = mechanism.joint(drive.joint)
@@ -134,13 +134,13 @@ def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:
 
 
 def _loads(mechanism: Mechanism, shown: Posed) -> list[str]:
-    """Loads with their sizes."""
+    """Return a line for each load with its magnitude."""
     sizes = [acting_load(load, shown.duration) for load in mechanism.loads[:_LISTED]]
     return [f"load {one.load.name}: {one.load.kind} at {one.load.point}, {one.size}" for one in sizes]
 
 
 def _joints(mechanism: Mechanism, shown: Posed) -> Table:
-    # Columns of what there is.
+    # Columns without entries are left out.
     columns = {
         "motor": {motor.joint: motor.name for motor in mechanism.motors},
         "prescribed": {drive.joint: drive.name for drive in mechanism.prescribed},

@@ -1,4 +1,4 @@
-"""How commands end: what they print of results, and their exit code."""
+"""End of a command: output of its results, and exit code."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from paraflex.findings import Finding
 
 
 def exit_code(well: bool, *, interrupted: bool) -> int:
-    """Of a command that did what was asked for, or not, or was interrupted."""
+    """Return the exit code of a command that succeeded, failed or was interrupted."""
     if interrupted:
         return signals.exit_code()
     return COMPLETE if well else TROUBLE
@@ -26,17 +26,18 @@ def exit_code(well: bool, *, interrupted: bool) -> int:
 def tell(
     numbers: dict[str, Any], show: Callable[[Console], None], *, as_json: bool, doubts: Iterable[Finding] | None = None
 ) -> None:
-    """Print results, as JSON or as they are shown; before them, beside JSON on stderr, what makes them doubtful.
+    """Print results as JSON or as tables, preceded by the findings that make them doubtful (on stderr for JSON).
 
     Parameters
     ----------
     numbers : dict
-        In plain values.
+        Results in plain values.
     show : callable
-        Prints tables to a console.
+        Function that prints tables to a console.
     as_json : bool
+        Whether to print JSON instead of tables.
     doubts : iterable of Finding, optional
-        Those of the numbers' own verdict by default.
+        Findings to print; by default those of the verdict in `numbers`.
     """
     out = plain_console()
     if doubts is None:
@@ -49,12 +50,12 @@ def tell(
 
 
 def say_where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> None:
-    """Print the last line of a command."""
+    """Print the last line of a command: elapsed time, and folder of the results."""
     plain_console(stderr=True).print(where(began, what, folder, drawn), soft_wrap=True)
 
 
 def where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> str:
-    """How long something took until now, and where things are."""
+    """Return a line with the time since `began`, the results `what` and their folder."""
     if drawn is not None:
         what += ", figures" if drawn.figures else ""
         what += " and report.html" if drawn.report else ""

@@ -1,4 +1,4 @@
-"""`paraflex export`: results for other programs."""
+"""`paraflex export`: results in the formats of other programs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TABLE = "results.parquet"
 
 
 def export_command(request: ExportRequest) -> int:
-    """Write the files; the exit code."""
+    """Write the files; return the exit code."""
     results = Path(request.results)
     folder = results if results.is_dir() else results.parent
     output = folder / "export" if request.output is None else Path(request.output)

@@ -1,4 +1,4 @@
-"""Natural frequencies that `paraflex info` tells, and the pose they are for."""
+"""Natural frequencies that `paraflex info` prints, and the pose that they refer to."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from paraflex.motion import UNBALANCED
 def frequencies(
     model: Model, system: System, rigid: System, start: State, assembly: str, request: InfoRequest
 ) -> dict[str, Any]:
-    """Natural frequencies with the motors held and free, and what the pose they are for is."""
+    """Return natural frequencies with motors held and free, and time, acceleration and equilibrium of their pose."""
     motors = list(dict.fromkeys(motor.joint for motor in model.mechanism.motors))
     state = start if request.at is None else _pose_at(model, rigid, start, assembly, request.at, request.path)
     state = undeformed(system, rigid, state)
@@ -55,7 +55,7 @@ def frequencies(
 
 
 def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:
-    """Whether `--balanced` would find an equilibrium from a pose."""
+    """Return whether `--balanced` would find an equilibrium from a pose."""
     try:
         static_equilibrium(system, state, held)
     except AssemblyError:
@@ -64,7 +64,7 @@ def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:
 
 
 def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float, path: str | None) -> State:
-    """Where the rigid mechanism is at a time: on its path, or by its prescribed angles."""
+    """Return the pose of the rigid mechanism at the time `at` [s], on its path or by its prescribed angles."""
     if not (math.isfinite(at) and at >= 0.0):
         raise InputError("not a time of the motion", field="--at", value=at, remedy="give it in s, from 0 on")
     if path is not None or model.paths:
@@ -86,5 +86,5 @@ def _growing(vibration: Vibration) -> int:
 
 
 def hertz(omega: NDArray[np.float64]) -> list[float]:
-    """Frequencies [Hz] of angular ones [rad/s]."""
+    """Convert angular frequencies [rad/s] to frequencies [Hz]."""
     return [float(w) / (2.0 * np.pi) for w in omega]

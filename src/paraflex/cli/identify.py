@@ -1,4 +1,4 @@
-"""`paraflex identify`: the parameters that reproduce given metrics."""
+"""`paraflex identify`: identification of the parameters that reproduce given metrics."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from paraflex.studies import IdentificationResult, load_identification
 
 
 def identify_command(request: SearchRequest) -> int:
-    """Do what is left of an identification; the exit code."""
+    """Run or continue an identification; return the exit code."""
     return search_command(request, load_identification(request.study), _report, "residual")
 
 
 def _report(console: Console, result: IdentificationResult) -> None:
     found = result.confidence
-    # Half-widths of intervals of 68 %.
+    # Half-widths of 68 % confidence intervals.
     known = {} if found is None else found.deviations
     widths = {name: known.get(name) for name in result.values}
     deviations = {name: "not given" if value is None else f"{value:.2g}" for name, value in widths.items()}

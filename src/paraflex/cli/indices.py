@@ -1,4 +1,4 @@
-"""`paraflex indices`: which parameters a metric depends on, over their whole ranges."""
+"""`paraflex indices`: dependence of metrics on parameters over their whole ranges, by Sobol indices."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from paraflex.studies import IndicesResult, load_indices
 
 
 def indices_command(request: IndicesRequest) -> int:
-    """Do what is left of the runs, and say the indices; the exit code."""
+    """Run or continue the study and print the indices; return the exit code."""
     console = plain_console(stderr=True)
     study = load_indices(request.study, request.metrics, request.samples, request.seed)
     compile_kernels_for(study.sweep.model().mechanism, console.print)

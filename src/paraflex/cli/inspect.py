@@ -1,4 +1,4 @@
-"""`paraflex info`: what a mechanism is and whether it is sound; without a name, what the library has."""
+"""`paraflex info`: facts on a mechanism and whether it is sound; without a name, the contents of the library."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from paraflex.mechanism import (
 )
 from paraflex.units import speed_text
 
-# Loops and sets of motors listed at most.
+# Largest number of loops and of redundant constraints listed.
 _LISTED = 1000
 
 
 def info_command(request: InfoRequest) -> int:
-    """Describe a mechanism, or the library; the exit code."""
+    """Describe a mechanism, or the library; return the exit code."""
     if request.model.given is None:
         facts: Any = library()
         verdict = None
     else:
         facts = describe(asked_model(request.model), request)
         verdict = facts["verdict"]["level"]
-        # They are part of what is printed.
+        # The findings are printed with the facts.
         printed(map(Finding.from_dict, facts["verdict"]["findings"]))
     if request.json:
         print(json.dumps(facts, indent=2))
@@ -57,7 +57,7 @@ def info_command(request: InfoRequest) -> int:
 
 
 def library() -> list[dict[str, Any]]:
-    """The mechanisms that come with the package, in a line each."""
+    """Return the main facts on every mechanism of the library."""
     facts = []
     for name in library_names():
         model = load(name)
@@ -78,7 +78,7 @@ def library() -> list[dict[str, Any]]:
 
 
 def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]:
-    """The facts `paraflex info` prints."""
+    """Return the facts that `paraflex info` prints."""
     request = request or InfoRequest()
     mechanism = model.mechanism
     seen = examine(mechanism, request.assembly or model.study.assembly)
@@ -101,7 +101,7 @@ def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]
     assert chosen is not None
     assert chosen.state is not None
     facts |= _mobility_facts(seen.mobility) | {"drives": _reach_facts(seen.reach)}
-    # The verdict says why there are none.
+    # If there are no frequencies, the verdict gives the reason.
     with suppress(ProportionError):
         facts["frequencies"] = frequencies(model, seen.system, seen.rigid, chosen.state, chosen.assembly, request)
     return facts
@@ -142,21 +142,21 @@ def _payload_facts(mechanism: Mechanism) -> dict[str, Any] | None:
 
 
 def _actuator(mechanism: Mechanism, actuator: Actuator) -> str:
-    """Name and numbers of an actuator at the joints of its motors, of both kinds where they turn and slide."""
+    """Return name and numbers of an actuator for its motors' joints; for both kinds if some turn and some slide."""
     names = actuator_motors(actuator, mechanism)
     kinds = dict.fromkeys(mechanism.slides(motor.joint) for motor in mechanism.motors if motor.name in names)
     return f"{actuator.name}: {'; '.join(actuator.summary(slides=kind) for kind in kinds)}"
 
 
 def _load(load: PointForce | AppliedTorque) -> str:
-    """Name, place and components of a load; of one in time that it is so."""
+    """Return name, kind, components and place of a load; a component that depends on time reads "in time"."""
     parts = ["in time" if isinstance(one, AngleLaw) else f"{one:.4g}" for one in load.components]
     size = f"({', '.join(parts)})" if len(parts) > 1 else parts[0]
     return f"{load.name}: {load.kind} {size} {load.unit} at {load.point}"
 
 
 def _drive(drive: PrescribedAngle, unit: str) -> str:
-    """Name, joint and, where it is constant, the speed of a prescribed motion."""
+    """Return name, joint and speed of a prescribed motion; "in time" if the speed is not constant."""
     law = drive.law
     return f"{drive.name}: joint {drive.joint}, " + (
         speed_text(law.speed, unit) if isinstance(law, ConstantSpeed) else "in time"
@@ -164,7 +164,7 @@ def _drive(drive: PrescribedAngle, unit: str) -> str:
 
 
 def _equation(one: Relation) -> str:
-    """What a relation holds, as an equation of the joints' coordinates."""
+    """Return a relation as an equation of the joints' coordinates."""
     sign = "-" if one.phase and one.phase < 0.0 else "+"
     if isinstance(one, SumRelation):
         terms = " ".join(f"{weight:+.4g} {joint}" for joint, weight in one.weights.items())
@@ -186,7 +186,7 @@ def _links(mechanism: Mechanism, system: System) -> list[dict[str, Any]]:
                 "elements": sum(part.mesh.n_elements for part in parts if part.mesh) or None,
                 "frames": len(parts),
                 "coordinates": sum(3 + part.nf for part in parts),
-                # Of each part in its own frame.
+                # Frequencies of the first part, held in its own frame.
                 "frequencies_hz": hertz(parts[0].modes.omega),
             }
         )

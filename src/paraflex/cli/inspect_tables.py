@@ -1,4 +1,4 @@
-"""What `paraflex info` prints."""
+"""Tables that `paraflex info` prints."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LISTED = 12
 
 
 def print_library(facts: Sequence[dict[str, Any]]) -> None:
-    """The library's mechanisms: a line of facts and what each is."""
+    """Print the mechanisms of the library: a line of facts and a description of each."""
     console = plain_console()
     for one in facts:
         freedoms = "" if one["degrees_of_freedom"] is None else f"freedoms {one['degrees_of_freedom']}, "
@@ -34,7 +34,7 @@ def print_library(facts: Sequence[dict[str, Any]]) -> None:
 
 
 def print_facts(facts: dict[str, Any]) -> None:
-    """A mechanism: counts, soundness, loops, starts, motors, frequencies, links."""
+    """Print a mechanism: counts, loops, redundancies, assemblies, motors, links, frequencies, verdict."""
     console = plain_console()
     console.print(f"{facts['name']} ({facts['source']})")
     if facts["description"]:
@@ -56,7 +56,7 @@ def print_facts(facts: dict[str, Any]) -> None:
 
 
 def print_verdict(console: Console, facts: dict[str, Any]) -> None:
-    """Sound, doubtful or wrong, and each reason on a line."""
+    """Print each finding on a line, then the verdict: sound, doubtful or wrong."""
     verdict = facts["verdict"]
     for one in verdict["findings"]:
         console.print(f"{one['level']}: {one['place']}: {one['text']}; {one['remedy']} [{one['code']}]", soft_wrap=True)
@@ -95,7 +95,7 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("modes", "modes"),
         ("paths", "paths"),
     ):
-        # Most mechanisms have no gears and the like.
+        # Empty rows of gears and the like are left out, as most mechanisms have none.
         if key in facts and (facts[key] or key not in (*related, "actuators", "prescribed", "loads")):
             value = facts[key]
             if key == "total_mass" and facts["payload"]:
@@ -107,7 +107,7 @@ def _counts(facts: dict[str, Any]) -> Table:
 
 
 def _payload(carried: dict[str, Any]) -> str:
-    """What the end-effector carries, and where."""
+    """Return the payload of the end-effector and its place in words."""
     inertia = f", {carried['inertia']:g} kg m^2" if carried["inertia"] else ""
     x, y = carried["offset"]
     beside = f", {x:g}, {y:g} m from it" if x or y else ""
@@ -115,7 +115,7 @@ def _payload(carried: dict[str, Any]) -> str:
 
 
 def _print_some(console: Console, lines: Sequence[str], count: int, what: str = "") -> None:
-    """As many lines as are worth reading, and how many more there are."""
+    """Print the first lines, and the number of those left out."""
     for line in lines[:_LISTED]:
         console.print(line, soft_wrap=True)
     if count > _LISTED:

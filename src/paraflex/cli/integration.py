@@ -1,4 +1,4 @@
-"""How a command integrates: method, steps, constraints and events from flags, or from the model's [study]."""
+"""Integration settings of a command: method, steps, constraints and events from flags or the model's [study]."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from paraflex.integrators import (
 from paraflex.mechanism import Mechanism
 from paraflex.units import quantities_in
 
-# Fields of a request that `IntegrationOptions` has too, and those that kineto-elastodynamics has no use for.
+# Fields of a request that `IntegrationOptions` also has, and fields that kineto-elastodynamics does not use.
 _OPTIONS = (
     "tolerance",
     "tolerance_per",
@@ -39,13 +39,13 @@ _OPTIONS = (
     "automatic_gains",
 )
 _OF_STEPS = (*_OPTIONS, "parameters", "stop_at", "balanced", "after")
-# Units of what events are about; a joint's is known with the mechanism.
+# Units of the limits of events; which of its two a joint has is known with the mechanism.
 _OF_JOINT, _OF_DEFLECTION = ("rad", "m"), ("m",)
 _SPECS = "joint:NAME=LOW..HIGH, deflection:BODY=METRES or singular=DISTANCE"
 
 
 def given_flags(request: RunRequest) -> dict[str, object]:
-    """Flags of how a run starts, is integrated and ends that were given, with their values."""
+    """Return the given flags on start, integration and end of a run, with their values."""
     flag = flags(request)
     values = {flag[name]: getattr(request, name) for name in _OF_STEPS}
     listed = {name: value[0] if isinstance(value, list) and value else value for name, value in values.items()}
@@ -53,7 +53,7 @@ def given_flags(request: RunRequest) -> dict[str, object]:
 
 
 def integration_options(request: RunRequest, study: StudyDefaults) -> IntegrationOptions:
-    """The options of the command line, and for what it leaves out the study's; errors name the flag."""
+    """Return the options of the command line, completed by those of the study; errors name the flag."""
     given: dict[str, Any] = {name: getattr(request, name) for name in _OPTIONS}
     given["parameters"] = dict(_parameter(text) for text in request.parameters)
     given["events"] = tuple(parse_event(text) for text in request.stop_at)
@@ -69,7 +69,7 @@ def integration_options(request: RunRequest, study: StudyDefaults) -> Integratio
 
 
 def _check_coefficients(request: RunRequest, options: IntegrationOptions) -> None:
-    """Baumgarte's coefficients where something else keeps the constraints, or chooses them."""
+    """Check that Baumgarte coefficients are given only for Baumgarte stabilisation without automatic gains."""
     for flag, value in (("--alpha", request.alpha), ("--beta", request.beta)):
         if value is None:
             continue
@@ -125,7 +125,7 @@ def _range(value: str, text: str) -> tuple[float, float]:
 
 
 def _number(value: str, flag: str, text: str, units: tuple[str, ...] = ()) -> float:
-    """A number, or one with a unit of the dimension of one of some units."""
+    """Parse a number, with or without a unit that has the dimension of one of `units`."""
     remedy = f"give one in {' or '.join(units)}, or with a unit" if units else "give one"
     try:
         number = evaluate(value, {}) if quantities_in(value) else float(value)
@@ -141,7 +141,7 @@ def _number(value: str, flag: str, text: str, units: tuple[str, ...] = ()) -> fl
 
 
 def check_stops(mechanism: Mechanism, options: IntegrationOptions, stop_at: Sequence[str]) -> None:
-    """Check that the mechanism can have the events; errors name the flag."""
+    """Check that the events of --stop-at suit the mechanism; errors name the flag."""
     for event, text in zip(options.events, stop_at, strict=True):
         try:
             check_events(mechanism, (event,))
@@ -156,7 +156,7 @@ def check_stops(mechanism: Mechanism, options: IntegrationOptions, stop_at: Sequ
 
 
 def model_parameters(request: RunRequest, mechanism: Mechanism, reduced: int | None) -> dict[str, Any]:
-    """What a run was asked for besides its integration, for provenance; `mechanism` as it ran."""
+    """Return the settings of a run other than its integration, for provenance; `mechanism` is the one that ran."""
     return {
         "rigid": request.rigid,
         "segments": request.segments,
@@ -170,7 +170,7 @@ def model_parameters(request: RunRequest, mechanism: Mechanism, reduced: int | N
 
 
 def integration_parameters(options: IntegrationOptions, stop_at: Sequence[str]) -> dict[str, Any]:
-    """How a run was integrated, for provenance."""
+    """Return the integration settings of a run, for provenance."""
     return {
         "tolerance": options.tolerance,
         "tolerance_per": options.tolerance_per and options.tolerance_per.value,

@@ -1,4 +1,4 @@
-"""Linear models as commands are asked for them: of a model at rest or in motion, or of the runs of results."""
+"""Linear models requested by commands: of a model at rest or in motion, or of the runs of stored results."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from paraflex.tracking import TrackingRun, TrackingTask
 
 Motion = TrackingTask | TrackingRun | MotionRun
 ALL, START = "all", "start"
-# Most moments of a motion: each is an eigenvalue problem for every mode.
+# Largest number of instants of a motion: each is an eigenvalue problem for every mode.
 _MOST_MOMENTS = 10_000
-# Samples of a run without a path.
+# Number of samples of a run without a path.
 _SAMPLES = 1001
 
 
 class AskedModels(NamedTuple):
-    """Linear models, one for each mode, the motions that they are about, if any, and what was asked for."""
+    """Linear models, one for each mode, with the motions that they are about (none at rest) and their provenance."""
 
     models: list[LinearModel]
     motions: list[Motion]
@@ -47,7 +47,7 @@ class AskedModels(NamedTuple):
 
 
 def asked_models(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
-    """What makes the linear models, once all that can be checked before is checked."""
+    """Return a function that computes the linear models, after all checks that need no computation."""
     _check(request)
     name = request.model.name
     if Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names()):
@@ -58,7 +58,7 @@ def asked_models(request: LinearRequest, command: str) -> Callable[[], AskedMode
 
 
 def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
-    """About the runs of a folder of results, which are made again."""
+    """Return a function that computes linear models about the runs of a results folder, which it repeats."""
     given = {"--set": request.model.settings, "--pose": request.pose, "--balanced": request.balanced,
              "--path": request.path, "--assembly": request.assembly}  # fmt: skip
     for flag, value in given.items():
@@ -67,7 +67,7 @@ def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModel
                 "means nothing for results, which are what they are", field=flag, value=str(value),
                 remedy="leave it out, or name the model",
             )  # fmt: skip
-    from paraflex.cli.repeated import repeated_runs  # with the reports, which tell the command of a run
+    from paraflex.cli.repeated import repeated_runs  # imports the reports, which rebuild the command of a run
 
     model, runs = repeated_runs(request.model.name, [] if ALL in request.modes else request.modes)
 
@@ -82,7 +82,7 @@ def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModel
 
 
 def _check(request: LinearRequest) -> None:
-    """Check what can be checked without the model."""
+    """Check the options that need no model."""
     moving = {"--at": request.at, "--along": request.along, "--path": request.path}
     for flag, value in moving.items():
         if value is None:
@@ -101,7 +101,7 @@ def _check(request: LinearRequest) -> None:
 
 
 def _modes(model: Model, request: LinearRequest) -> list[ActuationMode]:
-    """The modes asked for; of `all` those of the mechanism; by default the one with most motors."""
+    """Return the requested modes; for "all" those of the mechanism; by default the one with most motors."""
     mechanism = model.mechanism
     own = list(mechanism.modes) or [_everything(mechanism)]
     chosen = own if ALL in request.modes else find_modes(model, request.modes) if request.modes else None
@@ -122,7 +122,7 @@ def _everything(mechanism: Mechanism) -> ActuationMode:
 
 
 def _models(model: Model, modes: Sequence[ActuationMode], request: LinearRequest, command: str) -> AskedModels:
-    """Linear models in all modes, and along the motion."""
+    """Return the linear models in all modes, at rest or about the planned motion."""
     ports = _ports(request)
     with flagged(request):
         if request.at is None and request.along is None and request.path is None:
@@ -134,7 +134,7 @@ def _models(model: Model, modes: Sequence[ActuationMode], request: LinearRequest
 
 
 def _ports(request: LinearRequest) -> dict[str, Any]:
-    """Inputs and first states."""
+    """Return the arguments of `linearise` for inputs and first states."""
     return {"forces": request.forces, "prescribed": request.prescribed, "coordinates": request.coordinates}
 
 
@@ -145,7 +145,7 @@ def _moving(
     request: LinearRequest,
     parameters: dict[str, Any],
 ) -> AskedModels:
-    """Linear models about motions, one for each mode."""
+    """Return linear models about motions, one for each mode."""
     ports = _ports(request)
     with flagged(request):
         pairs = zip(motions, modes, strict=True)
@@ -154,7 +154,7 @@ def _moving(
 
 
 def moments_along(found: AskedModels, count: int) -> list[list[LinearModel]]:
-    """Linear models at so many moments of the motions, for each mode."""
+    """Return linear models at `count` equidistant instants of the motions, for each mode."""
     motion = found.motions[0]
     times = motion.motion.t if isinstance(motion, TrackingTask) else motion.solution.t
     moments = np.linspace(times[0], times[-1], count).tolist()
@@ -163,7 +163,7 @@ def moments_along(found: AskedModels, count: int) -> list[list[LinearModel]]:
 
 
 def pose_asked(model: Model, wanted: str | None, assembly: str | None, flag: str) -> State:
-    """The pose at rest that an option names; by default the model's start, or that of an assembly."""
+    """Return the pose at rest that an option names; by default the model's start, or the pose of an assembly."""
     mechanism = model.mechanism
     system = standing_system(mechanism, model.start, assembly or model.study.assembly)
     try:
@@ -184,7 +184,7 @@ def _poses(model: Model) -> str:
 
 
 def _at_place(model: Model, text: str, flag: str) -> State:
-    """The pose with the end-effector at a place, undeformed."""
+    """Return the undeformed pose with the end-effector at the position X,Y."""
     parts = [part.strip() for part in text.split(",")]
     effector = model.mechanism.end_effector
     if effector is None or not {"x", "y"} <= set(effector.coordinates):
@@ -205,12 +205,12 @@ def _at_place(model: Model, text: str, flag: str) -> State:
 
 
 def _at_rest(model: Model, pose: State, mode: ActuationMode, balanced: bool, ports: dict[str, Any]) -> LinearModel:
-    """The model about a pose, which the mode must hold."""
+    """Return the linear model about a pose; raise InputError if the mode does not hold the mechanism there."""
     try:
         found = linearise(model.mechanism, mode=mode, start=pose, balanced=balanced, **ports)
     except AssemblyError as error:
         raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
-    # What is driven moves as it is driven.
+    # Prescribed motions are not free, although they count as motions of zero frequency.
     free = int(np.sum(found.motions(motors_of(found)).frequencies == 0.0)) - found.minimal.driven
     if free and found.unbalanced > BALANCED:
         remain = "one motion remains" if free == 1 else f"{free} motions remain"
@@ -223,7 +223,7 @@ def _at_rest(model: Model, pose: State, mode: ActuationMode, balanced: bool, por
 
 
 def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
-    """The planned motion; of a model without a path its own run, until the time asked for."""
+    """Return the planned motion or, for a model without a path, its own run until the requested time."""
     if request.path is not None or model.paths:
         path, name = find_path(model, request.path)
         return plan_study(model, model.mechanism, path, name, PlanChoice(assembly=request.assembly))
@@ -260,7 +260,7 @@ def _in_motion(motion: Motion, mode: ActuationMode, at: float, ports: dict[str, 
 
 
 def _parameters(model: Model, modes: Iterable[ActuationMode], request: LinearRequest, command: str) -> dict[str, Any]:
-    """What was asked for."""
+    """Return the provenance of the linear models."""
     asked = {name: getattr(request, name) for name in ("pose", "balanced", "at", "along", "path", "assembly", "forces",
                                                         "prescribed", "coordinates")}  # fmt: skip
     run = {name: value for name, value in asked.items() if value not in (None, False, [], "motors")}

@@ -16,7 +16,7 @@ from paraflex.results.linear_summary import linear_summary
 
 
 def linearise_command(request: LineariseRequest) -> int:
-    """Linearise in every mode, print poles and zeros, and write files where that is asked for; the exit code."""
+    """Linearise in every mode, print poles and zeros and, with --out, write files; return the exit code."""
     make = asked_models(request, "linearise")
     _COMMAND.run(request.files, lambda: _data(make(), request))
     return COMPLETE

@@ -1,4 +1,4 @@
-"""What `paraflex linearise` prints: frequencies and damping, poles, zeros, and what they mean."""
+"""Tables that `paraflex linearise` prints: frequencies and damping, poles, zeros, and remarks on them."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from paraflex.results.linear_summary import (
 
 Complex = NDArray[np.complex128]
 Row = tuple[str, str, Complex]
-# Oscillations, poles and zeros of a row; linear.json has all.
+# Largest number of oscillations, and of poles or zeros, in a row; linear.json has all.
 _OSCILLATIONS, _SHOWN = 6, 4
-# A damping ratio below this is none.
+# A smaller damping ratio is a rounding error.
 _ROUNDING = 1e-7
 
 
 def print_linear(out: Console, data: xr.Dataset) -> None:
-    """All that is printed of linear models."""
+    """Print linear models: frequencies and damping ratios, poles, zeros and remarks."""
     modes = [str(mode) for mode in data["mode"].values]
     states, held = data.sizes["state"], held_rows(data)
     out.print(f"{data.attrs['mechanism']}, {about(data)}: {states} states", soft_wrap=True)
@@ -58,7 +58,10 @@ def print_linear(out: Console, data: xr.Dataset) -> None:
 
 
 def held_rows(data: xr.Dataset) -> list[Row]:
-    """Modes, whether their motors are free or held, and poles; modes in common where all have the same."""
+    """Return rows of mode, state of its motors ("free", "held", or "none" if it has none), and poles.
+
+    If the poles with motors free are the same in all modes, they have one row, "all".
+    """
     modes = [str(mode) for mode in data["mode"].values]
     common = common_poles(data)
     rows = [("all", "free", common)] if common is not None else [
@@ -80,12 +83,12 @@ def _frequencies(rows: Sequence[Row], count: int, damped: bool) -> Table:
 
 
 def _percent(ratio: float) -> str:
-    """A damping ratio in percent; empty where it is rounding."""
+    """Return a damping ratio in percent; empty if it is a rounding error."""
     return f"{100.0 * ratio:.2g}" if abs(ratio) > _ROUNDING else ""
 
 
 def _roots(rows: Sequence[Row], heads: tuple[str, str]) -> Table:
-    """The lowest poles or zeros of each row, and how many more there are."""
+    """Return a table of the lowest poles or zeros of each row, and how many more there are."""
 
     def text(values: Complex) -> str:
         found = roots(values)

@@ -1,4 +1,4 @@
-"""`paraflex methods`: the methods of integration and what each takes."""
+"""`paraflex methods`: list of the integration methods and their parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from paraflex.integrators import DEFAULT_METHOD, METHODS, Method
 
 
 def methods_command(request: MethodsRequest) -> None:
-    """List the methods by name."""
+    """Print the integration methods and their parameters, as tables or JSON."""
     if request.json:
         print(json.dumps([_figures(method) for method in METHODS.values()], indent=2))
         return

@@ -1,4 +1,4 @@
-"""`paraflex modes`: what the actuation modes of a mechanism can do along a path."""
+"""`paraflex modes`: actuation modes of a mechanism, and how well each can drive it along a path."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from paraflex.errors import ActuationError
 from paraflex.files import Model
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
 
-# Samples of the path at which modes are judged.
+# Number of samples of the path at which modes are assessed.
 _SAMPLES = 201
-# Sets of motors that are tried, and those listed at most, of a mechanism that names no modes.
+# Largest numbers of motor sets tried and listed for a mechanism without named modes.
 _TRIED, _LISTED = 20_000, 20
 
 
 def modes_command(request: ModesRequest) -> None:
-    """List the actuation modes with the condition of their actuation matrix along a path.
+    """List the actuation modes with the condition number of their actuation matrix along a path.
 
-    Of a model that names none: the sets of motors that could be asked for.
+    For a model without named modes, list the sets of motors that could be requested.
     """
     model, path = asked_model(request.model), request.path
     effort = _effort(model, path)
-    # Those of [mode] tables, and others of the study.
+    # Modes of [mode] tables, and further ones of the study.
     studied = [parse_mode(model.mechanism, name) for name in model.study.modes]
     named = list(dict.fromkeys([*model.mechanism.modes, *studied]))
     rows, more = [_row(mode, effort) for mode in named], 0
@@ -51,12 +51,12 @@ def modes_command(request: ModesRequest) -> None:
 
 
 def _effort(model: Model, path: str | None) -> Effort | None:
-    """What the path asks of the motors; None without a path, or a point to follow it."""
+    """Return the effort that the path requires of the motors; None without a path or an end-effector."""
     if model.mechanism.end_effector is None or not (path is not None or model.paths):
         return None
     followed, _ = find_path(model, path)
     rigid = model.mechanism.rigid()
-    # The path says where it starts.
+    # The path determines the start.
     placed = replace(model, start=None)
     return placed.plan(
         followed, mechanism=rigid, duration=placed.driven_for(followed), samples=_SAMPLES, warning=False
@@ -79,7 +79,10 @@ def _row(mode: ActuationMode, effort: Effort | None) -> dict[str, Any]:
 
 
 def _possible_rows(model: Model, effort: Effort | None) -> tuple[list[dict[str, Any]], int]:
-    """Smallest sets of motors that suffice, the best first, and all motors; and how many sets are left out."""
+    """Return rows of the smallest sufficient sets of motors, the best first, and of all motors.
+
+    The second value is the number of sufficient sets that are left out.
+    """
     motors = [motor.name for motor in model.mechanism.motors]
     sets = _sets_of_pose(model) if effort is None else combinations(motors, effort.required.shape[1])
     rows = [_row(mode_of_motors(model.mechanism, chosen), effort) for chosen in islice(sets, _TRIED)]
@@ -92,7 +95,10 @@ def _possible_rows(model: Model, effort: Effort | None) -> tuple[list[dict[str, 
 
 
 def _sets_of_pose(model: Model) -> Iterable[tuple[str, ...]]:
-    """Smallest sets of motors that reach all freedoms at the pose of the assembly; none where that does not close."""
+    """Return the smallest sets of motors that drive all degrees of freedom at the assembly's pose.
+
+    The result is empty if the assembly does not close.
+    """
     if not model.mechanism.assemblies:
         return ()
     system = build_system(model.mechanism.rigid())
@@ -101,7 +107,7 @@ def _sets_of_pose(model: Model) -> Iterable[tuple[str, ...]]:
 
 
 def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: int) -> list[str]:
-    """What the table does not say: what its rows are, where no modes are named, and what is missing for the rest."""
+    """Return lines that explain the table: its rows if no modes are named, and missing motors, path or end-effector."""
     mechanism = model.mechanism
     lines = []
     if not rows:

@@ -1,4 +1,4 @@
-"""`paraflex run` of a mechanism without a path: left to its loads, prescribed angles and given torques."""
+"""`paraflex run` of a mechanism without a path, under its loads, prescribed angles and given torques."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ from paraflex.reduction import size_of
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.reduced_runs import beside_full
 
-# Singular positions listed one by one.
+# Largest number of singular positions listed.
 _MOST_TIMES = 4
-# Points listed where a run ends.
+# Largest number of points listed at the end of a run.
 _MOST_POINTS = 20
-# Coordinates below this share of the largest are rounding.
+# Coordinates below this share of the largest are rounding errors.
 _ROUNDING = 1e-12
 
 
@@ -53,7 +53,7 @@ def run_motion(
     options: IntegrationOptions,
     how: dict[str, Any],
 ) -> int:
-    """Run a mechanism's own motion and write its results, how it was integrated among them; the exit code."""
+    """Run a mechanism's own motion, write results with the integration settings `how`; return the exit code."""
     study = own_motion(model, request.plan)
     if request.modes:
         raise InputError(
@@ -86,7 +86,7 @@ def _run_held(
     controllers = acting_controllers(model, request)
     full = _simulate(console, model, mechanism, options, controllers, balanced=request.balanced)
     run, kept = full, kept_coordinates(request, study)
-    # What did not get to its end has nothing to be compared with.
+    # A full run that failed is no reference for a reduced one.
     if kept is not None and full.solution.status in DONE_STATUSES:
         few = asked_reduction(request, full, kept)
         start = None
@@ -128,7 +128,7 @@ def free_run(
     start: State | str | None,
     on_progress: Callable[[float], None] | None = None,
 ) -> MotionRun:
-    """Run a mechanism without a path, as a model's study says, under controllers or under its torques."""
+    """Run a mechanism without a path as set in the model's study, under controllers or the given torques."""
     study = model.study
     assert study.duration is not None
     how: dict[str, Any] = {"samples": study.samples, "start": start, "options": options, "on_progress": on_progress}
@@ -157,7 +157,7 @@ def _simulate(
     try:
         with blaming(model), begun_late(progress), warnings.catch_warnings():
             begun = start or start_of(model, mechanism, study.assembly, balanced=balanced) or study.assembly
-            # The table and the summary say what the run doubts.
+            # The table and the summary report these findings.
             warnings.simplefilter("ignore", ValidityWarning)
             warnings.simplefilter("ignore", ResultWarning)
             return free_run(model, mechanism, options, controllers, begun, report)
@@ -166,7 +166,7 @@ def _simulate(
 
 
 def own_motion(model: Model, chosen: PlanChoice) -> StudyDefaults:
-    """The study of a model without a path, with what is chosen of it."""
+    """Return the study of a model without a path, with the options of the command in place of its own."""
     study = model.study.filled(**asdict(chosen))
     if study.duration is None:
         raise InputError(
@@ -178,7 +178,10 @@ def own_motion(model: Model, chosen: PlanChoice) -> StudyDefaults:
 
 
 def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanced: bool) -> State | None:
-    """The state the file describes, balanced if asked for; None for an assembly undeformed, moving with its drives."""
+    """Return the start state that the file describes, balanced if requested.
+
+    None stands for the undeformed assembly, moving with its drives.
+    """
     if not balanced and model.start is None:
         return None
     with renamed("--balanced", only="balanced"):
@@ -186,7 +189,7 @@ def start_of(model: Model, mechanism: Mechanism, assembly: str | None, *, balanc
 
 
 def _ended(summary: dict) -> str:
-    """How a run ended. When it failed its message says; the last sample is before that."""
+    """Describe how a run ended: the time of its end or, after a failure, of the last sample before it."""
     status, steps, time = summary["status"], f"{summary['steps']} steps", summary["final"]["time"]
     if status in DONE_STATUSES:
         return f"{status} at t = {time:g} s, {steps}"
@@ -202,7 +205,7 @@ def _report(out: Console, summary: dict) -> None:
     loads(out, {"": summary["loads"]})
     controllers(out, [((), summary)])
     out.print("at the end:")
-    # Points that segments made by the program hang together at are left out.
+    # Points at which finite segments are connected by the program are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
     wide = max((abs(x) for at in places.values() for x in at), default=0.0)
     unknown = max(_ROUNDING * wide, summary["constraint_position_max"])

@@ -1,4 +1,4 @@
-"""`paraflex optimise`: the design whose metrics are least."""
+"""`paraflex optimise`: search for the design that minimises metrics."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from paraflex.units import printed_unit
 
 
 def optimise_command(request: SearchRequest) -> int:
-    """Do what is left of an optimisation; the exit code."""
+    """Run or continue an optimisation; return the exit code."""
     study = load_optimisation(request.study)
     return search_command(request, study, partial(_report, study.base.members), "objective")
 

@@ -1,4 +1,4 @@
-"""`paraflex plot`: figures of results, drawn again for print."""
+"""`paraflex plot`: figures of stored results, drawn for print."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from paraflex.plots.sources import Source, open_source
 
 ALL = "all"
 STYLES = ("single", "double")
-# Denser pictures are larger than any printer's, and than memory.
+# Largest resolution [dots per inch]: denser pictures exceed any printer, and memory.
 _DENSEST = 2400.0
 
 
 def plot_command(request: PlotRequest) -> int:
-    """Draw the figures asked for and say where they are, or list those there are; the exit code."""
+    """Draw the requested figures and print their files, or list the available ones; return the exit code."""
     _check(request)
     source = open_source(request.results)
     if request.only_list or not request.figures:
@@ -32,7 +32,7 @@ def plot_command(request: PlotRequest) -> int:
         chosen = list(dict.fromkeys(find_figure(source, name) for name in request.figures))
     asked = (request.modes, request.metrics, request.points)
     drawn = [drawing for figure in chosen for drawing in drawings(source, figure, *asked)]
-    # Only now: Matplotlib takes longer to import than all until here.
+    # Matplotlib takes longer to import than everything up to here, so it is imported only now.
     from paraflex.plots.save import write_figures
 
     folder = source.folder / "figures" if request.output is None else Path(request.output)
@@ -44,7 +44,7 @@ def plot_command(request: PlotRequest) -> int:
 
 
 def _check(request: PlotRequest) -> None:
-    """Check that the options make sense."""
+    """Check the style and the resolution."""
     if request.style is not None and request.style not in STYLES:
         remedy = suggestion(request.style, STYLES)
         raise InputError("unknown style", field="--style", value=request.style, remedy=remedy)

@@ -1,4 +1,4 @@
-"""`paraflex reduce`: linear models of few states beside the full ones."""
+"""`paraflex reduce`: linear models with few states, compared with the full ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _METHODS = (ReductionMethod.CRAIG_BAMPTON.value, ReductionMethod.MODAL.value)
 
 
 def reduce_command(request: ReduceRequest) -> int:
-    """Reduce the models of every mode, print what is left of them, write files where that is asked for; exit code."""
+    """Reduce the models of every mode, print the results and, with --out, write files; return the exit code."""
     make = asked_models(request, "reduce")
     _COMMAND.run(request.files, lambda: _data(make(), request))
     return COMPLETE
@@ -38,7 +38,7 @@ def _data(found: AskedModels, request: ReduceRequest) -> xr.Dataset:
 
 
 def _along(found: AskedModels, request: ReduceRequest) -> list[PosesAlong]:
-    """Poses along the path, for each mode; and the one whose basis is taken along."""
+    """Return the poses along the path for each mode, with the pose whose basis is used; empty without --along."""
     if request.along is None:
         if request.basis is not None:
             raise InputError("is the pose whose basis is taken along a path", field="--basis", value=request.basis,

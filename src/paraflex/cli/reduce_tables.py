@@ -1,4 +1,4 @@
-"""What `paraflex reduce` prints: states needed, frequencies and errors of reduced models."""
+"""Tables that `paraflex reduce` prints: states needed, frequencies and errors of reduced models."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from paraflex.results.reduction_data import FULL, percent_off
 
 Array = NDArray[np.float64]
 
-# Outputs and frequencies in a row; reduced.json has all.
+# Largest numbers of outputs and of frequencies in a row; reduced.json has all.
 _OUTPUTS, _FREQUENCIES = 8, 4
 
 
 def print_reduction(out: Console, data: xr.Dataset) -> None:
-    """All that is printed of reduced models."""
+    """Print reduced models: states needed, errors, frequencies, error bounds, and errors along the path."""
     attrs = data.attrs
     until, accuracy = float(attrs["until"]), float(attrs["accuracy"])
     kept, full = int(attrs["kept_states"]), int(attrs["full_states"])
@@ -56,7 +56,7 @@ def _states(value: float) -> str:
 
 
 def _frequency_rows(data: xr.Dataset) -> Iterator[list[str]]:
-    """With motors free, the same in all modes, and with those of each mode held."""
+    """Yield rows of frequencies with motors free, which all modes share, and with the motors of each mode held."""
     modes = [str(mode) for mode in data["mode"].values]
     held = [("all" if holding == HOLDINGS[0] else mode, mode, holding)
             for holding in HOLDINGS for mode in (modes[:1] if holding == HOLDINGS[0] else modes)]  # fmt: skip

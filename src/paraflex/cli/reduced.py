@@ -1,4 +1,4 @@
-"""Runs with few flexible coordinates: how many are asked for, and what takes the place of the mechanism."""
+"""Runs with few flexible coordinates: the requested number, and the reduced mechanism."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from paraflex.tracking import TrackingTask
 
 
 def kept_coordinates(request: RunRequest, study: StudyDefaults) -> int | None:
-    """How many flexible coordinates a run keeps, as asked, else as the study says; None for all."""
+    """Return the number of flexible coordinates that a run keeps, as requested or set in the study; None for all."""
     if request.rigid or request.ked or request.segments is not None:
         return None
     return (study.reduced if request.reduced is None else request.reduced) or None
@@ -23,7 +23,7 @@ def kept_coordinates(request: RunRequest, study: StudyDefaults) -> int | None:
 def asked_reduction(
     request: RunRequest, along: TrackingTask | MotionRun, count: int, modes: Sequence[ActuationMode] | None = None
 ) -> Mechanism:
-    """The mechanism that keeps so many coordinates along a plan or a run; errors name the option or the field."""
+    """Return the mechanism reduced to `count` coordinates along a plan or a run; errors name the option or field."""
     try:
         return reduced_mechanism(along, count, modes=modes)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""Runs of a folder of results, made again from what it was asked for: results do not hold all that a run has."""
+"""Repetition of the runs of a results folder from its provenance, as results do not store all data of a run."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ _OTHER = "name the folder of paraflex run"
 
 
 def repeated_runs(results: str, modes: Sequence[str] = ()) -> tuple[Model, Iterator[TrackingRun | MotionRun]]:
-    """The model of some results, and their runs made again: of all their modes, or of some.
+    """Return the model of stored results, and an iterator that repeats their runs in all modes or in `modes`.
 
     Raises
     ------
     InputError
-        They are no run's, of kineto-elastodynamics, do not tell what was asked for, or their model's file has changed;
-        or a mode that they do not have.
+        The results are not of a run, are of kineto-elastodynamics, or lack their provenance; their model's file has
+        changed; or they lack one of the modes.
     """
     data = open_results(results)
     if kind_of(data) not in ("tracking", "motion"):
@@ -57,7 +57,7 @@ def repeated_runs(results: str, modes: Sequence[str] = ()) -> tuple[Model, Itera
 
 
 def _model(data: xr.Dataset, request: RunRequest, results: str) -> Model:
-    """The model that a run was of, from its file, if that says the same as then."""
+    """Return the model of a run from its file; raise InputError if the file has changed since."""
     model = asked_model(request.model)
     then, now = json.loads(data.attrs["parameters"]).get("model"), json.loads(json.dumps(dict(model.parameters)))
     if then != now:
@@ -69,7 +69,7 @@ def _model(data: xr.Dataset, request: RunRequest, results: str) -> Model:
 
 
 def _request(data: xr.Dataset, results: str) -> RunRequest:
-    from paraflex.cli.app import app  # which imports the commands
+    from paraflex.cli.app import app  # imported here because it imports the commands
 
     run = asked(data)
     if not run or run.get("ked"):

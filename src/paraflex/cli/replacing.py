@@ -1,4 +1,4 @@
-"""What lies in a folder of results before a command writes there: said before it computes."""
+"""Contents of a results folder that a command will replace or leave: reported before the command computes."""
 
 from __future__ import annotations
 
@@ -23,28 +23,29 @@ from paraflex.folders import (
 )
 from paraflex.writing import read_json
 
-# Foreign files that are named.
+# Largest number of foreign files that are named.
 _NAMED = 3
 
 
 @contextmanager
 def hold_results(out: str | Path, kind: str, *, force: bool, field: str = "--out") -> Iterator[ResultsFolder]:
-    """A folder held for the results of a command: what it is about to replace is said on stderr.
+    """Hold a folder for the results of a command, and report on stderr what will be replaced there.
 
     Parameters
     ----------
     out : str or Path
+        Results folder.
     kind : str
-        See `paraflex.folders.KINDS`.
+        Kind of the results: see `paraflex.folders.KINDS`.
     force : bool
         Whether results of another kind may be replaced.
     field : str
-        The option that names the folder.
+        Option that names the folder.
 
     Raises
     ------
     InputError, OutputError
-        See `hold_folder`.
+        The folder cannot be held: see `hold_folder`.
     """
     with hold_folder(Path(out), kind, force=force, field=field) as folder:
         say_replaced(folder.path)
@@ -52,7 +53,7 @@ def hold_results(out: str | Path, kind: str, *, force: bool, field: str = "--out
 
 
 def refuse_existing(output: Path, force: bool) -> None:
-    """Check that there is no file of that name, nor anything in a folder of it, or that it may be written over."""
+    """Check that no such file or non-empty folder exists, or that `force` allows overwriting it."""
     if force or not output.exists() or (output.is_dir() and not any(output.iterdir())):
         return
     raise InputError(
@@ -63,7 +64,7 @@ def refuse_existing(output: Path, force: bool) -> None:
 
 
 def say_replaced(folder: Path) -> None:
-    """Say on stderr which results of a folder a command is about to replace, and which files it leaves."""
+    """Report on stderr which results in a folder a command will replace, and which files it leaves."""
     kind, foreign = kind_of_folder(folder), foreign_files(folder)
     said = []
     if kind:
@@ -80,13 +81,13 @@ def _described(folder: Path, kind: str) -> str:
     try:
         text = _what(folder, kind, read_json(folder / KINDS[kind][0]))
     except (InputError, KeyError, TypeError, AttributeError):
-        # Not there, damaged, or of another version: it is replaced all the same.
+        # A file that is missing, damaged or of another version is replaced all the same.
         text = f"a {kind}"
     return f"{text}, {when}"
 
 
 def _what(folder: Path, kind: str, found: dict[str, Any]) -> str:
-    """What the first file of some results tells of them."""
+    """Describe results by the contents of their first file."""
     if kind == SENSITIVITY:
         return f'sensitivities "{found["name"]}"'
     if kind == STUDY_OF_RUNS:

@@ -1,4 +1,4 @@
-"""`paraflex report`: the report of results that are there."""
+"""`paraflex report`: the report of stored results."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
 from paraflex.writing import read_json
 
-# Pages of kinds of results that nothing beside their dataset is needed for.
+# Page functions of the kinds of results that need nothing but their dataset.
 _PAGES = {"motion": motion_page, "linear": linear_page, "statics": statics_page, "reduction": reduction_page}
 
 
 def report_command(request: ReportRequest) -> None:
-    """Write a report."""
+    """Write the report of stored results."""
     study = study_of(Path(request.results))
     file = study / "results.parquet" if study is not None else results_file(request.results)
     target = file.with_name("report.html") if request.output is None else Path(request.output)
@@ -47,7 +47,7 @@ def report_command(request: ReportRequest) -> None:
 
 
 def study_of(results: Path) -> Path | None:
-    """The folder of a study of many designs that was named, or whose table was; None where there is none."""
+    """Return the folder of a study of many designs, given by its name or by a file in it; None if it is not one."""
     from paraflex.campaign import STUDY
 
     folder = results.parent if results.is_file() and results.suffix in (".parquet", ".json") else results
@@ -55,7 +55,7 @@ def study_of(results: Path) -> Path | None:
 
 
 def save_study_report(folder: Path, console: Console, target: Path | None = None) -> None:
-    """Write the report of a study's folder, saying what takes time."""
+    """Write the report of a study's folder, and print the steps that take time."""
     from paraflex.studies.sweeps.report import study_page
 
     page = study_page(folder, lambda doing: console.print(doing, soft_wrap=True))
@@ -63,7 +63,7 @@ def save_study_report(folder: Path, console: Console, target: Path | None = None
 
 
 def page_of(data: xr.Dataset, folder: Path) -> Page:
-    """The report of a dataset and of what stands in its folder."""
+    """Return the report of a dataset and of the files in its folder."""
     kind = kind_of(data)
     if kind == "verification":
         return verification_page(data, _beside(folder / "verify.json"))

@@ -1,4 +1,4 @@
-"""What commands that simulate a study have in common: which path, which modes, the plan, where results go."""
+"""Common parts of commands that simulate a study: model, paths, modes, controllers, plan, and errors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from paraflex.validity import to_blame
 
 
 def asked_model(choice: ModelChoice) -> Model:
-    """The model that a command is to take, with what --set says."""
+    """Load the requested model, with the values of --set."""
     found = {}
     for text in choice.settings:
         name, equals, value = text.partition("=")
@@ -35,7 +35,7 @@ def asked_model(choice: ModelChoice) -> Model:
 
 
 def asked_of(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance of a command: a model, its file, --set and the rest of a run."""
+    """Return the provenance of a command: parameters of the model, its file, --set and the settings of the run."""
     source = {"mechanism": model.source, "set": dict(model.settings)}
     if may_be_outside():
         source["allow_outside"] = True
@@ -43,13 +43,13 @@ def asked_of(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def with_frames(mechanism: Mechanism, frames: FramesChoice) -> Mechanism:
-    """The mechanism with all beams in the frames and of the curvature asked for; None leaves them as they are."""
+    """Return the mechanism with the requested frames and curvature of all beams; None leaves them unchanged."""
     with flagged(frames):
         return mechanism.with_beams(reference=frames.reference, curvature=frames.curvature)
 
 
 def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
-    """A path of the model or of a file, and its name."""
+    """Return a path of the model or of a file, and its name."""
     if name is not None and name not in model.paths and name.endswith(".toml"):
         return load_path(name), name
     name = model.path_name(name)
@@ -57,7 +57,7 @@ def find_path(model: Model, name: str | None) -> tuple[EndEffectorPath, str]:
 
 
 def find_paths(model: Model, names: Sequence[str]) -> dict[str, EndEffectorPath]:
-    """Paths of the model or of files by name: those asked for, else the study's first, or the model's."""
+    """Return the requested paths of the model or of files by name; by default the study's first, or the model's."""
     found = {}
     for name in names or (None,):
         path, called = find_path(model, name)
@@ -68,7 +68,7 @@ def find_paths(model: Model, names: Sequence[str]) -> dict[str, EndEffectorPath]
 
 
 def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
-    """The modes asked for, or the study's."""
+    """Return the requested modes, or the study's."""
     with renamed("--mode"):
         modes = model.modes(names)
     if not modes:
@@ -81,7 +81,7 @@ def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
 
 
 def acting_controllers(model: Model, request: RunRequest) -> tuple[ControllerDescription, ...]:
-    """The controllers asked for, or the study's."""
+    """Return the requested controllers, or the study's."""
     with blaming(model):
         found = model.acting(request.controllers)
     if found and request.ked:
@@ -99,12 +99,12 @@ def acting_controllers(model: Model, request: RunRequest) -> tuple[ControllerDes
 
 
 def controllers_said(model: Model, acting: Sequence[ControllerDescription]) -> list[str]:
-    """Controllers of a run as --controller says them."""
+    """Return the controllers of a run as values of --controller."""
     return [one.name for one in acting] or ([NONE] if model.study.controllers else [])
 
 
 def find_mode(model: Model, names: list[str]) -> ActuationMode:
-    """Of the modes asked for, or the study's, the one with most motors."""
+    """Return the mode with most motors, of those requested or of the study."""
     return max(find_modes(model, names), key=lambda mode: len(mode.motors))
 
 
@@ -116,7 +116,7 @@ def plan_study(
     chosen: PlanChoice,
     after: str | None = None,
 ) -> TrackingTask:
-    """The study, planned; errors name the option or the field at fault."""
+    """Plan the study along a path; errors name the option or field at fault."""
     with blaming(model):
         try:
             return model.plan(path, mechanism=mechanism, **asdict(chosen), after=after, warning=False)
@@ -126,7 +126,7 @@ def plan_study(
 
 @contextmanager
 def blaming(model: Model) -> Iterator[None]:
-    """Context whose errors of input, and of a mechanism that cannot be put together, name the option or file."""
+    """Convert input and assembly errors within the context to errors that name the option or file at fault."""
     try:
         yield
     except AssemblyError as error:
@@ -136,14 +136,14 @@ def blaming(model: Model) -> Iterator[None]:
 
 
 def of_assembly(error: AssemblyError, model: Model) -> InputError:
-    """The error of a mechanism that cannot be put together, naming the model's file."""
-    # Links that are far too soft bend where the loops are to close, instead of moving.
+    """Return the error of a mechanism that cannot be assembled, naming the model's file."""
+    # Links that are far too soft bend, instead of moving, when the loops are closed.
     remedy = to_blame(model.mechanism) or error.remedy
     return InputError(error.problem, field="assembly", remedy=remedy, source=model.source)
 
 
 def at_fault(error: InputError, model: Model) -> InputError:
-    """The same error, naming the option it came from or else the model's file."""
+    """Return the same error, naming the option it came from or else the model's file."""
     flags = {
         "duration": "--duration",
         "samples": "--samples",

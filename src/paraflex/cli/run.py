@@ -1,4 +1,4 @@
-"""`paraflex run`: what is asked for, checked; then along paths, or a mechanism's own motion."""
+"""`paraflex run`: check of the request, then runs along paths or of the mechanism's own motion."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from paraflex.writing import portable_name
 
 
 def run_command(request: RunRequest) -> int:
-    """Run a study and write its results; the exit code."""
+    """Run a study and write its results; return the exit code."""
     model = asked_model(request.model)
     _check_fidelity(request)
     options = integration_options(request, model.study)
@@ -32,7 +32,7 @@ def run_command(request: RunRequest) -> int:
         check_stops(mechanism, options, request.stop_at)
         return run_motion(request, model, mechanism, options, how)
     paths, modes = find_paths(model, request.paths or model.study.paths), find_modes(model, request.modes)
-    # Every check that needs no computing comes before the first minute is spent.
+    # All checks that need no computation come before the long runs.
     with ExitStack() as held:
         followed = {
             name: (paths[name], held.enter_context(hold_results(folder, RUN, force=request.force)))
@@ -42,7 +42,7 @@ def run_command(request: RunRequest) -> int:
 
 
 def _folders(paths: Iterable[str], out: Path) -> dict[str, Path]:
-    """The folder of each path's results: that asked for, or one in it for each of several paths."""
+    """Return the results folder of each path: the requested one, or a folder in it for each of several paths."""
     paths = list(paths)
     if len(paths) == 1:
         return {paths[0]: out}
@@ -69,7 +69,10 @@ def _without_path(model: Model, request: RunRequest) -> Mechanism:
 
 
 def _check_fidelity(request: RunRequest) -> None:
-    """The four fidelities and finite segments exclude one another; KED has a step of its own."""
+    """Check that at most one fidelity is requested, and that the other options go with it.
+
+    Kineto-elastodynamics (KED) has its own fixed steps, hence no options on integration.
+    """
     chosen = {
         "--rigid": request.rigid,
         "--segments": request.segments is not None,
@@ -93,7 +96,7 @@ def _check_fidelity(request: RunRequest) -> None:
 
 
 def asked_mechanism(model: Model, request: RunRequest) -> Mechanism:
-    """The mechanism at the fidelity asked for."""
+    """Return the mechanism at the requested fidelity."""
     mechanism = model.mechanism.rigid() if request.rigid else model.mechanism
     mechanism = with_frames(mechanism, request.frames)
     if request.geometry is None:

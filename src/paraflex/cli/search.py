@@ -1,4 +1,4 @@
-"""What the commands that look for designs have in common: the request, the folder, the bar, the exit code."""
+"""Common parts of the commands that search for designs: run, progress bar, output, figures, exit code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Report = Callable[[Console, R], None]
 
 
 def search_command(request: SearchRequest, study: DesignStudy[R], report: Report[R], what: str) -> int:
-    """Do what is left of a search, write its figures and say what it found; the exit code."""
+    """Run or continue a search, print its result and write its figures; return the exit code."""
     console = plain_console(stderr=True)
     compile_kernels_for(study.base.model().mechanism, console.print)
     result = _with_bar(console, study, request, what)
@@ -46,7 +46,7 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
 
 
 def parameter_table(result: R, **columns: dict[str, str]) -> Table:
-    """The start and the best of every parameter, and more columns of text."""
+    """Return a table of the start and the best value of every parameter, with further columns of text."""
     table = plain_table("parameter", numbers=("start", "best", *columns))
     table.add_column("", no_wrap=True)
     for name, value in result.values.items():

@@ -1,4 +1,4 @@
-"""`paraflex sensitivity`: derivatives of what runs are judged by, by numbers of the mechanism's file."""
+"""`paraflex sensitivity`: derivatives of the metrics of runs with respect to numbers of the mechanism's file."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from paraflex.folders import SENSITIVITY
 from paraflex.studies import Sensitivities, load_sensitivities
 from paraflex.studies.sensitivities.study import FIGURES, LINES, TABLE
 
-# Parameters side by side in a table of 80 columns.
+# Number of parameters side by side in a table of 80 columns.
 _PARAMETERS_ABREAST = 4
 
 
 def sensitivity_command(request: SensitivityRequest) -> int:
-    """Differentiate the runs of a study; write sensitivity.json, the table and figures. The exit code."""
+    """Differentiate the runs of a study; write sensitivity.json, the table and figures; return the exit code."""
     named = [name.strip() for entry in request.metrics for name in entry.split(",")]
     study = load_sensitivities(request.study, [name for name in named if name])
     folder = request.folder
@@ -49,7 +49,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
 
 
 def _values(entries: list[str], setting: Setting) -> dict[str, float]:
-    """Values by name, in SI units; a unit is that of the parameter's fields."""
+    """Return values by parameter in SI units; a unit must suit the fields of the parameter."""
     values = {}
     for entry in entries:
         name, _, value = (part.strip() for part in entry.partition("="))
@@ -63,7 +63,7 @@ def _values(entries: list[str], setting: Setting) -> dict[str, float]:
 
 
 def _print(console: Console, found: Sensitivities, row: int) -> None:
-    """Elasticities and derivatives of one run, a table each for every few parameters."""
+    """Print elasticities and derivatives of one run, in tables of a few parameters each."""
     path, mode = found.rows[row]
     where, relative = f"{found.mechanism}, {path}, mode {mode}", found.relative
     for first in range(0, len(found.parameters), _PARAMETERS_ABREAST):

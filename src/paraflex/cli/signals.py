@@ -1,7 +1,7 @@
-"""What the command does on Ctrl-C, SIGTERM, and SIGHUP of a terminal that closes: the same, but for its exit code.
+"""Response of a command to Ctrl-C, SIGTERM, and SIGHUP of a closing terminal: the same except for the exit code.
 
-Before its work has begun and after it has ended the process leaves at once. While it works, the signal is raised as a
-KeyboardInterrupt, as Python does with Ctrl-C alone: what is done is kept, and said.
+Before its work has begun and after it has ended, the process exits at once. During the work, the signal is raised as a
+KeyboardInterrupt, as Python does for Ctrl-C alone: finished results are kept and reported.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from typing import Any
 
 from paraflex.interrupts import ENDING
 
-# Those that follow the first so soon are the same wish [s]: a terminal that closes may send two.
+# Signals within this time of the last one raised are repetitions [s]: a terminal that closes may send two.
 _ONCE = 1.0
-# How long an import may go on: what is imported by half cannot be imported again; and how often that is looked at [s].
+# Longest delay of a signal during an import, as a half-imported module cannot be imported again; and time between two
+# attempts to raise it [s].
 _IMPORTS, _AGAIN = 1.5, 0.02
 _IMPORTING = "<frozen importlib._bootstrap>"
 
 
 class _Taken:
-    """The signal that is being answered."""
+    """Signal being handled: its number, and the monotonic times of the first one and of the last one raised [s]."""
 
     number: int | None = None
     first: float = 0.0
@@ -34,31 +35,31 @@ class _Taken:
 
 
 def exit_code() -> int:
-    """Of a command that was interrupted: 130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP."""
+    """Return the exit code of an interrupted command: 130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP."""
     return 128 + (_Taken.number or signal.SIGINT)
 
 
 def is_taken() -> bool:
-    """Whether a signal has been raised in the work."""
+    """Return whether a signal has arrived during the work."""
     return _Taken.number is not None
 
 
 def leave_when_signalled() -> None:
-    """From now on a signal ends the process at once, with a line and its exit code."""
+    """Make signals end the process at once from now on, with a line and their exit code."""
     for number in _answered():
         signal.signal(number, _leave)
 
 
 @contextmanager
 def raised() -> Iterator[None]:
-    """Meanwhile a signal is raised as a KeyboardInterrupt in the main thread."""
+    """Raise signals as KeyboardInterrupt in the main thread within the context."""
     _Taken.number = None
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     before = {number: signal.signal(number, _raise) for number in _answered()}
     hooks = sys.unraisablehook, sys.excepthook
-    # Compiled libraries print first what they cannot raise.
+    # Compiled libraries pass exceptions that they cannot raise to these hooks, which print them by default.
     sys.unraisablehook, sys.excepthook = _raise_again, _print_others
     try:
         yield
@@ -69,7 +70,7 @@ def raised() -> Iterator[None]:
 
 
 def _answered() -> list[signal.Signals]:
-    """Signals that the process was not told to ignore, as `nohup` does, and that nobody else answers."""
+    """Return the signals to handle: those neither ignored, as under `nohup`, nor handled outside Python."""
     return [number for number in ENDING if signal.getsignal(number) not in (signal.SIG_IGN, None)]
 
 
@@ -99,9 +100,9 @@ def _is_importing(frame: FrameType | None) -> bool:
 
 
 def _raise_again(lost: Any) -> None:
-    """Raise an interrupt again that was lost where nothing can be raised: in a callback of a library.
+    """Raise an interrupt again that was lost in a callback of a library, where exceptions cannot be raised.
 
-    Afterwards objects that were half made may not go in peace: of these nothing is said.
+    After an interrupt, errors in the deletion of incomplete objects are not printed.
     """
     if _Taken.number is None:
         sys.__unraisablehook__(lost)
@@ -124,7 +125,7 @@ def _send_later(number: int) -> None:
 def _send(number: int) -> None:
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main is not None:
-        # Wakes it where it waits.
+        # This also wakes a main thread that waits in a system call.
         signal.pthread_kill(main, number)
     else:
         signal.raise_signal(number)

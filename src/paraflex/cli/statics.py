@@ -1,4 +1,4 @@
-"""`paraflex statics`: equilibria under loads and travel, in steps."""
+"""`paraflex statics`: static equilibria under loads and travel, applied in steps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _NONE = "none"
 
 
 def statics_command(request: StaticsRequest) -> int:
-    """Find the equilibria, print them, and write files where that is asked for; the exit code."""
+    """Compute the equilibria, print them and, with --out, write files; return the exit code."""
     model = asked_model(request.model)
     data = _COMMAND.run(request.files, lambda: _data(model, request))
     return COMPLETE if data["status"].item() == "complete" else TROUBLE
@@ -40,7 +40,7 @@ def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
 
 
 def _found(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> Statics:
-    """The equilibria, or those until one is not found."""
+    """Return the equilibria, or those before the first that is not found."""
     with flagged(request, first=True):
         try:
             return statics(
@@ -56,7 +56,10 @@ def _found(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> Sta
 
 
 def _asked(model: Model, request: StaticsRequest) -> StaticsDefaults:
-    """What is given: of loads, torques and travel what options say, if any does; the rest as the model has it."""
+    """Return the arguments of `statics`: loads, torques and travel of the options if any is given, else the model's.
+
+    All other arguments that are not given are the model's as well.
+    """
     mechanism = model.mechanism
     units = dict(zip([motor.name for motor in mechanism.motors], mechanism.motor_units(), strict=True))
     with flagged(request, first=True):
@@ -77,12 +80,12 @@ def _asked(model: Model, request: StaticsRequest) -> StaticsDefaults:
     effector = mechanism.end_effector
     if asked.stiffness is not None or asked.loads or asked.torques or asked.moved or effector is None:
         return asked
-    # Of nothing that is given the stiffness of the end-effector.
+    # Without loads, torques or travel, the stiffness is that of the end-effector.
     return asked.filled(stiffness=tuple(f"{effector.point}.{axis}" for axis in effector.coordinates))
 
 
 def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
-    """Names and values, each name once."""
+    """Return values by name; raise InputError if a name is given twice."""
     found: dict[str, str] = {}
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -100,7 +103,7 @@ def _in_unit(text: str, unit: str, field: str) -> float:
 
 
 def _parameters(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> dict[str, Any]:
-    """What was asked for."""
+    """Return the provenance of the equilibria."""
     given = {name: value for name, value in (vars(asked) | {"assembly": request.assembly}).items()
              if value is not None and value != {}}  # fmt: skip
     return asked_of(model, {"statics": True} | given)

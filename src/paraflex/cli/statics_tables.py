@@ -1,4 +1,4 @@
-"""What `paraflex statics` prints: a table of steps, and what the last of them is."""
+"""Tables that `paraflex statics` prints: the steps, and details of the last one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from paraflex.units import STRESS
 
 
 def print_statics(out: Console, data: xr.Dataset) -> None:
-    """All that is printed of equilibria."""
+    """Print equilibria: a table of steps, details of the last one, then frequencies, buckling, stress and validity."""
     summary = statics_summary(data)
     points = len(summary["limit_points"])
     also = f", {points} limit point{'s' * (points > 1)}" if points else ""

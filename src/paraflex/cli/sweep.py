@@ -1,4 +1,4 @@
-"""`paraflex sweep`: thousands of runs of a mechanism whose numbers vary, gone on with when run again."""
+"""`paraflex sweep`: thousands of runs of a mechanism with varied numbers, continued when called again."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from paraflex.studies import SweepResult, load_sweep
 
 
 def sweep_command(request: SweepRequest) -> int:
-    """Do what is left of a sweep; the exit code."""
+    """Run or continue a sweep; return the exit code."""
     console = plain_console(stderr=True)
     study = load_sweep(request.study)
     folder = request.folder
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, folder, request)
     verdict = study.setting.verdict()
-    # Tables say which parts of paths are run by the verdict's findings.
+    # In the printed output, findings of the verdict report which parts of paths are run.
     parts = {path: part.to_dict() for path, part in study.setting.parts().items()} if request.json else {}
 
     figures = {"folder": str(result.folder), "table": str(result.table), **result.to_dict()}
@@ -51,7 +51,7 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
 
 
 def _write_report(console: Console, folder: Path, result: SweepResult) -> None:
-    """Write the report; whoever stopped the sweep does not want to wait for more."""
+    """Write the report, unless the sweep was interrupted: the user should not have to wait for it."""
     from paraflex.cli.report import save_study_report
 
     if result.interrupted:

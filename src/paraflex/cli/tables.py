@@ -1,4 +1,4 @@
-"""What the commands print."""
+"""Tables and lines that commands print."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from paraflex.findings import DONE_STATUSES, Finding
 from paraflex.units import STRESS
 
 if TYPE_CHECKING:
-    # With what they import they take as long as all of `paraflex info`.
+    # Their import takes as long as all of `paraflex info`.
     from paraflex.studies import StudyResult
     from paraflex.tracking import TrackingTask
 
 
-# Torques below this share of the largest are rounding.
+# Torques below this share of the largest are rounding errors.
 _ROUNDING = 1e-9
 
 
 class _PlainConsole(Console):
-    """A console on which names from files do nothing: their control characters stand as escapes."""
+    """Console that prints control characters, which names from files may hold, as escapes."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """The parts of what is printed; rich's own controls and styles stand beside the text, not in it."""
+        """Yield the segments to print; controls and styles of Rich are kept, as they are not part of the text."""
         for part in super().render(renderable, options):
             yield part if part.control else part._replace(text=printable(part.text))
 
 
 def plain_console(*, stderr: bool = False) -> Console:
-    """A console that leaves square brackets alone: here they hold units."""
+    """Return a console that prints square brackets as they are, because here they hold units."""
     return _PlainConsole(highlight=False, markup=False, stderr=stderr)
 
 
 def warn_of(console: Console, findings: Iterable[Finding], whose: str = "") -> None:
-    """A line for each finding; `whose` begins it."""
-    from paraflex.results.doubts import doubt_lines  # with xarray, which descriptions of mechanisms do without
+    """Print a line for each finding, which begins with `whose`."""
+    from paraflex.results.doubts import doubt_lines  # imports xarray, which descriptions of mechanisms do not need
 
     findings = list(findings)
     for line in doubt_lines(findings):
@@ -50,16 +50,18 @@ def warn_of(console: Console, findings: Iterable[Finding], whose: str = "") -> N
 
 
 def print_studies(console: Console, summaries: Mapping[str, Any], task: TrackingTask, model: str) -> None:
-    """What every mode came to in a model along each path: tables, and a line for each run that an event stopped.
+    """Print tables of the runs in every mode along each path, and a line for each run that an event stopped.
 
     Parameters
     ----------
     console : Console
+        Console to print to.
     summaries : mapping of str to dict
-        By path; the name of a single one may be empty.
+        Summaries by path; the name of a single path may be empty.
     task : TrackingTask
-        Of any of them.
+        Task of any of the paths.
     model : str
+        Fidelity of the runs, for the title.
     """
     console.print(_study_table(summaries, task, model))
     if any(mode.get("tracking_rms_after") is not None for _, mode in _runs(summaries)):
@@ -73,7 +75,7 @@ def print_studies(console: Console, summaries: Mapping[str, Any], task: Tracking
 
 
 def _runs(summaries: Mapping[str, Any]) -> Iterator[tuple[list[str], dict[str, Any]]]:
-    """Every run of some paths: words of the path, where it has a name, and of the mode, then its numbers."""
+    """Yield each run along the paths: the names of its path, if not empty, and of its mode, then its numbers."""
     for path, summary in summaries.items():
         for name, mode in summary["modes"].items():
             yield [path, name] if path else [name], mode
@@ -84,7 +86,7 @@ def _texts(summaries: Mapping[str, Any]) -> list[str]:
 
 
 def _study_table(summaries: Mapping[str, Any], task: TrackingTask, model: str) -> Table:
-    """Tracking error and peak torques of every run, and what the solver did."""
+    """Return a table of the tracking error and peak torques of every run, with its steps and wall time."""
     from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 
     first = next(iter(summaries.values()))
@@ -110,7 +112,10 @@ def _study_table(summaries: Mapping[str, Any], task: TrackingTask, model: str) -
 
 
 def _after_table(summaries: Mapping[str, Any], task: TrackingTask) -> Table:
-    """Errors during the motion and after it, what goes on then, and what brakes took."""
+    """Return a table of errors during the motion and after it, drift and vibration after it, and energy of brakes.
+
+    Runs with controllers also have settling time and overshoot.
+    """
     held = task.holds
     motors = "held by brakes" if held else "free"
     if next(iter(summaries.values()))["parameters"]["run"].get("ked"):
@@ -128,7 +133,7 @@ def _after_table(summaries: Mapping[str, Any], task: TrackingTask) -> Table:
 def controllers(
     console: Console, runs: Sequence[tuple[Sequence[str], Mapping[str, Any]]], texts: Sequence[str] = ()
 ) -> None:
-    """A table of controllers of runs, along paths with words for first columns; nothing where there were none."""
+    """Print a table of the controllers of runs, if any; `texts` are the heads of the columns that name a run."""
     rows = []
     for names, run in runs:
         internal = number(_unless_rounding(run.get("internal_torque_max"), run.get("peak_torque", {})), ".2g")
@@ -144,7 +149,7 @@ def controllers(
 
 
 def _unless_rounding(value: float | None, beside: Mapping[str, float | None]) -> float | None:
-    """A value, or zero where it is the rounding of those that it is a part of."""
+    """Return a value, or zero if it is a rounding error of the values beside it."""
     return (
         0.0
         if value is not None and value < _ROUNDING * max((x or 0.0 for x in beside.values()), default=0.0)
@@ -159,7 +164,7 @@ def plain_table(
     title: str | None = None,
     wrapped: Iterable[str] = (),
 ) -> Table:
-    """A table without frames: columns of text, of which some may be broken, then of numbers."""
+    """Return a table without frames: columns of text, of which the `wrapped` ones may be broken, then of numbers."""
     table = Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
     for heading in texts:
         table.add_column(heading, no_wrap=heading not in wrapped)
@@ -171,7 +176,7 @@ def plain_table(
 
 
 def framed_table(title: str, headings: Iterable[str], right: Container[int] = ()) -> Table:
-    """A table in a frame; `right` are the numbers of its columns of numbers."""
+    """Return a table in a frame; `right` holds the indices of its columns of numbers."""
     table = Table(title=title, title_justify="left")
     for k, heading in enumerate(headings):
         table.add_column(heading, justify="right" if k in right else "left")
@@ -179,13 +184,13 @@ def framed_table(title: str, headings: Iterable[str], right: Container[int] = ()
 
 
 def print_titled(console: Console, title: str, table: Table) -> None:
-    """A table below a title that is not broken at the table's width, as one of its own would be."""
+    """Print a table below a title, which is not broken at the table's width as Rich does with a table's own title."""
     console.print(title, soft_wrap=True)
     console.print(table)
 
 
 def validity(console: Console, verdicts: Mapping[str, Any]) -> None:
-    """That the models of all runs hold, if they do."""
+    """Print that the models of all runs are valid, if they are."""
     from paraflex.results.validity import validity_line
 
     if line := validity_line(verdicts):
@@ -193,7 +198,7 @@ def validity(console: Console, verdicts: Mapping[str, Any]) -> None:
 
 
 def below_tolerance(console: Console, summaries: Mapping[str, Any], modes: Mapping[str, Any]) -> None:
-    """Runs whose tracking error is smaller than errors of integration may be; with fixed steps nothing is known."""
+    """Print which tracking errors are below the tolerance of integration; nothing for fixed steps, which have none."""
     from paraflex.results.following import HEADLINE, ErrorSpan, below_tolerance_line
 
     first = next(iter(summaries.values()))
@@ -207,7 +212,7 @@ def below_tolerance(console: Console, summaries: Mapping[str, Any], modes: Mappi
 
 
 def loads(console: Console, figures: Mapping[str, Any]) -> None:
-    """What a designer asks first: the largest stress of all runs, what prescribed motions need, the joint force."""
+    """Print the largest stress of all runs, the effort that prescribed motions need, and the largest joint force."""
     from paraflex.results.loads import effort_lines, joint_line, stress_line
 
     lines = [line for name, one in figures.items() for line in effort_lines(one, name)]
@@ -216,7 +221,7 @@ def loads(console: Console, figures: Mapping[str, Any]) -> None:
 
 
 def reductions(console: Console, summaries: Mapping[str, Any]) -> None:
-    """How far off runs with few flexible coordinates are, and how much faster, beside those with all."""
+    """Print errors and times of runs with few flexible coordinates relative to those with all, if there are any."""
     from paraflex.results.following import HEADLINE, ErrorSpan
 
     rows, title, key = [], "", HEADLINE[ErrorSpan(next(iter(summaries.values()))["error"])]
@@ -234,7 +239,7 @@ def reductions(console: Console, summaries: Mapping[str, Any]) -> None:
 
 
 def reduction(console: Console, summary: Mapping[str, Any]) -> None:
-    """The same of a run without a path."""
+    """Print error and time of a run without a path with few flexible coordinates, relative to the full run."""
     if (one := summary.get("reduction")) is not None:
         console.print(
             f"{_reduced_words(one)}: points are up to {one['distance']:.1e} m from their places in the full run, in "
@@ -250,7 +255,7 @@ def _reduced_words(one: Mapping[str, Any]) -> str:
 
 
 def stresses(console: Console, summaries: Mapping[str, Any]) -> None:
-    """The largest stress of every run along some paths, where the mechanism has any."""
+    """Print a table of the largest stress of every run along the paths, if there are stresses."""
     from paraflex.results.loads import ranked
 
     rows, numbers = [], (f"stress\n[{STRESS.name}]", "at\n[m]", "time\n[s]", "safety\nfactor")
@@ -266,7 +271,7 @@ def stresses(console: Console, summaries: Mapping[str, Any]) -> None:
 
 
 def failures(console: Console, result: StudyResult, whose: str = "") -> None:
-    """One line for each mode that did not run to its end."""
+    """Print a line for each mode that did not run to its end."""
     reasons = list(result.failed.values())
     if result.data is not None:
         runs = [result.data.sel(mode=mode) for mode in result.data["mode"].values]
@@ -277,11 +282,11 @@ def failures(console: Console, result: StudyResult, whose: str = "") -> None:
 
 
 def number(value: float | None, form: str) -> str:
-    """A number in a form; nothing for None."""
+    """Return a number in a format; empty for None."""
     return "" if value is None else format(value, form)
 
 
 def few(names: Sequence[Any], most: int) -> str:
-    """The first of some names, and how many more there are."""
+    """Return the first `most` names as text, and how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return f"{', '.join(map(str, names[:most]))}{more}"

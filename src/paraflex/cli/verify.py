@@ -1,4 +1,4 @@
-"""`paraflex verify`: one mechanism at every fidelity and in other engines, compared."""
+"""`paraflex verify`: comparison of one mechanism at every fidelity and in other engines."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from paraflex.studies import FIDELITIES, VerificationOptions, VerificationStudy,
 
 
 def verify_command(request: VerifyRequest) -> int:
-    """Run all models, write what they say of each other; the exit code."""
+    """Run all models and write their comparison; return the exit code."""
     model = asked_model(request.model)
     path, path_name = find_path(model, request.path)
     modes = find_modes(model, request.modes) if request.modes else [find_mode(model, [])]
@@ -47,7 +47,7 @@ def _verify(
     models: list[str],
     folder: ResultsFolder,
 ) -> int:
-    """Run all models along a path, and its name; write results into a folder that is held."""
+    """Run all models along a path, given with its name; write results into the held folder and return the exit code."""
     console, (path, path_name) = plain_console(stderr=True), along
     options, mechanism = _options(request), with_frames(model.mechanism, request.frames)
     for geometry in Geometry:

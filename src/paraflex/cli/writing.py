@@ -1,4 +1,4 @@
-"""Results of a command as files: numbers first, then what is drawn of them."""
+"""Files of a command's results: numbers first, then figures and report."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ def write_numbers(
     folder: ResultsFolder,
     names: tuple[str, str] = ("results.nc", "summary.json"),
 ) -> None:
-    """Write a dataset and its summary, of a run by default, in place of the results before."""
+    """Write a dataset and its summary in place of earlier results; the default names are those of a run."""
     with folder.replaced() as new:
         save_results(data, new / names[0])
         write_json(new / names[1], summary)
 
 
 def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest, began: float) -> str:
-    """Add the figures of a run, and the report if it is wanted; a line that says where all is."""
+    """Add the requested figures and report of a run; return a line with time and folder."""
     write_drawn(data, folder, request.drawn)
     return where(began, "results", folder.path, request.drawn)
 
 
 def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, drawn: DrawnChoice = _FIGURES) -> None:
-    """Add figures, and the report of a dataset, to results that are written: an interruption costs these alone."""
+    """Add figures, and the report of a dataset, to results already written, which an interruption leaves intact."""
     try:
         with folder.amended() as new:
             if drawn.figures:
-                from paraflex.plots import save_figures  # it takes a second
+                from paraflex.plots import save_figures  # its import takes a second
 
                 save_figures(results, new / "figures")
             if drawn.report and isinstance(results, xr.Dataset):
-                from paraflex.cli.report import page_of, save_page  # so does it
+                from paraflex.cli.report import page_of, save_page  # as does this one
 
                 save_page(page_of(results, folder.path), new / "report.html")
     except KeyboardInterrupt as interrupt:

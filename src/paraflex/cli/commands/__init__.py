@@ -1,1 +1,1 @@
-"""The commands as a shell sees them: their arguments, options and help. What they do is in the other modules."""
+"""Commands as the shell sees them: arguments, options and help. The modules of `paraflex.cli` do their work."""

@@ -1,4 +1,4 @@
-"""Requests about control laws."""
+"""Requests of commands on control laws."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from paraflex.cli.commands.options import (
 
 @dataclass(frozen=True, kw_only=True)
 class CompareLawsRequest:
-    """What `paraflex control compare` is asked for; None takes the model's or the program's default."""
+    """Options of `paraflex control compare`; None stands for the default of the model or the program."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     controllers: Annotated[

@@ -1,4 +1,4 @@
-"""Requests for what can be said without a run."""
+"""Requests of commands on models, most of which need no run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from paraflex.cli.commands.options import (
 
 @dataclass(frozen=True)
 class LibraryChoice(ModelChoice):
-    """A model, or all of the library."""
+    """Choice of a model, or of the whole library."""
 
     source: Annotated[
         str | None, Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file; all of the library.")
@@ -28,7 +28,7 @@ class LibraryChoice(ModelChoice):
 
 @dataclass(frozen=True, kw_only=True)
 class InfoRequest:
-    """What `paraflex info` is asked for."""
+    """Options of `paraflex info`."""
 
     model: LibraryChoice = field(default_factory=LibraryChoice)
     assembly: AssemblyOption = None
@@ -45,7 +45,7 @@ class InfoRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class DrawRequest:
-    """What `paraflex draw` is asked for."""
+    """Options of `paraflex draw`."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     assembly: AssemblyOption = None
@@ -64,7 +64,7 @@ class DrawRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class ModesRequest:
-    """What `paraflex modes` is asked for."""
+    """Options of `paraflex modes`."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     path: PathOption = None
@@ -73,7 +73,7 @@ class ModesRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class LinearRequest:
-    """Which linear models are asked for."""
+    """Options common to the commands on linear models."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     modes: Annotated[
@@ -121,7 +121,7 @@ class LinearRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class LineariseRequest(LinearRequest):
-    """What `paraflex linearise` is asked for."""
+    """Options of `paraflex linearise`."""
 
     along: Annotated[  # type: ignore[misc]
         int | None, Option(metavar="N", help="Poles at so many moments of the motion too, as branches over time.")
@@ -131,7 +131,7 @@ class LineariseRequest(LinearRequest):
 
 @dataclass(frozen=True, kw_only=True)
 class ReduceRequest(LinearRequest):
-    """What `paraflex reduce` is asked for."""
+    """Options of `paraflex reduce`."""
 
     states: Annotated[
         int | None, Option(metavar="N", help="States of the reduced models. Default: 16, or all of fewer.")
@@ -159,7 +159,7 @@ class ReduceRequest(LinearRequest):
 
 @dataclass(frozen=True, kw_only=True)
 class StaticsRequest:
-    """What `paraflex statics` is asked for; what is not is as the [statics] of the model's file has it."""
+    """Options of `paraflex statics`; those that are not given are taken from [statics] of the model's file."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     loads: Annotated[
@@ -207,14 +207,14 @@ class StaticsRequest:
 
 @dataclass(frozen=True)
 class MethodsRequest:
-    """What `paraflex methods` is asked for."""
+    """Options of `paraflex methods`."""
 
     json: Json = False
 
 
 @dataclass(frozen=True)
 class NewRequest:
-    """What `paraflex new` is asked for."""
+    """Options of `paraflex new`."""
 
     name: Annotated[str, Argument(metavar="NAME", help="Of the file to write, NAME.toml.")]
     template: Annotated[str, Option("--from", metavar="NAME", help="Library mechanism to start from.")] = "five_bar"
@@ -222,4 +222,4 @@ class NewRequest:
 
 @dataclass(frozen=True)
 class SchemaRequest:
-    """Nothing is asked of `paraflex schema`."""
+    """Request of `paraflex schema`, which has no options."""

@@ -1,4 +1,4 @@
-"""Commands whose options are given once, unless their help calls them repeatable."""
+"""Commands that accept each option once, unless its help calls it repeatable."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from paraflex.errors import InputError
 
 
 class Command(TyperCommand):
-    """A command that refuses a second value of an option that takes one."""
+    """Command that refuses a second value of an option that takes one."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse as every command does; before that, look for options given twice."""
-        if not ctx.resilient_parsing:  # in completion, where the line is not yet whole
+        """Parse arguments as every command does, after a check for options given twice."""
+        if not ctx.resilient_parsing:  # set during completion, when the line is incomplete
             self._refuse_second_values(ctx, list(args))
         return super().parse_args(ctx, args)
 
@@ -27,7 +27,7 @@ class Command(TyperCommand):
             if not isinstance(option, TyperOption) or option.multiple or not option.name:
                 continue
             values = given.get(option.name) or []
-            # A switch given twice says the same twice.
+            # A switch may be repeated with the same value.
             if len(set(values) if option.is_flag else values) > 1:
                 raise _given_twice(option, values)
 

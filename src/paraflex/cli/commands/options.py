@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have."""
+"""Arguments and options common to several commands."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 
 def measured(unit: str) -> Callable[[Any], float]:
-    """What an option makes of a text: a number, or one with a unit of the dimension of the option's own."""
+    """Return a parser of option values: a number in `unit`, or one with a unit of the same dimension."""
 
     def number(text: Any) -> float:
         try:
             return float(text)
         except ValueError:
-            from paraflex.files.fields import number_in  # not for the help
+            from paraflex.files.fields import number_in  # not needed for the help
 
             try:
                 return number_in(text, unit)
@@ -33,7 +33,7 @@ def measured(unit: str) -> Callable[[Any], float]:
 
 SECONDS, METRES, PER_SECOND = measured("s"), measured("m"), measured("1/s")
 
-# What a command runs of which no model is named.
+# Model of a command for which none is named.
 DEFAULT_MODEL = "raparm_i"
 
 Json = Annotated[bool, Option("--json", help="Print JSON instead of tables.")]
@@ -60,7 +60,7 @@ OutsideOption = Annotated[bool, Option("--allow-outside", help="Read tables that
 
 @dataclass(frozen=True)
 class DrawnChoice:
-    """Figures and report of results."""
+    """Choice of figures and report of results."""
 
     figures: Annotated[bool, Option("--figures/--no-figures", help="Draw figures, or leave them out.")] = True
     report: ReportOption = True
@@ -68,12 +68,12 @@ class DrawnChoice:
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """A model, named by an argument or by --mechanism.
+    """Choice of a model by an argument or by --mechanism.
 
     Raises
     ------
     InputError
-        Both name one, and not the same.
+        Argument and option name different models.
     """
 
     source: Annotated[
@@ -98,18 +98,18 @@ class ModelChoice:
 
     @property
     def given(self) -> str | None:
-        """Its name, where one is given."""
+        """Name of the model; None if none is given."""
         return self.mechanism if self.source is None else self.source
 
     @property
     def name(self) -> str:
-        """Its name, or that of the model run by default."""
+        """Name of the model, or of the default one."""
         return self.given or DEFAULT_MODEL
 
 
 @dataclass(frozen=True)
 class PlanChoice:
-    """What `Model.plan` takes of the command line; None takes the model's."""
+    """Options passed to `Model.plan`; None takes the model's value."""
 
     duration: Annotated[float | None, Option(metavar="S", parser=SECONDS, help="Duration, dwell included.")] = None
     samples: Annotated[int | None, Option(metavar="N", help="Samples kept.")] = None
@@ -118,7 +118,7 @@ class PlanChoice:
 
 @dataclass(frozen=True)
 class FramesChoice:
-    """Frames and curvature of all beams; None takes the model's."""
+    """Choice of frames and curvature of all beams; None takes the model's."""
 
     reference: Annotated[
         str | None,
@@ -132,7 +132,7 @@ class FramesChoice:
 
 @dataclass(frozen=True)
 class FilesChoice:
-    """Files and output of one dataset; no files without a folder."""
+    """Choice of files and output of one dataset; without a folder no files are written."""
 
     out: Annotated[
         str | None,
@@ -145,7 +145,7 @@ class FilesChoice:
 
 @dataclass(frozen=True)
 class WorkersChoice:
-    """Who computes the runs of a study."""
+    """Choice of the workers that compute the runs of a study."""
 
     engine: Annotated[
         str, Option("--engine", metavar="threads|processes|dask", help="Who computes; results are the same.")
@@ -160,8 +160,8 @@ class WorkersChoice:
 
     @property
     def chosen(self) -> Workers:
-        """As studies take it; a cluster is Dask's."""
-        from paraflex.campaign import Workers  # imported when a study is run, and not for the help
+        """Workers in the form that studies take; an address of a cluster selects Dask in place of threads."""
+        from paraflex.campaign import Workers  # needed when a study is run, not for the help
 
         engine = "dask" if self.cluster is not None and self.engine == "threads" else self.engine
         return Workers(engine, self.workers, self.cluster)

@@ -1,7 +1,7 @@
-"""Requests: dataclasses whose fields are what a shell may give, each with its `typer.Option` or `typer.Argument`.
+"""Requests: dataclasses whose fields are options of a command, each with its `typer.Option` or `typer.Argument`.
 
-The shell sees an option for each field; a field that is itself a request, of options that several commands share,
-stands for its own fields.
+The shell sees an option for each field. A field that is itself a request holds options that several commands share;
+its fields are listed in its place.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from paraflex.errors import InputError
 
 
 def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable[..., None]:
-    """A command as Typer takes it, with a parameter for each option of its request; the answer is the exit code."""
+    """Return a Typer command with a parameter for each option of its request; `answer` returns the exit code."""
 
     def called(**given: Any) -> None:
         raise typer.Exit(answer(filled(request, given)) or 0)
@@ -29,7 +29,7 @@ def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable
 
 
 def flags(request: object) -> dict[str, str]:
-    """The flag of every option of a request, by its field: {"tolerance": "--tol"}."""
+    """Return the flag of every option of a request by its field: {"tolerance": "--tol"}."""
     return {
         one.name: _flag(one)
         for one in _parameters(type(request))
@@ -39,9 +39,9 @@ def flags(request: object) -> dict[str, str]:
 
 @contextmanager
 def flagged(request: object, *, first: bool = False) -> Iterator[None]:
-    """An error that names an option's field, in whatever table, names the option's flag instead.
+    """Replace the field in errors within the context by the option's flag, in whatever table the field is.
 
-    The field is the last part of the name, or the first: of "loads.stage.T.x" the loads.
+    The field is the last part of its dotted name or, with `first`, the first part: "loads" of "loads.stage.T.x".
     """
     try:
         yield
@@ -51,12 +51,12 @@ def flagged(request: object, *, first: bool = False) -> Iterator[None]:
 
 
 def conflict(problem: str, flag: str, value: object) -> InputError:
-    """The error of an option that does not go with another."""
+    """Return the error of an option that does not go with another."""
     return InputError(problem, field=flag, value=value, remedy="leave one of them out")
 
 
 def _parameters(request: Any) -> Iterator[inspect.Parameter]:
-    """What a request is given, in order, the fields of requests in the place of these."""
+    """Yield the parameters of a request in order, with the fields of nested requests in their place."""
     kinds = get_type_hints(request, include_extras=True)
     for one in fields(request):
         if is_dataclass(kinds[one.name]):
@@ -64,13 +64,13 @@ def _parameters(request: Any) -> Iterator[inspect.Parameter]:
             continue
         default = one.default
         if default is MISSING:
-            # None stands for a default that is made anew each time.
+            # None stands for a default made by a factory.
             default = inspect.Parameter.empty if one.default_factory is MISSING else None
         yield inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kinds[one.name])
 
 
 def filled(request: Any, given: dict[str, Any]) -> Any:
-    """The request with what a shell has given; what it has not is left to the defaults."""
+    """Return the request filled with values from the shell; fields without a value (None) take their defaults."""
     kinds = get_type_hints(request)
     values = {
         one.name: filled(kinds[one.name], given) if is_dataclass(kinds[one.name]) else given[one.name]
@@ -81,6 +81,6 @@ def filled(request: Any, given: dict[str, Any]) -> Any:
 
 def _flag(one: inspect.Parameter) -> str:
     info = one.annotation.__metadata__[0]
-    # Typer keeps the first name as the default.
+    # Typer stores the first name of an option as its default.
     named = [str(name) for name in (info.default, *(info.param_decls or ())) if str(name).startswith("--")]
     return named[0].partition("/")[0] if named else f"--{one.name.replace('_', '-')}"

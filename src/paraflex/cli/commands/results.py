@@ -1,4 +1,4 @@
-"""Requests for what is made of results that are there."""
+"""Requests of commands on stored results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Force = Annotated[bool, Option("--force", help="Write over what is there.")]
 
 @dataclass(frozen=True, kw_only=True)
 class ReportRequest:
-    """What `paraflex report` is asked for."""
+    """Options of `paraflex report`."""
 
     results: Annotated[
         str,
@@ -29,7 +29,7 @@ class ReportRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class AnimateRequest:
-    """What `paraflex animate` is asked for."""
+    """Options of `paraflex animate`."""
 
     results: Annotated[str, Argument(metavar="RESULTS", help="The folder of a run or verification, or a file.")]
     output: Annotated[
@@ -62,7 +62,7 @@ class AnimateRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class CompareRequest:
-    """What `paraflex compare` is asked for."""
+    """Options of `paraflex compare`."""
 
     first: Annotated[str, Argument(metavar="RESULTS", help="The folder of a run, or a file.")]
     second: Annotated[str, Argument(metavar="RESULTS", help="Those that are compared with it.")]
@@ -76,7 +76,7 @@ class CompareRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class ExportRequest:
-    """What `paraflex export` is asked for."""
+    """Options of `paraflex export`."""
 
     results: Results
     to: Annotated[str, Option("--to", metavar="csv|parquet|mat|netcdf", help="For which programs.")]
@@ -91,7 +91,7 @@ class ExportRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class PlotRequest:
-    """What `paraflex plot` is asked for."""
+    """Options of `paraflex plot`."""
 
     results: Results
     figures: Annotated[

@@ -1,4 +1,4 @@
-"""Requests for runs of a mechanism."""
+"""Requests of commands that simulate a mechanism."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from paraflex.cli.commands.options import (
 
 @dataclass(frozen=True, kw_only=True)
 class RunRequest:
-    """What `paraflex run` is asked for; None takes the model's or the program's default."""
+    """Options of `paraflex run`; None stands for the default of the model or the program."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     paths: Annotated[
@@ -133,7 +133,7 @@ class RunRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class VerifyRequest:
-    """What `paraflex verify` is asked for."""
+    """Options of `paraflex verify`."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     path: PathOption = None
@@ -167,7 +167,7 @@ class VerifyRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class CompareMethodsRequest:
-    """What `paraflex compare-methods` is asked for."""
+    """Options of `paraflex compare-methods`."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
     path: PathOption = None

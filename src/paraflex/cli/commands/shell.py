@@ -1,6 +1,6 @@
-"""The commands that a shell sees: what each is asked for, what it says of itself, and what does its work.
+"""List of the commands that the shell sees: request, help, and the function that does the work of each.
 
-That is imported only when the command is called.
+The module of the function is imported only when the command is called.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from paraflex.cli.commands.runs import CompareMethodsRequest, RunRequest, Verify
 from paraflex.cli.commands.studies import IndicesRequest, SearchRequest, SensitivityRequest, SweepRequest
 from paraflex.cli.signals import exit_code, is_taken, raised
 
-# What says how to go on with a study of many runs, and what with other commands.
+# Messages after an interruption, for studies of many runs and for other commands.
 _GOES_ON = "interrupted; what is done is kept, and the same command goes on from there"
 _BEGINS = "interrupted; the same command begins anew"
 
 
 class ListedCommand(NamedTuple):
-    """A command: its name, its request, the module of `paraflex.cli` and the function there, and its help.
+    """Entry of a command: name, request, "module.function" in `paraflex.cli`, and help.
 
-    The name of a command in a group follows that of the group.
+    The name of a command in a group follows that of the group: "control compare".
     """
 
     name: str
@@ -45,14 +45,14 @@ class ListedCommand(NamedTuple):
     help: str
 
     def answer(self, request: Any) -> int | None:
-        """Do what is asked for; the exit code."""
+        """Carry out a request; return the exit code."""
         module, _, function = self.function.partition(".")
         do = getattr(import_module(f"paraflex.cli.{module}"), function)
         try:
             with raised(), _outside(request):
                 return do(request)
         except BaseException as error:
-            # A library that is interrupted may make an error of its own of it.
+            # An interrupted library may raise an error of its own instead.
             if not isinstance(error, KeyboardInterrupt) and not is_taken():
                 raise
             typer.echo(_GOES_ON if self.request in _STUDIES else _BEGINS, err=True)
@@ -60,7 +60,7 @@ class ListedCommand(NamedTuple):
 
 
 def _outside(request: Any) -> AbstractContextManager[None]:
-    """Permission for models to name files outside their folders, if the request gives it."""
+    """Return a context in which models may name files outside their folders, if the request allows it."""
     if not any(getattr(each, "allow_outside", False) for each in (request, getattr(request, "model", None))):
         return nullcontext()
     from paraflex.files import allowing_outside
@@ -68,9 +68,9 @@ def _outside(request: Any) -> AbstractContextManager[None]:
     return allowing_outside()
 
 
-# Groups of commands by name, and what they are about.
+# Groups of commands by name, with their help.
 GROUPS = {"control": "Sampled controllers of a model."}
-# They keep every run.
+# Requests of studies that store every run, so that they can be continued.
 _STUDIES = (SweepRequest, SearchRequest, IndicesRequest)
 # In the order of `paraflex --help`.
 COMMANDS = (

@@ -1,4 +1,4 @@
-"""Requests for studies of many runs."""
+"""Requests of commands for studies of many runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from paraflex.cli.commands.options import (
 
 @dataclass(frozen=True, kw_only=True)
 class StudyRequest:
-    """What requests of study files have in common."""
+    """Options common to the commands on study files."""
 
     study: StudyArgument
     output: OutputOption = None
@@ -29,13 +29,13 @@ class StudyRequest:
 
     @property
     def folder(self) -> Path:
-        """Folder of the results: the one given, else results/ and the name of the study's file."""
+        """Results folder: the one given, else results/ and the name of the study's file without suffix."""
         return Path("results") / Path(self.study).stem if self.output is None else Path(self.output)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensitivityRequest(StudyRequest):
-    """What `paraflex sensitivity` is asked for."""
+    """Options of `paraflex sensitivity`."""
 
     study: Annotated[str, Argument(metavar="STUDY.toml", help="What is run, and by what it is differentiated.")]
     at: Annotated[
@@ -51,7 +51,7 @@ class SensitivityRequest(StudyRequest):
 
 @dataclass(frozen=True, kw_only=True)
 class SweepRequest(StudyRequest):
-    """What `paraflex sweep` is asked for."""
+    """Options of `paraflex sweep`."""
 
     study: Annotated[str, Argument(metavar="STUDY.toml", help="What varies, what is run, what is kept.")]
     workers: WorkersChoice = field(default_factory=WorkersChoice)
@@ -62,7 +62,7 @@ class SweepRequest(StudyRequest):
 
 @dataclass(frozen=True, kw_only=True)
 class SearchRequest(StudyRequest):
-    """What a command that looks for a design is asked for."""
+    """Options of the commands that search for a design."""
 
     workers: WorkersChoice = field(default_factory=WorkersChoice)
     json: Json = False
@@ -70,7 +70,7 @@ class SearchRequest(StudyRequest):
 
 @dataclass(frozen=True, kw_only=True)
 class IndicesRequest(StudyRequest):
-    """What `paraflex indices` is asked for."""
+    """Options of `paraflex indices`."""
 
     metrics: Annotated[
         list[str], Option("--metric", metavar="NAME", help="A metric; repeatable. Default: the study's.")
