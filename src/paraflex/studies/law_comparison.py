@@ -136,7 +136,7 @@ def _plain_cell(cell: xr.Dataset, metrics: Sequence[str]) -> dict[str, Any]:
 
 
 def unit_shown(data: xr.Dataset, metric: str) -> DisplayUnit:
-    """Return the unit in which tables show a metric: millimetres for lengths, per cent for shares."""
+    """Return the unit in which tables show a metric: mm and mm/s for lengths and speeds, % for shares."""
     unit = data[metric].attrs["units"]
     return _SHARE if metric.endswith("_share") else _UNITS.get(unit, printed_unit(unit))
 

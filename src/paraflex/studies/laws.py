@@ -164,7 +164,8 @@ def laws_of(model: Model, names: Sequence[str] = ()) -> dict[str, tuple[Controll
     Raises
     ------
     InputError
-        Unknown controller, or sample periods that are not multiples of the shortest one.
+        Unknown controller, sample periods that are not multiples of the shortest one, or two laws that each give the
+        whole torque.
     """
     together = [_AND.join(model.study.controllers)] if len(model.study.controllers) > 1 else []
     wanted = [name for name in names or [*model.controllers, *together] if name != NONE]
