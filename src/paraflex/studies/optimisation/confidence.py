@@ -16,8 +16,8 @@ from paraflex.studies.optimisation.fit import residuals
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.study import DesignStudy
 
-# Condition number of the Jacobian, with parameters as fractions of their ranges, above which its weakest direction counts
-# as undetermined.
+# Condition number of the Jacobian, with parameters as fractions of their ranges, above which its weakest direction is
+# undetermined.
 ILL_CONDITIONED = 1e3
 # Largest accepted relative difference between a change of the residuals and the prediction by the Jacobian.
 _AGREES = 0.5

@@ -30,7 +30,7 @@ def root_mean_square(targets: Sequence[Target], design: Evaluated) -> float:
 
 
 def closest(targets: Sequence[Target], designs: Sequence[Evaluated]) -> Evaluated | None:
-    """Return the complete design with the smallest residuals, the earliest if several are equal; None if there is none."""
+    """Return the complete design with the smallest residuals, the earliest of equal ones; None if there is none."""
     complete = [design for design in designs if design.complete]
     return min(complete, key=lambda each: (root_mean_square(targets, each), each.number), default=None)
 
@@ -40,8 +40,7 @@ def fit(
 ) -> str:
     """Minimise the residuals from a start, and return the reason of termination as text.
 
-    A trial design that does not run has infinite residuals, to which SciPy's trust-region method responds with a shorter
-    step.
+    A trial design that does not run has infinite residuals, and SciPy's trust-region method then shortens the step.
 
     Raises
     ------

@@ -63,7 +63,7 @@ class IdentificationResult(SearchResult):
         Confidence intervals of the parameters; None if the search ended before the derivatives at the best design were
         computed.
     derivatives : str
-        Kind of derivatives: "exact", or "differences" with the reason.
+        Kind of derivatives: "exact" or "differences", with the reason for differences; empty if the search ended early.
     """
 
     kind: ClassVar[str] = "identification"
