@@ -1,6 +1,6 @@
 """Parameters of a model file and expressions of them, such as "l1 - la", "30 deg" or "a * sin(w * t)".
 
-No code is executed. A unit stands directly behind a number; a name anywhere else is a parameter, a function or the time.
+No code is executed. A unit stands directly behind a number; any other name is a parameter, a function or the time.
 """
 
 from __future__ import annotations
