@@ -173,7 +173,7 @@ class Model(CheckedFields):
 
     @checked_arguments()
     def driven_for(self, path: Path) -> float:
-        """Return how long the motors drive along a path [s]: the duration of the path plus that of the study's shaper."""
+        """Return the time during which the motors drive [s]: the duration of a path plus that of the study's shaper."""
         return path.duration + (0.0 if self.study.shaper is None else self.study.shaper.duration)
 
     @checked_arguments()

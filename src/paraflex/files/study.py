@@ -117,7 +117,7 @@ class StudyDefaults:
 
 
 def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
-    """Check that a study refers to existing members of the mechanism and existing paths, and that its numbers are valid.
+    """Check that a study refers to existing paths and members of the mechanism, and that its numbers are valid.
 
     Raises
     ------
