@@ -1,4 +1,4 @@
-"""Models as TOML files: read, validated, turned into mechanism, paths and study."""
+"""Reading, validation and writing of TOML model files, which describe a mechanism, its paths and a study."""
 
 from paraflex.files.generators import generator_names as generator_names
 from paraflex.files.laws import ExpressionLaw as ExpressionLaw

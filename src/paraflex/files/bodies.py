@@ -1,4 +1,4 @@
-"""Bodies from their tables."""
+"""Construction of bodies from their tables in a model file."""
 
 from __future__ import annotations
 
@@ -44,12 +44,21 @@ from paraflex.mechanism.sections import SHAPES
 
 
 def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | ModalTable, table: ModelTable) -> Body:
-    """The body of that name from its table.
+    """Build a body from its table.
+
+    Parameters
+    ----------
+    name : str
+        Name of the body.
+    body : BeamTable, RigidTable, AssumedModesTable or ModalTable
+        Table of the body.
+    table : ModelTable
+        Whole model file, with sections, materials and lumps.
 
     Raises
     ------
     InputError
-        A section, material or lump that the file does not have, or numbers that cannot be.
+        Section, material or lump missing from the file, or invalid numbers.
     """
     if isinstance(body, RigidTable):
         return RigidBody(name, **_given(body))
@@ -90,12 +99,12 @@ def _section(body: str, name: str, table: ModelTable) -> Section:
 
 
 def read_section(name: str, table: SectionTable) -> Section:
-    """A section from its table.
+    """Build a cross-section from its table.
 
     Raises
     ------
     InputError
-        A field that sections of its shape do not have, or one that they need, or numbers that cannot be.
+        Field that a section of this shape does not have, missing required field, or invalid numbers.
     """
     given = {key: value for key, value in table if value is not None}
     kind = given.pop("shape", None)
@@ -126,12 +135,12 @@ def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:
 def _assumed_modes_beam(
     name: str, table: AssumedModesTable, section: Section, material: Material, lumps: tuple[LumpedMass, ...]
 ) -> AssumedModesBeam:
-    """A bar of assumed modes: its sines first, then its polynomials.
+    """Build a beam with assumed modes; the sine functions come first, then the polynomials.
 
     Raises
     ------
     InputError
-        A negative number of sines.
+        Negative number of sines, or more than the limit.
     """
     return AssumedModesBeam(
         name=name,
@@ -149,17 +158,17 @@ def _assumed_modes_beam(
 
 
 def _given(table: RigidTable | ModalTable) -> dict[str, Any]:
-    """The fields of a table without its type."""
+    """Return the fields of a table without its type."""
     return {key: value for key, value in table if key != "type"}
 
 
 def _damping(table: DampingTable | None, name: str) -> Damping | None:
-    """Structural damping of a body of that name.
+    """Build the structural damping of a body, whose name appears in errors.
 
     Raises
     ------
     InputError
-        Two kinds at once, or a loss factor without its frequency.
+        Two kinds of damping at once, or a loss factor without its frequency.
     """
     if table is None:
         return None

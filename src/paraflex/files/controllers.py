@@ -1,4 +1,4 @@
-"""Controllers of a model file from their tables, and their tables from them."""
+"""Construction of controllers from their tables in a model file, and of tables from controllers."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from paraflex.mechanism.loads import InTime
 
 
 def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, ControllerDescription]:
-    """The controllers of a model file by name.
+    """Build the controllers of a model file, by name.
 
     Raises
     ------
     InputError
-        Unknown sensors or motors, numbers that make no sense.
+        Unknown sensors or motors, or invalid numbers.
     """
     parameters, found = evaluate_parameters(table.parameters), {}
     for name, one in table.controller.items():
@@ -47,18 +47,18 @@ def _read(
 
 
 def _reference(sensor: str, given: Any, parameters: Mapping[str, float], duration: float | None) -> InTime:
-    """A reading that is wanted, in the words that torques of motors have."""
+    """Build the reference of a sensor, which is written like the torque of a motor."""
     with renamed(f"reference.{sensor}"):
         return read_components(TorqueTable.model_construct(torque=given), "torque", parameters, duration)[0]
 
 
 def controller_table(one: ControllerDescription) -> dict[str, Any]:
-    """The table of a controller; what is as it is by default is left out.
+    """Build the table of a controller; fields with default values are omitted.
 
     Raises
     ------
     InputError
-        A reference that a file has no words for.
+        Reference that cannot be expressed in a file.
     """
     said = {"type": one.law.kind} | fields_said(one.law) | fields_said(one, "name", "law")
     if isinstance(one.reference, Mapping):

@@ -1,4 +1,4 @@
-"""Dimensions of expressions, as far as the units in them tell: a mass is no length."""
+"""Dimensional analysis of expressions, as far as their units determine dimensions."""
 
 from __future__ import annotations
 
@@ -9,34 +9,35 @@ from typing import Any
 from paraflex.files.expressions import CONSTANTS, ExpressionError, expressed_in, tree_of
 from paraflex.units import ANGLE, PLAIN, Dimension, spelt, unit_named
 
-# That of a name; None where it is not known, such as that of the time or of a parameter without a unit.
+# Function from a name to its dimension; None where it is unknown, as for the time or a parameter without a unit.
 _Of = Callable[[str], Dimension | None]
 
 
 def dimension_of(text: str, parameters: Mapping[str, Dimension | None]) -> Dimension | None:
-    """The dimension of an expression that has a value: `PLAIN` of pure numbers, None where it is not known.
+    """Return the dimension of a valid expression: `PLAIN` for pure numbers, None if it is unknown.
 
     Parameters
     ----------
     text : str
+        Expression, which has a value.
     parameters : mapping
-        Of the file, each with its dimension; see `dimensions_of_parameters`.
+        Dimensions of the parameters of the file; see `dimensions_of_parameters`.
 
     Raises
     ------
     ExpressionError
-        A sum of unlike quantities, or a function of one that is no angle.
+        Sum of quantities of different dimensions, or function of a quantity that is not an angle.
     """
     return _dimension(tree_of(text), lambda name: PLAIN if name in CONSTANTS else parameters.get(name))
 
 
 def dimensions_of_parameters(table: Mapping[str, Any]) -> dict[str, Dimension | None]:
-    """The dimension of each parameter of a file that `evaluate_parameters` has found right.
+    """Return the dimension of each parameter of a file whose parameters `evaluate_parameters` accepts.
 
     Raises
     ------
     InputError
-        See `dimension_of`.
+        Inconsistent dimensions; see `dimension_of`.
     """
     found: dict[str, Dimension | None] = {}
 
@@ -77,7 +78,7 @@ def _dimension(node: ast.AST, of: _Of) -> Dimension | None:
 
 
 def _of_sum(one: Dimension | None, other: Dimension | None) -> Dimension | None:
-    """A number without a unit is in SI units, of whatever it is added to."""
+    """Return the dimension of a sum; a number without a unit is in the SI unit of the other summand."""
     if one in (None, PLAIN) or other in (None, PLAIN):
         return next(
             (each for each in (one, other) if each not in (None, PLAIN)), None if None in (one, other) else PLAIN

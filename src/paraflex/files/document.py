@@ -1,4 +1,4 @@
-"""Data as TOML: a text that keeps the comments, the order and the spelling of the file that the data come from."""
+"""TOML output that preserves the comments, order and spelling of the file from which the data come."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from tomlkit.items import Item, Key, Table, Whitespace
 
 from paraflex.files.merge import order_of, same
 
-# What a table holds, in order: members, and without a key comments and blank lines.
+# Content of a table in order: members, and without a key the comments and blank lines.
 _Body = list[tuple[Key | None, Item]]
 
-# Longer rows of lists or tables are written a line each.
+# Lists of lists or tables longer than this number of characters are written with one item per line.
 _LONGEST = 100
 
 
 def document_text(data: Mapping[str, Any], text: str = "") -> str:
-    """Data as TOML, from which `tomllib` reads them again.
+    """Return data as TOML, from which `tomllib` reads the same data.
 
     Parameters
     ----------
     data : mapping
-        Texts, numbers, truth values, and lists and mappings of these.
+        Strings, numbers, booleans, and lists and mappings of these.
     text : str
-        A file that holds other data. What is alike stays as it is written there, comments and all.
+        Text of a file with other data. Parts with equal data are kept as written there, including comments.
     """
     written = _written(data, text)
     found = tomllib.loads(written)
-    # Where a table cannot be changed in place it is written anew, without its comments: where something differs, or is
-    # of another order; of a body's own fields, and of the file's tables, any will do.
+    # A table that could not be changed in place is rewritten without its comments. That is the case if its data or the
+    # order of its members differ. The order of deeper tables, and of the tables of the file, is not compared.
     differing = {
         key
         for key in found.keys() | data.keys()
@@ -51,7 +51,7 @@ def _written(data: Mapping[str, Any], text: str, anew: Collection[str] = ()) -> 
 
 
 def _update(container: Any, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
-    """Change a table of a document that holds old data into one of new data."""
+    """Update a table of a document from old to new data, in place."""
     if isinstance(container, OutOfOrderTableProxy) and list(old) != list(new):
         return  # its parts stand in several places, and only what they hold can be changed
     for key in old:
@@ -84,14 +84,14 @@ def _change(container: Any, key: Any, old: Any, new: Any) -> None:
 
 
 def _has_headers(container: Any) -> bool:
-    """Whether tables in it have a header each."""
+    """Check whether tables inside a container have headers of their own."""
     if isinstance(container, Table):
         return any(isinstance(item, Table) for _, item in container.value.body)
     return isinstance(container, tomlkit.TOMLDocument)
 
 
 def _append(container: Any, key: str, item: Item) -> None:
-    """Add a member behind the last one; comments and blank lines after that belong to what follows."""
+    """Append a member after the last one; trailing comments and blank lines stay behind it, with the next table."""
     if not isinstance(container, Table | tomlkit.TOMLDocument):
         container[key] = item
         return
@@ -101,7 +101,7 @@ def _append(container: Any, key: str, item: Item) -> None:
 
 
 def _take_out(container: Any, key: str) -> None:
-    """Remove a member; comments and blank lines behind a table belong to what follows and stay."""
+    """Remove a member, but keep the comments and blank lines behind a table, which belong to the next one."""
     body = _body(container) if isinstance(container, Table | tomlkit.TOMLDocument) else []
     tails = {
         place: "".join(each.as_string() for _, each in _cut_tail(item))
@@ -114,7 +114,7 @@ def _take_out(container: Any, key: str) -> None:
 
 
 def _cut_tail(container: Table | tomlkit.TOMLDocument) -> _Body:
-    """Take out the comments and blank lines behind the last member."""
+    """Remove and return the comments and blank lines behind the last member."""
     body = _innermost(container)
     size = max((k + 1 for k, (key, _) in enumerate(body) if key is not None), default=0)
     tail = body[size:]
@@ -123,7 +123,7 @@ def _cut_tail(container: Table | tomlkit.TOMLDocument) -> _Body:
 
 
 def _innermost(container: Table | tomlkit.TOMLDocument) -> _Body:
-    """What is written in the last of the tables within it."""
+    """Return the content of the last nested table of a container."""
     body = _body(container)
     while body and isinstance(last := body[-1][1], Table):
         body = last.value.body
@@ -135,7 +135,11 @@ def _body(container: Table | tomlkit.TOMLDocument) -> _Body:
 
 
 def _item(value: Any, *, block: bool) -> Item:
-    """A value; a mapping with a header of its own, as have those in one of mappings alone, or within one line."""
+    """Return a value as a TOML item.
+
+    If `block` is True, a mapping becomes a table with a header, and so do its members if all of them are non-empty
+    mappings. Otherwise a mapping becomes an inline table.
+    """
     if isinstance(value, Mapping):
         inner = block and bool(value) and all(isinstance(each, Mapping) and each for each in value.values())
         table = tomlkit.table(is_super_table=inner) if block else tomlkit.inline_table()

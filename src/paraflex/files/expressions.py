@@ -1,6 +1,6 @@
 """Parameters of a model file and expressions of them, such as "l1 - la", "30 deg" or "a * sin(w * t)".
 
-No code is run. A unit stands directly behind a number; a name anywhere else is a parameter, a function or the time.
+No code is executed. A unit stands directly behind a number; any other name is a parameter, a function or the time.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from paraflex.limits import EXPRESSION_LETTERS, PARAMETER_CHAIN
 from paraflex.units import UNITS, divisors_in, quantities_in, unknown_unit
 
 CONSTANTS = {"pi": math.pi}
-# The name of time in an expression of it.
+# Name of the time in expressions.
 TIME_NAME = "t"
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -31,12 +31,12 @@ _BINARY: dict[type, Callable[[Any, Any], Any]] = {
     ast.Pow: operator.pow,
 }
 _UNARY: dict[type, Callable[[Any], Any]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
-# What others would look for, and motions must not have.
+# Functions that are not smooth: users may expect them, but motions must have derivatives.
 _WITH_KINKS = {"abs", "sign", "min", "max", "floor", "ceil", "round", "step", "heaviside", "mod"}
 
 
 class ExpressionError(ValueError):
-    """What is wrong with an expression, and what to do about it."""
+    """Error in an expression, with a problem and a remedy."""
 
     def __init__(self, problem: str, remedy: str) -> None:
         self.problem = problem
@@ -46,7 +46,7 @@ class ExpressionError(ValueError):
 
 @contextmanager
 def expressed_in(field: str, value: object) -> Iterator[None]:
-    """Context in which what is wrong with an expression is wrong with the value of a field."""
+    """Convert an ExpressionError inside the context to an InputError of a field and its value."""
     try:
         yield
     except ExpressionError as error:
@@ -54,26 +54,42 @@ def expressed_in(field: str, value: object) -> Iterator[None]:
 
 
 def evaluate(text: str, parameters: Mapping[str, float]) -> float:
-    """Value of an expression of numbers, parameters, pi, + - * / **, brackets and the functions of `jets`.
+    """Evaluate an expression of numbers, parameters, pi, + - * / **, brackets and the functions of `jets`.
 
-    Numbers may have units, which `dimensions` checks.
+    Numbers may have units, whose consistency is checked in `dimensions`.
+
+    Parameters
+    ----------
+    text : str
+        Expression.
+    parameters : mapping of str to float
+        Values of the parameters.
 
     Raises
     ------
     ExpressionError
-        It does not parse, has anything else in it, names an unknown parameter, or has no finite value.
+        Syntax error, element that is not allowed, unknown parameter, or value that is not finite.
     """
     _refuse_ambiguous(text, parameters)
     return _finite(_arithmetic(text, lambda name: _look_up(name, parameters)))
 
 
 def evaluate_in_time(text: str, parameters: Mapping[str, float], t: Array) -> Jet:
-    """Value, rate and acceleration at times t of an expression as above in which t is the time [s].
+    """Evaluate an expression of the time t [s], with its first and second derivative.
+
+    Parameters
+    ----------
+    text : str
+        Expression as in `evaluate`, in which t is the time.
+    parameters : mapping of str to float
+        Values of the parameters.
+    t : array
+        Times [s].
 
     Raises
     ------
     ExpressionError
-        As above; or one of the three is no finite number at some of the times, the first of which it names.
+        See `evaluate`; or value or derivative that is not finite, reported with the first time at which this occurs.
     """
     t = np.asarray(t, dtype=float)
     value = _in_time(text, parameters, t)
@@ -89,7 +105,7 @@ def evaluate_in_time(text: str, parameters: Mapping[str, float], t: Array) -> Je
 
 
 def check_in_time(text: str, parameters: Mapping[str, float]) -> None:
-    """Nothing, if a text is an expression of time and parameters; it may be without a value at some times.
+    """Check that a text is an expression of time and parameters; it may have no finite value at some times.
 
     Raises
     ------
@@ -100,22 +116,22 @@ def check_in_time(text: str, parameters: Mapping[str, float]) -> None:
 
 
 def is_constant(text: str) -> bool:
-    """Whether time does not occur in an expression."""
+    """Check whether an expression does not contain the time."""
     return TIME_NAME not in names_in(text)
 
 
 def names_in(text: str) -> set[str]:
-    """What an expression speaks of: parameters, functions, time."""
+    """Return the names in an expression: parameters, functions, time."""
     return {node.id for node in ast.walk(tree_of(text)) if isinstance(node, ast.Name)}
 
 
 def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
-    """Values of the parameters of a file; each is a number or an expression of others.
+    """Evaluate the parameters of a file, each of which is a number or an expression of others.
 
     Raises
     ------
     InputError
-        One that is neither, is not named like a variable, or depends on itself.
+        Parameter that is neither, has an invalid name, has no finite value, or depends on itself.
     """
     values: dict[str, float] = {}
 
@@ -164,7 +180,7 @@ def _in_time(text: str, parameters: Mapping[str, float], t: Array) -> Any:
     def value_of(name: str) -> Any:
         return Jet.time(t) if name == TIME_NAME else _look_up(name, parameters)
 
-    # What is not finite has no warning but is reported with its time.
+    # NumPy's warnings are suppressed, because values that are not finite are reported later with their time.
     with np.errstate(all="ignore"):
         return _arithmetic(text, value_of)
 
@@ -183,12 +199,12 @@ def _float(number: float) -> float:
 
 
 def tree_of(text: str) -> ast.AST:
-    """The syntax tree of an expression; 80 mm is 0.08 @ "mm" in it.
+    """Parse an expression into a syntax tree, in which 80 mm is 0.08 @ "mm".
 
     Raises
     ------
     ExpressionError
-        It does not parse.
+        Syntax error, unknown unit, or expression that is too long.
     """
     if len(text) > EXPRESSION_LETTERS:
         remedy = f"at most {EXPRESSION_LETTERS} letters; name its parts as parameters"
@@ -206,7 +222,7 @@ def tree_of(text: str) -> ast.AST:
 
 
 def _without_units(text: str) -> str:
-    """An expression with its quantities as products that Python can parse."""
+    """Rewrite the quantities of an expression as products of number and unit that Python can parse."""
     if "@" in text:
         raise SyntaxError
     out, end = "", 0

@@ -1,4 +1,4 @@
-"""Fields of a file by their places: what the schema says of each, the units that it takes, and whether it has one."""
+"""Fields of a file: their schema entries, the units that they accept, and the check of units in data."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from paraflex.files.expressions import ExpressionError, evaluate, expressed_in, 
 from paraflex.mechanism import JOINT_KINDS
 from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, quantities_in, spelt, unit_named
 
-# A place in parsed TOML: keys of tables and indices of lists.
+# Path to a value in parsed TOML: keys of tables and indices of lists.
 Place = tuple[str | int, ...]
 
 _SI = f"(?:{'|'.join(map(re.escape, FIELD_UNITS))})"
-# "in m", "in rad/s or m/s", "in s and rad or m", "in s, N and N"; the longest unit that fits stands first in the list.
+# Matches "in m", "in rad/s or m/s", "in s and rad or m", "in s, N and N"; longer units come first among alternatives.
 _IN_UNITS = re.compile(rf"\bin ({_SI}(?:(?:,|,? (?:or|and)) {_SI})*)(?=[\s,.)]|$)")
 _AND = re.compile(r" and |, (?!or\b)")
-# Tables of numbers by names of the user's, and of values whose fields are those of another file.
+# Tables of numbers by user-defined names, and tables of values whose fields belong to another file.
 _OF_ANY_UNIT = ("parameters", "set")
 _WHERE_IT_TURNS = {slides: turns for turns, slides in WHERE_IT_SLIDES.items()}
 
 
 class FileField(NamedTuple):
-    """What a schema says of a field.
+    """Schema entry of a field.
 
     Attributes
     ----------
     owner : type of BaseModel, or None
-        The table it is in.
+        Table that contains the field.
     description : str
+        Description of the field.
     annotation : Any
-        Its type; None for a field that the table does not have.
+        Type of the field; None for a field that the table does not have.
     """
 
     owner: type[BaseModel] | None
@@ -45,7 +46,7 @@ class FileField(NamedTuple):
 
 
 def field_at(schema: type[BaseModel], data: Any, place: Sequence[Any]) -> FileField:
-    """The field at a place, found by walking the annotations."""
+    """Find the field at a place by following the annotations of the schema."""
     model: Any = schema
     owner: type[BaseModel] | None = schema
     description = "a value"
@@ -67,14 +68,16 @@ def field_at(schema: type[BaseModel], data: Any, place: Sequence[Any]) -> FileFi
 
 
 def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> tuple[str, ...] | None:
-    """Units that the number at a place may have: none for a plain number; None where any may stand there.
+    """Return the units that the number at a place may have: empty for a plain number, None if any unit is allowed.
 
     Parameters
     ----------
     schema : type of BaseModel
+        Schema of the file.
     data : mapping
-        As parsed: it says of which kind a table is, and whether the joint that it names turns or slides.
+        Parsed data, which determine the kind of a table and whether the joint named in it rotates or slides.
     place : tuple
+        Keys and indices that lead to the number.
     """
     found = field_at(schema, data, place)
     if place[0] in _OF_ANY_UNIT or "unit of" in found.description:
@@ -90,12 +93,12 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
 
 
 def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
-    """Check that units in data that fit a schema are those of the fields.
+    """Check the units in data that fit a schema against those of the fields.
 
     Raises
     ------
     InputError
-        One that is not, or a sum of unlike quantities.
+        Unit of another dimension, or sum of quantities of different dimensions.
     """
     table = data.get("parameters", {})
     parameters = dimensions_of_parameters(table if isinstance(table, dict) else {})
@@ -116,12 +119,23 @@ def check_unit(
     field: str,
     description: str,
 ) -> None:
-    """Check the unit of an expression against those of its field; see `units_at`.
+    """Check the unit of an expression against those of its field.
+
+    Parameters
+    ----------
+    text : str
+        Expression.
+    parameters : mapping
+        Dimensions of the parameters of the file.
+    units : tuple of str, or None
+        Accepted units; see `units_at`.
+    field, description : str
+        Name and description of the field, for errors.
 
     Raises
     ------
     InputError
-        Of another dimension, or a sum of unlike quantities.
+        Expression of another dimension, or sum of quantities of different dimensions.
     """
     with expressed_in(field, text):
         given = dimension_of(text, parameters)
@@ -131,19 +145,19 @@ def check_unit(
     remedy = f"give {description}"
     if named := sorted(names_in(text) & parameters.keys()):
         remedy += f"; it comes of {', '.join(f'parameters.{name}' for name in named)}"
-    # A period from a speed, 2 * pi / n: an angle counts.
+    # The dimensions differ in the angle only, as for a period computed from a speed, 2 * pi / n.
     if any(given[:3] == unit_named(unit).dimension[:3] for unit in units or ()):
         remedy += '; an angle is a quantity of its own: of a speed n in rpm the period is "1 rev / n"'
     raise InputError(f"a quantity in {spelt(given)} where {asked} is asked for", field=field, value=text, remedy=remedy)
 
 
 def number_in(text: str, unit: str) -> float:
-    """The number of a text in an SI unit, where the text has that or another one of its dimension, or none.
+    """Return the number in a text in an SI unit; the text has no unit, or one of the same dimension.
 
     Raises
     ------
     InputError
-        It is no number, or of another dimension.
+        Text that is not a number, or has another dimension.
     """
     try:
         number = evaluate(text, {})
@@ -154,7 +168,7 @@ def number_in(text: str, unit: str) -> float:
 
 
 def leaves(data: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
-    """Every value of data that is no table or list, and its place."""
+    """Yield the place and the value of every entry of data that is not a table or a list."""
     if isinstance(data, (dict, list)):
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
             yield from leaves(value, (*place, key))
@@ -163,7 +177,7 @@ def leaves(data: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
 
 
 def _words_of(annotation: Any) -> Iterator[Any]:
-    """Words that may stand where a number may."""
+    """Yield the words that an annotation accepts in place of a number."""
     arguments = typing.get_args(annotation)
     if typing.get_origin(annotation) is typing.Literal:
         yield from arguments
@@ -172,12 +186,12 @@ def _words_of(annotation: Any) -> Iterator[Any]:
 
 
 def takes_number(annotation: Any) -> bool:
-    """Whether what is annotated may be a number with an expression for it, or a function of time."""
+    """Check whether an annotation accepts a number or an expression for it, or a function of time."""
     return annotation in (float, Any) or any(map(takes_number, typing.get_args(annotation)))
 
 
 def _units_in(description: str, row: Sequence[Any] | None, key: str | int) -> tuple[str, ...]:
-    """Units that a description names; of a number in a row those of its place in it."""
+    """Return the units named in a description; for a number in a row, the units of its position in the row."""
     found = [(description[: match.start()], match[1]) for match in _IN_UNITS.finditer(description)]
     if row is not None and isinstance(key, int):
         for before, units in found:
@@ -193,14 +207,14 @@ def _alternatives(units: str) -> tuple[str, ...]:
 
 
 def _row(data: Any, place: Place) -> Sequence[Any] | None:
-    """The list that holds the number at a place."""
+    """Return the list that contains the number at a place; None if it is not in a list."""
     for key in place[:-1]:
         data = _below(data, key)
     return data if isinstance(data, list) else None
 
 
 def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
-    """Whether the joint slides that a number is about; None where there is none, or the field's name says it."""
+    """Check whether the joint to which a number refers slides; None without a joint or if the field name decides."""
     if len(place) < 3 or {"angle", "displacement"} & set(place):
         return None
     table, owner, key = place[:3]
@@ -212,7 +226,10 @@ def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
 
 
 def _ratio_units(data: Mapping[str, Any], place: Place) -> tuple[str, ...]:
-    """Units of the second joint's coordinate by the first's: of a rack the radius of its pinion."""
+    """Return the units of a gear ratio, the second joint's coordinate per coordinate of the first.
+
+    For a rack and pinion the ratio is the radius of the pinion.
+    """
     joints = _below(_below(_below(data, place[0]), place[1]), "joints")
     slide = [bool(_joint_slides(data, name)) for name in joints] if isinstance(joints, list) else []
     if slide == [False, True]:
@@ -221,7 +238,7 @@ def _ratio_units(data: Mapping[str, Any], place: Place) -> tuple[str, ...]:
 
 
 def _joint_slides(data: Mapping[str, Any], name: Any) -> bool | None:
-    """Whether a joint slides; None where there is none of that name."""
+    """Check whether a joint slides; None if there is no joint of that name."""
     joint = _below(_below(data, "joint"), name) if isinstance(name, str) else None
     if joint is None:
         return None
@@ -230,18 +247,18 @@ def _joint_slides(data: Mapping[str, Any], name: Any) -> bool | None:
 
 
 def _moves_straight(data: Mapping[str, Any], coordinate: str) -> bool | None:
-    """Whether a coordinate of a joint or point is a length; None of an unknown name."""
+    """Check whether a coordinate of a joint or point is a length; None for an unknown name."""
     point, _, axis = coordinate.rpartition(".")
     return {"x": True, "y": True, "angle": False}.get(axis) if point else _joint_slides(data, coordinate)
 
 
 def is_table(annotation: Any) -> bool:
-    """Whether an annotation is that of a table with fields of its own."""
+    """Check whether an annotation is a table with fields of its own."""
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
 def has_tables(annotation: Any) -> bool:
-    """Whether there are such tables within an annotation."""
+    """Check whether an annotation contains tables with fields of their own."""
     return is_table(annotation) or any(map(has_tables, typing.get_args(annotation)))
 
 
@@ -252,13 +269,13 @@ def _below(data: Any, key: Any) -> Any:
 
 
 def _inner(annotation: Any) -> Any:
-    """What a dict or list annotation holds."""
+    """Return the type of the items of a dict or list annotation; other annotations unchanged."""
     arguments = typing.get_args(annotation)
     return arguments[-1] if typing.get_origin(annotation) in (dict, list) and arguments else annotation
 
 
 def _resolve(annotation: Any, data: Any) -> Any:
-    """Strip Annotated, and of a union take the model whose `type` or fields the data has."""
+    """Strip Annotated, and select the model of a union whose `type` or fields match the data."""
     while typing.get_origin(annotation) is typing.Annotated:
         annotation = typing.get_args(annotation)[0]
     members = [_resolve(member, data) for member in typing.get_args(annotation)]

@@ -1,4 +1,4 @@
-"""Library mechanisms of any size: "four_bars:3" names a model of three four-bars in a row."""
+"""Library mechanisms of variable size: "four_bars:3" names a model of three four-bars in a row."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism, RigidBody, chain_of_segments, four_bars_in_a_row
 
-# A hundred thousand bodies take minutes to read alone; more are a slip of the finger.
+# Reading a hundred thousand bodies alone takes minutes; a larger number is taken for a typing error.
 _LARGEST_NUMBER = 100_000
 
 
 @dataclass(frozen=True)
 class _Generator:
-    """What makes a mechanism of a number, what the number counts, and what its file says besides."""
+    """Generator of a mechanism from a number, with the name of what is counted and further text of the file."""
 
     make: Callable[[int], Mechanism]
     counts: str
@@ -43,22 +43,22 @@ _GENERATORS: Mapping[str, _Generator] = {
 
 
 def generator_names() -> list[str]:
-    """Names that want a number behind a colon in place of N."""
+    """Return the names of generated mechanisms; N stands for a number."""
     return [f"{name}:N" for name in _GENERATORS]
 
 
 def is_generated(name: str) -> bool:
-    """Whether a name is one of these, with a number or without."""
+    """Check whether a name is that of a generated mechanism, with or without a number."""
     return name.partition(":")[0] in _GENERATORS
 
 
 def generated_text(name: str) -> str:
-    """The model file of a name such as "four_bars:3".
+    """Return the text of the model file of a generated mechanism, such as "four_bars:3".
 
     Raises
     ------
     InputError
-        No number, or one that makes no sense.
+        Missing or invalid number.
     """
     base, _, number = name.partition(":")
     generator = _GENERATORS[base]
@@ -73,7 +73,7 @@ def generated_text(name: str) -> str:
 
 
 def _lines(generator: _Generator, mechanism: Mechanism) -> Iterator[str]:
-    """A mechanism of rigid bodies, revolute joints and torsional springs, as these generators make them."""
+    """Yield the lines of the file of a mechanism of rigid bodies, revolute joints and torsional springs."""
     yield generator.heading
     yield f'\nname = "{mechanism.name}"'
     yield f'description = "{mechanism.description}"'

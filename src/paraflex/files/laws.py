@@ -1,4 +1,4 @@
-"""Laws in time as a file gives them: a number or constant speed, an expression of t, pieces of them, or a table."""
+"""Reading and writing of time profiles in files: constants, constant speeds, expressions of t, pieces, and tables."""
 
 from __future__ import annotations
 
@@ -23,26 +23,29 @@ from paraflex.mechanism import AngleLaw, ConstantSpeed, PiecewiseLaw, TabulatedL
 from paraflex.mechanism.laws import Interpolation, Values
 from paraflex.mechanism.loads import InTime
 
-# Instants at which a law is tried when it is read.
+# Number of times at which a profile is evaluated as a check when it is read.
 _TRIALS = 257
 
 
 @dataclass(frozen=True)
 class ExpressionLaw:
-    """An expression of the time t and of parameters, with its exact derivatives.
+    """Profile given by an expression of the time t and of parameters, with exact derivatives.
 
     Attributes
     ----------
     text : str
+        Expression.
     parameters : mapping of str to float
-        Those that the text does not name are left out.
+        Values of the parameters; those that do not occur in the text are dropped.
     field : str
-        Where it stands, for errors.
+        Field of the file, for errors.
+    knots : tuple of float
+        Times at which derivatives jump [s]; none by default.
 
     Raises
     ------
     InputError
-        It is no expression, or names a parameter that is not given.
+        Invalid expression, or expression with an unknown parameter.
     """
 
     text: str
@@ -58,12 +61,12 @@ class ExpressionLaw:
         object.__setattr__(self, "parameters", used)
 
     def evaluate(self, t: Array) -> Values:
-        """Value, rate and acceleration at times t.
+        """Evaluate value, rate and acceleration at times t [s].
 
         Raises
         ------
         InputError
-            One of them is no finite number at some time.
+            Value or derivative that is not finite at some time.
         """
         with expressed_in(self.field, self.text):
             jet = evaluate_in_time(self.text, self.parameters, t)
@@ -71,13 +74,22 @@ class ExpressionLaw:
 
 
 def read_law(entry: PrescribedTable, parameters: Mapping[str, float], duration: float | None) -> AngleLaw:
-    """The law of a [prescribed.NAME] table; tried where it will be used, as far as the study says.
+    """Read the profile of a [prescribed.NAME] table, and evaluate it over the duration of the study as a check.
+
+    Parameters
+    ----------
+    entry : PrescribedTable
+        Table of the prescribed motion.
+    parameters : mapping of str to float
+        Values of the parameters of the file.
+    duration : float or None
+        Duration of the study [s]; if None, the profile is evaluated at t = 0 only.
 
     Raises
     ------
     InputError
-        Not exactly one way of saying it, a speed beside anything but a number, pieces that do not meet, an expression
-        without finite derivatives, or a table that is none or does not cover the study.
+        Profile given in two ways, speed together with anything but a number, pieces that do not connect, expression
+        without finite derivatives, or table that is invalid or does not cover the study.
     """
     given = [name for name in ("angle", "displacement", "pieces", "table") if getattr(entry, name) is not None]
     if len(given) > 1:
@@ -97,24 +109,24 @@ def read_law(entry: PrescribedTable, parameters: Mapping[str, float], duration: 
 
 
 def _try(law: AngleLaw, duration: float | None) -> None:
-    """Evaluate a law where it will be used, as far as the study says."""
-    # A duration that makes no sense is refused with the study.
+    """Evaluate a profile over the duration of the study, or at t = 0 if it has none."""
+    # An invalid duration is reported when the study is checked.
     law.evaluate(np.linspace(0.0, duration, _TRIALS) if duration is not None and duration > 0.0 else np.zeros(1))
 
 
 def quantities(entry: PrescribedTable) -> set[str]:
-    """Which of "angle" and "displacement" a [prescribed.NAME] table speaks of."""
+    """Return which of "angle" and "displacement" occur in a [prescribed.NAME] table."""
     said: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
     return {name for table in said for name in ("angle", "displacement") if getattr(table, name) is not None}
 
 
 def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
-    """What a [prescribed.NAME] table says of a law of an "angle" or a "displacement".
+    """Build the fields of a [prescribed.NAME] table for the profile of an "angle" or a "displacement".
 
     Raises
     ------
     InputError
-        A law that a file has no words for.
+        Profile that cannot be expressed in a file.
     """
     match law:
         case ConstantSpeed(angle=angle, speed=speed, knots=()):
@@ -133,21 +145,24 @@ def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
 def read_components(
     entry: Any, quantity: str, parameters: Mapping[str, float], duration: float | None
 ) -> tuple[InTime, ...]:
-    """Components of a "force", or of a "torque" the one, that a table gives; laws are tried as by `read_law`.
+    """Read the two components of a "force", or the one of a "torque", and check profiles as `read_law` does.
 
     Parameters
     ----------
     entry : table
-        With a field of the quantity's name, `pieces` and `table`, of which one is given, and a table's `interpolation`.
+        Table with a field of the quantity's name, `pieces` and `table`, exactly one of which is given, and the
+        `interpolation` of a table.
     quantity : str
+        "force" or "torque".
     parameters : mapping of str to float
+        Values of the parameters of the file.
     duration : float or None
-        Of the study [s].
+        Duration of the study [s].
 
     Raises
     ------
     InputError
-        See `read_law`.
+        Invalid profile; see `read_law`.
     """
     given = [name for name in (quantity, "pieces", "table") if getattr(entry, name) is not None]
     if len(given) != 1:
@@ -181,7 +196,7 @@ def read_components(
 
 
 def _functions(given: Any, parameters: Mapping[str, float], field: str) -> tuple[InTime, ...]:
-    """Numbers and expressions of one quantity; those of numbers and parameters alone are numbers."""
+    """Read the numbers and expressions of one quantity; expressions that do not contain the time become numbers."""
     listed = isinstance(given, list)
     laws = [
         _expression(each, parameters, f"{field}.{k}" if listed else field)
@@ -191,7 +206,7 @@ def _functions(given: Any, parameters: Mapping[str, float], field: str) -> tuple
 
 
 def _joined(laws: Sequence[InTime], ends: list[float]) -> InTime:
-    """One law of pieces; a number where all are the same."""
+    """Join pieces to one profile, or to a number if all pieces are the same number."""
     first = laws[0]
     if not isinstance(first, AngleLaw) and all(law == first for law in laws):
         return first
@@ -201,12 +216,12 @@ def _joined(laws: Sequence[InTime], ends: list[float]) -> InTime:
 
 
 def components_table(components: Sequence[InTime], quantity: str) -> dict[str, Any]:
-    """What a table says of the components of a "force", or of a "torque".
+    """Build the fields of a table for the components of a "force" or a "torque".
 
     Raises
     ------
     InputError
-        Laws that a file has no words for, or components whose pieces or times differ.
+        Profiles that cannot be expressed in a file, or components with different pieces or times.
     """
 
     def said(values: Sequence[Any]) -> Any:
@@ -241,12 +256,12 @@ def components_table(components: Sequence[InTime], quantity: str) -> dict[str, A
 
 
 def law_parameters(laws: Iterable[tuple[str, AngleLaw]]) -> dict[str, float]:
-    """The parameters that laws, each with its place in a file, speak of; each has one value.
+    """Collect the parameters of profiles, each given with its field in a file.
 
     Raises
     ------
     InputError
-        One of two values.
+        Parameter with different values in two profiles.
     """
     found: dict[str, float] = {}
     for place, whole in laws:
@@ -298,7 +313,7 @@ def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
 
 
 def _place(table: PrescribedTable | PieceTable) -> tuple[str, Any]:
-    """Name and law of the angle or displacement that a table gives; None of one that gives neither."""
+    """Return the field name and the value of the angle or displacement in a table; the value is None without either."""
     return ("angle", table.angle) if table.displacement is None else ("displacement", table.displacement)
 
 
@@ -319,7 +334,7 @@ def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> Piecew
 
 
 def _ends(pieces: Sequence[Any]) -> list[float]:
-    """Where pieces end."""
+    """Return the end times of all pieces but the last [s]."""
     for number, piece in enumerate(pieces):
         if (piece.until is None) != (number == len(pieces) - 1):
             raise InputError(

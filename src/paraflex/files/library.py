@@ -1,4 +1,4 @@
-"""The mechanisms that come with the package."""
+"""Library of mechanisms that come with the package."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ def _folder() -> Traversable:
 
 
 def library_names() -> list[str]:
-    """Names of the mechanisms that `load` knows without a file."""
+    """Return the names of the library mechanisms, which `load` reads without a file."""
     return sorted(entry.name.removesuffix(".toml") for entry in _folder().iterdir() if entry.name.endswith(".toml"))
 
 
 @checked_arguments()
 def library_file(name: str) -> Traversable:
-    """The file of a library mechanism, to read or copy."""
+    """Return the file of a library mechanism, to read or copy."""
     return _folder() / f"{name}.toml"
 
 
 @checked_arguments()
 def library_text(name: str) -> str:
-    """What a library mechanism's file says, of those made by a number too ("four_bars:3").
+    """Return the text of the file of a library mechanism, including generated ones ("four_bars:3").
 
     Raises
     ------
     InputError
-        Unknown name, or a number that makes no sense.
+        Unknown name, or invalid number of a generated mechanism.
     """
     if is_generated(name):
         return generated_text(name)

@@ -1,4 +1,4 @@
-"""The mechanism of a model file from its tables, and its paths from theirs."""
+"""Construction of mechanisms and paths from the tables of a model file."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from paraflex.mechanism import (
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
 
-# What paths are called in files.
+# Path classes by the name of their type in files.
 PATHS: dict[str, Callable[..., Path]] = {
     "polygon": Polygon,
     "line": Line,
@@ -57,12 +57,12 @@ PATHS: dict[str, Callable[..., Path]] = {
 
 
 def read_mechanism(table: ModelTable) -> Mechanism:
-    """The mechanism of a model file.
+    """Build the mechanism of a model file.
 
     Raises
     ------
     InputError
-        Anything in it that does not fit together.
+        Inconsistent or invalid entry.
     """
     for name, section in table.section.items():
         read_section(name, section)
@@ -92,7 +92,7 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
     a, b = (PointRef.parse(point, f"joint.{name}") for point in points)
     if isinstance(entry, list):
         return RevoluteJoint(name, a, b)
-    # A field of another kind of joint would be read and not obeyed.
+    # Fields of another kind of joint are rejected, because they would have no effect.
     kind = JOINT_KINDS[entry.type]
     given = {key: getattr(entry, key) for key in entry.model_fields_set - {"type", "points"}}
     own = {each.name: each for each in fields(kind)[3:]}
@@ -114,7 +114,7 @@ def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
 
 
 def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointTable | None) -> None:
-    """A joint that turns has an angle, one that slides a displacement."""
+    """Check that a revolute joint has an angle and a sliding joint a displacement."""
     kind = joint.type if isinstance(joint, JointTable) else "revolute"
     wrong, right = ("angle", "displacement") if JOINT_KINDS[kind].slides else ("displacement", "angle")
     if joint is not None and wrong in quantities(entry):
@@ -125,7 +125,7 @@ def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointT
 
 
 def _load(_: Group, name: str, entry: Any, table: ModelTable) -> Load:
-    """A load from its table."""
+    """Build a load from its table."""
     kind = {"force": PointForce, "torque": AppliedTorque}[entry.type]
     with within(f"load.{name}"):
         given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
@@ -133,12 +133,12 @@ def _load(_: Group, name: str, entry: Any, table: ModelTable) -> Load:
 
 
 def read_torques(table: ModelTable) -> dict[str, InTime]:
-    """Torques of motors that the study gives.
+    """Read the motor torques given in the study.
 
     Raises
     ------
     InputError
-        A law that makes no sense.
+        Invalid profile.
     """
     parameters, torques = evaluate_parameters(table.parameters), {}
     for name, given in table.study.torques.items():
@@ -147,13 +147,13 @@ def read_torques(table: ModelTable) -> dict[str, InTime]:
         try:
             (torques[name],) = read_components(entry, "torque", parameters, table.study.duration)
         except InputError as error:
-            # An expression alone stands where the table would.
+            # A single number or expression stands in the place of the table.
             raise (error.within(place) if whole else error.at(place)) from None
     return torques
 
 
 def _member(group: Group, name: str, entry: Any, _: ModelTable) -> Any:
-    """A member of a group from its table."""
+    """Build a member of a group from its table."""
     said = dict(entry)
     kinds = {getattr(kind, "kind", None): kind for kind in group.kinds}
     kind = kinds[said.pop("type")] if "type" in said else group.kinds[0]
@@ -162,15 +162,15 @@ def _member(group: Group, name: str, entry: Any, _: ModelTable) -> Any:
 
 
 def read_paths(tables: Mapping[str, PathTable]) -> dict[str, Path]:
-    """Paths from their tables, by name.
+    """Build paths from their tables, by name.
 
     Raises
     ------
     InputError
-        See `read_path`; or a sequence of what is no path, or is one that follows it in the file.
+        Invalid path (see `read_path`), or sequence that names no path or a sequence that follows it in the file.
     """
     found: dict[str, Path] = {}
-    # Sequences name the others.
+    # Sequences refer to other paths and are therefore read last.
     for name in sorted(tables, key=lambda name: tables[name].type == "sequence"):
         with within(f"path.{name}"):
             found[name] = read_path(tables[name], found)
@@ -178,12 +178,12 @@ def read_paths(tables: Mapping[str, PathTable]) -> dict[str, Path]:
 
 
 def read_path(table: PathTable, others: Mapping[str, Path] | None = None) -> Path:
-    """A path from its table, and those that it may name.
+    """Build a path from its table; `others` are the paths to which a sequence may refer.
 
     Raises
     ------
     InputError
-        Numbers that make no path, or unknown names.
+        Invalid numbers, or unknown names.
     """
     said = {name: value for name, value in table if name not in ("type", "shaper")}
     if isinstance(table, SequenceTable):
@@ -207,12 +207,12 @@ def read_path(table: PathTable, others: Mapping[str, Path] | None = None) -> Pat
 
 
 def read_shaper(table: ShaperTable) -> Shaper:
-    """An input shaper from its table.
+    """Build an input shaper from its table.
 
     Raises
     ------
     InputError
-        Numbers that make no shaper.
+        Invalid numbers.
     """
     said = {name: value for name, value in table if name != "type" and value is not None}
     with within("shaper"):

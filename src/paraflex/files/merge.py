@@ -1,4 +1,4 @@
-"""Data of a file changed as the model changed that they describe."""
+"""Update of the data of a file after a change of the model that they describe."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether data are the same, keys in the same order."""
+    """Check whether data are equal, with keys in the same order."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         return list(one) == list(other) and all(same(value, other[key]) for key, value in one.items())
     if isinstance(one, list) and isinstance(other, list):
@@ -16,10 +16,20 @@ def same(one: Any, other: Any) -> bool:
 
 
 def merged(data: Any, before: Any, after: Any) -> Any:
-    """Data changed as `after` differs from `before`, which say the same in a form without choices.
+    """Apply the differences between `before` and `after` to the data of a file.
 
-    Where the data have a form of their own, such as an expression or a field that is as it is by default, they keep it
-    as long as what it stands for stays.
+    Parameters
+    ----------
+    data : any
+        Data of the file.
+    before, after : any
+        Normalised forms of the same data, as they are and as they are to be.
+
+    Returns
+    -------
+    any
+        Updated data. An entry with a form of its own, such as an expression or an explicit default, is kept as long as
+        its meaning does not change.
     """
     if same(before, after):
         return data
@@ -46,6 +56,6 @@ def _merged_table(data: Mapping[str, Any], before: Mapping[str, Any], after: Map
 
 
 def order_of(before: Iterable[str], after: Mapping[str, Any]) -> list[str]:
-    """Keys that stay in their order, then new ones."""
+    """Return the keys that are kept, in their previous order, followed by the new ones."""
     kept = [key for key in before if key in after]
     return [*kept, *(key for key in after if key not in kept)]

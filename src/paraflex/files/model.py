@@ -1,4 +1,4 @@
-"""A model: the mechanism of a file with its named paths and the study it proposes."""
+"""Model: the mechanism of a file, with its named paths and the defaults of its study."""
 
 from __future__ import annotations
 
@@ -37,27 +37,30 @@ from paraflex.writing import write_text
 @given_as("a model", "the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Model(CheckedFields):
-    """What a model file says, or is to say.
+    """Model: content of a model file, read from one or built in Python.
 
     Attributes
     ----------
     mechanism : Mechanism
+        Mechanism of the model.
     paths : mapping of str to Path
+        Paths by name.
     study : StudyDefaults
+        Default settings of runs.
     source : str
-        The file it came from, or the library name; empty for one made in Python.
+        File from which the model was read, or its library name; empty for a model built in Python.
     parameters : mapping
-        The file's content as read, for provenance.
+        Content of the file as read, for provenance.
     start : Start or None
-        Deflection and velocity at the start of a run without a path; None for a start undeformed and at rest.
+        Deflection and velocity at the start of a run without a path; None for an undeformed start at rest.
     text : str
-        The file's text, which `save` keeps the comments of.
+        Text of the file, whose comments `save` preserves.
     settings : mapping
-        What `load` has set in place of what the file says, by field.
+        Values by field with which `load` has replaced those of the file.
     statics : StaticsDefaults
-        What `paraflex.statics` finds unless asked otherwise.
+        Default settings of `paraflex.statics`.
     controllers : mapping of str to ControllerDescription
-        Those that runs may have, by name: see `acting`.
+        Controllers available to runs, by name; see `acting`.
     """
 
     mechanism: Mechanism
@@ -72,7 +75,7 @@ class Model(CheckedFields):
     controllers: Mapping[str, ControllerDescription] = field(default_factory=dict)
 
     def _repr_html_(self) -> str:
-        """In notebooks."""
+        """Return the HTML representation shown in notebooks."""
         from paraflex.display import facts, page
 
         study = self.study
@@ -86,18 +89,18 @@ class Model(CheckedFields):
 
     @checked_arguments()
     def path(self, name: str | None = None) -> Path:
-        """A path by name, or the study's.
+        """Return a path by name; by default that of the study, or else the first path.
 
         Raises
         ------
         InputError
-            There is none of that name.
+            Unknown path, or model without paths.
         """
         return self.paths[self.path_name(name)]
 
     @checked_arguments()
     def path_name(self, name: str | None = None) -> str:
-        """The name of a path: that given, the study's, or that of the first path; see `path`."""
+        """Return the name of a path: the given name, that of the study, or that of the first path; see `path`."""
         wanted = name or self.study.first_path or next(iter(self.paths), None)
         if wanted is None:
             raise InputError(
@@ -114,25 +117,25 @@ class Model(CheckedFields):
 
     @checked_arguments()
     def modes(self, names: Sequence[str] = ()) -> tuple[ActuationMode, ...]:
-        """Actuation modes by name, else those of the study, else all of the mechanism; none where it has none.
+        """Return actuation modes by name; by default those of the study, else all of the mechanism (possibly none).
 
         Raises
         ------
         InputError
-            An unknown mode.
+            Unknown mode.
         """
         wanted = names or self.study.modes or [mode.name for mode in self.mechanism.modes]
         return tuple(dict.fromkeys(parse_mode(self.mechanism, name) for name in wanted))
 
     @checked_arguments()
     def acting(self, names: Sequence[str] = ()) -> tuple[ControllerDescription, ...]:
-        """Controllers by name, else those of the study; "none" alone for none of them.
+        """Return controllers by name, by default those of the study; the single name "none" returns no controllers.
 
         Raises
         ------
         InputError
-            An unknown controller, periods that are no multiples of the shortest, or two laws each of which gives the
-            whole torque.
+            Unknown controller, "none" together with other names, sample periods that are not multiples of the shortest
+            one, or two laws that each give the whole torque.
         """
         wanted = list(dict.fromkeys(names or self.study.controllers))
         if wanted == [NONE]:
@@ -149,10 +152,15 @@ class Model(CheckedFields):
 
     @checked_arguments()
     def duration(self, path: Path | str, chosen: float | None = None) -> float:
-        """How long a run along a path takes, dwell included [s].
+        """Return the duration of a run along a path, including the dwell [s].
 
-        As chosen; else the study's duration along its own path, the first where it has several. Another path has
-        another length, and the study's share of dwell.
+        Parameters
+        ----------
+        path : Path or str
+            Path, or its name.
+        chosen : float, optional
+            Duration [s], returned unchanged if given. By default the duration is that of the study for the study's
+            path, or the first of its paths. For another path it is scaled so that the relative dwell is the same.
         """
         if chosen is not None:
             return chosen
@@ -165,7 +173,7 @@ class Model(CheckedFields):
 
     @checked_arguments()
     def driven_for(self, path: Path) -> float:
-        """How long torques drive along a path [s]: the path's duration, and that of the study's shaper."""
+        """Return the time during which the motors drive [s]: the duration of a path plus that of the study's shaper."""
         return path.duration + (0.0 if self.study.shaper is None else self.study.shaper.duration)
 
     @checked_arguments()
@@ -181,23 +189,23 @@ class Model(CheckedFields):
         after: Ending | str | None = None,
         warning: bool = True,
     ) -> TrackingTask:
-        """Plan a run along a path; what is not given is as the model's [study] has it.
+        """Plan a run along a path; arguments that are not given are taken from the model's [study].
 
-        Where the study has a shaper torques are shaped: see `shape_torques`.
+        If the study has a shaper, the torques are shaped; see `shape_torques`.
 
         Parameters
         ----------
         path : Path or str, optional
-            A path, or the name of one of the model's.
+            Path, or the name of one of the model's paths.
         mechanism : Mechanism, optional
-            Another form of the model's own: rigid, or of another geometry.
+            Variant of the model's mechanism, such as a rigid one or one with another geometry.
         duration, samples, assembly, orientation, after, warning
             See `tracking.plan_tracking`.
 
         Raises
         ------
         InputError, AssemblyError, UnreachablePathError
-            See there; or the model has a [start].
+            See `tracking.plan_tracking`; InputError also if the model has a [start].
         """
         self.check_start()
         followed = path if isinstance(path, Path) else self.path(path)
@@ -215,12 +223,12 @@ class Model(CheckedFields):
         return task if study.shaper is None else shape_torques(task, study.shaper)
 
     def check_start(self) -> None:
-        """Check that a run along a path may start where the path says.
+        """Check that the model has no [start], which a run along a path does not allow.
 
         Raises
         ------
         InputError
-            The model has a [start] of its own.
+            Model with a [start].
         """
         if self.start is not None:
             raise InputError(
@@ -232,20 +240,20 @@ class Model(CheckedFields):
     def save(self, path: str | FilePath) -> None:
         """Write a model file from which `load` reads the same mechanism, paths, study and start.
 
-        A model that came from a file is written as that file, with what differs in its place: comments, order and
-        expressions stay. What has no place there is added. The file is written whole or not at all.
+        A model read from a file is written as that file with the differences in place: comments, order and expressions
+        are preserved, and new entries are added. The file is written completely or not at all.
 
         Parameters
         ----------
         path : str or Path
-            One that exists is replaced.
+            File to write; an existing file is replaced.
 
         Raises
         ------
         InputError
-            A member that a file has no words for, such as a law by functions of Python: it is named.
+            Member that cannot be expressed in a file, such as a profile given by Python functions.
         OutputError
-            The file cannot be written.
+            File that cannot be written.
         """
         from paraflex.files.document import document_text
 
@@ -266,19 +274,19 @@ def plan(
     after: Ending | str | None = None,
     warning: bool = True,
 ) -> TrackingTask:
-    """Plan a run of the end-effector along a path: joint motion, and what it asks of the motors.
+    """Plan a run of the end-effector along a path: joint motion and required motor torques.
 
     Parameters
     ----------
     model : Model, Mechanism or str
-        A model, whose [study] says what is not given; or the name or file of one; or a mechanism.
+        Model, or its name or file, whose [study] supplies arguments that are not given; or a mechanism.
     path, duration, samples, assembly, orientation, after, warning
         See `Model.plan` and `tracking.plan_tracking`.
 
     Raises
     ------
     InputError, AssemblyError, UnreachablePathError
-        See there.
+        See `Model.plan` and `tracking.plan_tracking`.
     """
     asked = {
         "duration": duration, "samples": samples, "assembly": assembly, "orientation": orientation, "after": after,
@@ -292,24 +300,25 @@ def plan(
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
 def load(name_or_file: str | FilePath, *, set: Mapping[str, Any] | None = None) -> Model:
-    """Read a model from the library or from a TOML file; numbers that are not plausible issue a `ModelWarning` each.
+    """Read a model from the library or from a TOML file; each implausible number issues a `ModelWarning`.
 
     Parameters
     ----------
     name_or_file : str or Path
-        A name of `library_names()`, one with a number ("four_bars:3"), or a file.
+        Name of `library_names()`, name of a generated mechanism ("four_bars:3"), or file.
     set : mapping of str to Any, optional
-        Values in place of what the file says, by field: `{"body.link1.length": 0.3, "section.bar.width": "80 mm"}`. The
-        table may be left out where one alone has the name: "link1.length".
+        Values by field that replace those of the file: `{"body.link1.length": 0.3, "section.bar.width": "80 mm"}`. The
+        table may be omitted if the name is unique: "link1.length".
 
     Returns
     -------
     Model
+        Model that was read.
 
     Raises
     ------
     InputError
-        Unknown name, unreadable file, or anything in it that does not fit: it names file, field, value and remedy.
+        Unknown name, unreadable file, or invalid entry. The error names file, field, value and remedy.
     """
     model = read_model(name_or_file, set or {})
     warn_of(doubtful_numbers(model.mechanism, model.study.duration))
@@ -317,7 +326,7 @@ def load(name_or_file: str | FilePath, *, set: Mapping[str, Any] | None = None) 
 
 
 def read_model(name_or_file: str | FilePath, settings: Mapping[str, Any] | None = None) -> Model:
-    """What `load` reads, without its warnings."""
+    """Read a model as `load` does, without its warnings."""
     text, source, folder = _read(name_or_file)
     values = {name: plain(value) for name, value in (settings or {}).items()}
     return replace(model_from(_parsed(text, source, folder, values), source, text), settings=values)
@@ -325,12 +334,12 @@ def read_model(name_or_file: str | FilePath, settings: Mapping[str, Any] | None 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
 def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:
-    """What a model file says, parsed and not yet checked, and the name of its source; see `load` for the argument.
+    """Return the data of a model file, parsed but not validated, and the name of its source; see `load`.
 
     Raises
     ------
     InputError
-        Unknown name, unreadable file, or a file it names that cannot be read.
+        Unknown name, unreadable file, or unreadable file to which the model refers.
     """
     text, source, folder = _read(name_or_file)
     return _parsed(text, source, folder, {}), source
@@ -338,16 +347,16 @@ def load_data(name_or_file: str | FilePath) -> tuple[dict[str, Any], str]:
 
 @checked_arguments()
 def model_from(data: dict[str, Any], source: str, text: str = "") -> Model:
-    """The model that parsed data describe; see `load` for what is raised.
+    """Build a model from parsed data; errors are those of `load`.
 
     Parameters
     ----------
     data : dict
-        See `load_data`; left as it is.
+        Data as returned by `load_data`; not modified.
     source : str
-        Named in errors.
+        Name of the source, for errors.
     text : str
-        A file's, which `Model.save` keeps the comments of.
+        Text of the file, whose comments `Model.save` preserves.
     """
     with naming(source):
         return _model(validate(ModelTable, data, source), data, source, text)
@@ -359,7 +368,7 @@ def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any
 
 
 def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
-    """A model's text, the name of its source, and the folder that names of other files in it count from."""
+    """Read a model's text; return it with the name of its source and the folder to which file names in it refer."""
     text = str(name_or_file)
     if is_generated(text):
         return generated_text(text), text, FilePath()
@@ -384,7 +393,7 @@ def load_path(file: str | FilePath) -> Path:
     Raises
     ------
     InputError
-        See `load`.
+        Unreadable file or invalid entry; see `load`.
     """
     source = str(file)
     with naming(source):
@@ -436,12 +445,12 @@ def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
 
 
 def _data(model: Model) -> dict[str, Any]:
-    """The data of a file from which a model is read: those it came from as far as they still say so."""
+    """Return the data of a file that describes a model, based on the data from which the model was read, if any."""
     data = dict(model.parameters)
     if not data:
         return _checked(model, model_tables(model))
     if "payload" in data and _carrier(model_from(data, model.source)) != _carrier(model):
-        # The body's own numbers, which are written, then include the payload.
+        # The numbers of the body are written, and they include the payload already.
         data.pop("payload")
     for each in (False, True, True):
         found = model_from(data, model.source)
@@ -453,18 +462,18 @@ def _data(model: Model) -> dict[str, Any]:
 
 
 def _carrier(model: Model) -> tuple[Any, ...]:
-    """The end-effector's point, and the body that carries it."""
+    """Return the end-effector, and the body that carries it."""
     effector = model.mechanism.end_effector
     return effector, [body for body in model.mechanism.bodies if effector and body.name == effector.point.body]
 
 
 def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
-    """Data that say what they are to say.
+    """Return data after a check that they describe the model.
 
     Raises
     ------
     InputError
-        They do not.
+        Data that describe another model.
     """
     wanted, found = (model_tables(one) for one in (model, model_from(data, model.source)))
     for key, value in wanted.items():

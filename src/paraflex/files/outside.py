@@ -1,4 +1,4 @@
-"""Files outside the folder of a model, which it may name only by permission: a model may come from anyone."""
+"""Permission for models to read files outside their folders, withheld by default because a model may be untrusted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _allowed: ContextVar[bool] = ContextVar("allowed", default=False)
 
 @contextmanager
 def allowing_outside() -> Iterator[None]:
-    """Let models that are read meanwhile name tables outside their folders, as --allow-outside does."""
+    """Allow models that are read inside the context to name tables outside their folders, as --allow-outside does."""
     before = _allowed.set(True)
     try:
         yield
@@ -23,17 +23,17 @@ def allowing_outside() -> Iterator[None]:
 
 
 def may_be_outside() -> bool:
-    """Whether models that are read now may name tables outside their folders."""
+    """Check whether models that are read now may name tables outside their folders."""
     return _allowed.get()
 
 
 def check_outside(folder: Path, name: str, field: str) -> None:
-    """Check that a file that a model names lies in the model's folder, wherever links lead, or may lie elsewhere.
+    """Check that a file named by a model lies in the model's folder, with links resolved, or may lie elsewhere.
 
     Raises
     ------
     InputError
-        It lies elsewhere, and nobody said that it may.
+        File outside the folder without permission.
     """
     if not may_be_outside() and is_outside(folder, name):
         raise InputError(
@@ -43,5 +43,5 @@ def check_outside(folder: Path, name: str, field: str) -> None:
 
 
 def is_outside(folder: Path, name: str) -> bool:
-    """Whether a file lies outside a folder."""
+    """Check whether a file lies outside a folder, with links resolved."""
     return not (folder / name).resolve().is_relative_to(folder.resolve())

@@ -1,4 +1,4 @@
-"""Values of a model file by name: found, and replaced before the file is checked."""
+"""Lookup and replacement of values of a model file by field name, before the file is validated."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _PART = re.compile(r'\s*(?:"([^"]*)"|\'([^\']*)\'|([^."\'\s]+))\s*(\.|\Z)')
 
 
 def find_place(data: Mapping[str, Any], field: str) -> Place:
-    """Place of a number in a model's data.
+    """Find the place of a number in a model's data.
 
     Parameters
     ----------
     data : mapping
-        A model file as parsed.
+        Parsed model file.
     field : str
-        Keys and list indices joined by points, "body.link1.length" or "ground.A1.0"; a key with a point in quotes. The
-        table may be left out where one alone has the name: "link1.length".
+        Keys and list indices joined by dots, "body.link1.length" or "ground.A1.0"; a key that contains a dot is quoted.
+        The table may be omitted if the name is unique: "link1.length".
 
     Raises
     ------
     InputError
-        There is no such field, which names the nearest; several fit; or it is no number.
+        Unknown field, reported with the nearest ones, ambiguous name, or field that is not a number.
     """
     parts = _in_full(data, field)
     place = _followed(data, parts)
@@ -46,19 +46,19 @@ def find_place(data: Mapping[str, Any], field: str) -> Place:
 
 
 def with_values(data: dict[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """A model's data with other values of fields, which the file need not have; see `find_place` for their names.
+    """Replace or add values of fields in a model's data; see `find_place` for the names of fields.
 
     Parameters
     ----------
     data : dict
-        As parsed; left as it is.
+        Parsed data; not modified.
     values : mapping of str to Any
-        Numbers, expressions, numbers with units, names, truth values, or lists of these.
+        Numbers, expressions, numbers with units, names, booleans, or lists of these, by field.
 
     Raises
     ------
     InputError
-        No such field; several fit; or it is a table.
+        Unknown field, ambiguous name, or field or value that is a table.
     """
     for field, value in values.items():
         place = _place_to_set(data, field)
@@ -69,13 +69,13 @@ def with_values(data: dict[str, Any], values: Mapping[str, Any]) -> dict[str, An
 
 
 def plain(value: Any) -> Any:
-    """A value as TOML has it: numbers and arrays of NumPy, and tuples, as numbers and lists."""
+    """Convert NumPy numbers and arrays, and tuples, to numbers and lists as used in TOML."""
     value = value.tolist() if hasattr(value, "tolist") else value
     return list(value) if isinstance(value, tuple) else value
 
 
 def value_of(text: str) -> Any:
-    """What a text stands for in a file: a number, truth value, list, or text without its quotes."""
+    """Parse a text as a TOML value: a number, boolean, list, or string without its quotes; else return the text."""
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
@@ -99,7 +99,7 @@ def _place_to_set(data: Mapping[str, Any], field: str) -> Place:
 
 
 def _may_have(data: Mapping[str, Any], place: Place, part: str) -> bool:
-    """Whether the table at a place may have a field that is not there: one of the schema, or a number by a new name."""
+    """Check whether a table may have a missing field: one of the schema, or a number by a new name."""
     annotation = field_at(ModelTable, data, place).annotation if place else ModelTable
     if is_table(annotation):
         return part in annotation.model_fields or annotation.model_config.get("extra") == "allow"
@@ -107,7 +107,7 @@ def _may_have(data: Mapping[str, Any], place: Place, part: str) -> bool:
 
 
 def _known_below(data: Mapping[str, Any], place: Place) -> list[str]:
-    """Fields that the table at a place has or may have; all numbers where the name of no table is known."""
+    """Return the fields that the table at a place has or may have; all numbers of the data for an empty place."""
     if not place:
         return [_spelt(each) for each in number_places(data)]
     annotation, inside = field_at(ModelTable, data, place).annotation, _at(data, place)
@@ -117,13 +117,13 @@ def _known_below(data: Mapping[str, Any], place: Place) -> list[str]:
 
 
 def _namesakes(data: Mapping[str, Any], name: str) -> str:
-    """A remedy for a name whose tables are missing: "did you mean section.bar.thickness?"; empty where none has it."""
+    """Suggest fields of that name in other tables, "did you mean section.bar.thickness?"; empty if there are none."""
     there = [_spelt(each) for each in number_places(data) if each[-1] == name]
     return f"did you mean {' or '.join(there[:3])}?" if there else ""
 
 
 def _in_full(data: Mapping[str, Any], field: str) -> list[str]:
-    """The parts of a name, with the table that it leaves out."""
+    """Return the parts of a field name, completed with an omitted table."""
     parts = _joined(data, _parts(field))
     if parts[0] in data or parts[0] in ModelTable.model_fields:
         return parts
@@ -141,7 +141,7 @@ def _in_full(data: Mapping[str, Any], field: str) -> list[str]:
 
 
 def _joined(data: Mapping[str, Any], parts: list[str]) -> list[str]:
-    """Parts with those that are a key with points of the data put together: "statics.moved.stage.T.x"."""
+    """Join the parts that form one key of the data that contains dots, as in "statics.moved.stage.T.x"."""
     for start in range(1, len(parts)):
         place = _followed(data, parts[:start])
         if len(place) < start:
@@ -154,7 +154,7 @@ def _joined(data: Mapping[str, Any], parts: list[str]) -> list[str]:
 
 
 def _followed(data: Mapping[str, Any], parts: Sequence[str]) -> Place:
-    """The place of a name as far as data have it."""
+    """Follow the parts of a name in the data, and return the place as far as it exists."""
     place: list[str | int] = []
     inside: Any = data
     for part in parts:
@@ -178,12 +178,12 @@ def _at(data: Any, place: Place) -> Any:
 
 
 def number_places(data: Mapping[str, Any]) -> Iterator[Place]:
-    """Every number of a model's data, and every expression that has a value."""
+    """Yield the places of all numbers of a model's data, including expressions with a value."""
     return (place for place, value in leaves(data) if _is_number(value, data))
 
 
 def number_at(data: Mapping[str, Any], place: Place) -> float:
-    """The number at a place that `find_place` found, or the value of its expression."""
+    """Return the number at a place found by `find_place`, or the value of its expression."""
     inside = _at(data, place)
     if isinstance(inside, str):
         return float(evaluate(inside, evaluate_parameters(data.get("parameters", {}))))
@@ -191,7 +191,7 @@ def number_at(data: Mapping[str, Any], place: Place) -> float:
 
 
 def overlaid(data: dict[str, Any], values: Sequence[tuple[Place, Any]]) -> dict[str, Any]:
-    """A model's data with other values at given places; unchanged tables are shared, not copied."""
+    """Return a model's data with new values at given places; unchanged tables are shared, not copied."""
     out: Any = dict(data)
     for place, value in values:
         inside: Any = out
@@ -238,5 +238,5 @@ def _below(data: Mapping[str, Any], field: str) -> str:
 
 
 def _spelt(place: Place) -> str:
-    """A place as it is written in a study file."""
+    """Return a place as it is written in a study file."""
     return ".".join(str(key) if _BARE.match(str(key)) else f'"{key}"' for key in place)

@@ -1,4 +1,4 @@
-"""Reading TOML with errors that name file, field, value and remedy."""
+"""Reading and validation of TOML files, with errors that name file, field, value and remedy."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.fields import check_units, field_at
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
 
-# Numbers with a decimal comma, values in no quotes that TOML has none of, and what brackets do not count in.
+# Patterns of numbers with a decimal comma, of unquoted values that TOML does not allow, and of strings and comments,
+# whose brackets are ignored.
 _DECIMAL_COMMA = re.compile(r"=\s*[-+]?\d+,\d")
 _BARE = re.compile(
     r"[=\[,]\s*(?!true\b|false\b|[-+]?inf\b|[-+]?nan\b)(?=[^\"'#\[\]{},=]*[A-Za-z_])[-+(\w][^\"'#\[\]{},=]*(?=[\],#]|$)"
 )
 _NO_BRACKETS = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
-# A key of more parts than any has: the parser would take minutes for thousands of them.
+# A key with more parts than any valid key; the parser takes minutes for thousands of parts.
 _DEEP_KEY = re.compile(rf"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{KEY_PARTS}}}""")
-# The field that says of which kind a table is, in every file.
+# Field that selects the kind of a table, in every file.
 _TAG = "type"
 _NO_TABLE = ("dict_type", "model_type", "model_attributes_type")
 
@@ -39,32 +40,33 @@ def read_toml(path: Path, source: str) -> dict[str, Any]:
 
 
 def read_text(path: Path, source: str) -> str:
-    """The text of a TOML file.
+    """Read the text of a TOML file.
 
     Raises
     ------
     InputError
-        See `text_of`.
+        Unreadable file; see `text_of`.
     """
     with naming(source):
         return text_of(path, "file", None, unread="check its name", wrong="name a TOML file")
 
 
 def text_of(path: Path, field: str, name: str | None, *, unread: str, wrong: str) -> str:
-    """The text of a file, of which no more is read than one of ours may have; with or without a mark at its start.
+    """Read the text of a file of limited size, in UTF-8 with or without a byte order mark.
 
     Parameters
     ----------
     path : Path
+        File to read.
     field, name : str
-        Of errors: what names the file, and how.
+        Field that names the file and the name given there, for errors.
     unread, wrong : str
-        Remedies where the file cannot be read, and where it is no such text.
+        Remedies for a file that cannot be read, and for one that is too large or not text.
 
     Raises
     ------
     InputError
-        It cannot be read, is no regular file, too large, or not UTF-8.
+        File that cannot be read, is not a regular file, is too large, or is not UTF-8.
     """
     try:
         content = _content(path)
@@ -81,8 +83,8 @@ def text_of(path: Path, field: str, name: str | None, *, unread: str, wrong: str
 
 
 def _content(path: Path) -> bytes:
-    """What is in a file, and hardly more than may be in one."""
-    # Opening a pipe would wait for who writes into it, and devices have no end.
+    """Read the content of a file, at most one byte more than allowed."""
+    # Opening a pipe would block until something is written to it, and devices have no end.
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise OSError("not a regular file")
     with path.open("rb") as stream:
@@ -90,7 +92,7 @@ def _content(path: Path) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Whether there is such a file; of a name that none can have there is none."""
+    """Check whether a file exists; False for a name that no file can have."""
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -98,12 +100,12 @@ def exists(path: Path) -> bool:
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """The data of a TOML text.
+    """Parse a TOML text.
 
     Raises
     ------
     InputError
-        It is not TOML.
+        Text that is not valid TOML, or has names that are too long.
     """
     with naming(source):
         if _DEEP_KEY.search(text):
@@ -121,7 +123,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
 
 
 def _check_names(data: dict[str, Any]) -> None:
-    """Names are none too long, at whatever depth."""
+    """Check that no name is too long, at any depth."""
     left: list[tuple[str, Any]] = [("", data)]
     while left:
         table, value = left.pop()
@@ -135,7 +137,7 @@ def _check_names(data: dict[str, Any]) -> None:
 
 
 def _not_toml(reason: str, text: str) -> InputError:
-    """Error of a text that is no TOML: the parser's reason or the table that stands twice, and the likely remedy."""
+    """Build the error of invalid TOML: the parser's reason or the duplicate table, with a likely remedy."""
     twice = re.match(r"Cannot declare \((.*?),?\) twice \((.*)\)", reason)
     if twice is None:
         problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "mend that line"
@@ -157,7 +159,7 @@ def _not_toml(reason: str, text: str) -> InputError:
 
 
 def _opened(text: str, last: int) -> int:
-    """Line of the last bracket that is open where a parser gave up at a line; zero for none."""
+    """Return the line of the last bracket still open at the line where the parser stopped; zero if there is none."""
     opened: list[int] = []
     for number, line in enumerate(text.split("\n")[:last], 1):
         for bracket in re.findall(r"[\[{\]}]", _NO_BRACKETS.sub("", line)):
@@ -170,7 +172,7 @@ def _opened(text: str, last: int) -> int:
 
 @contextmanager
 def naming(source: str) -> Iterator[None]:
-    """Errors that name no file name this one."""
+    """Add the name of a source to errors raised inside the context that name no file."""
     try:
         yield
     except InputError as error:
@@ -178,12 +180,21 @@ def naming(source: str) -> Iterator[None]:
 
 
 def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
-    """Check parsed data against a schema; numbers may be expressions of the data's [parameters], and have units.
+    """Validate parsed data against a schema; numbers may be expressions of the data's [parameters], and have units.
+
+    Parameters
+    ----------
+    schema : type of BaseModel
+        Schema of the file.
+    data : dict
+        Parsed data.
+    source : str
+        Name of the file, for errors.
 
     Raises
     ------
     InputError
-        The first field that does not fit, or a unit that is none of the field's.
+        Invalid field, or unit that does not fit the field; the first problem is reported.
     """
     table = data.get("parameters", {})
     with naming(source):
@@ -233,7 +244,7 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
 
 
 def _above(schema: type[BaseModel], name: str) -> str:
-    """The remedy for a field of the file itself that stands in a table; empty for other names."""
+    """Return the remedy for a top-level field of the file that stands in a table; empty for other names."""
     annotation = getattr(schema.model_fields.get(name), "annotation", dict)
     tables = [annotation, *typing.get_args(annotation)]
     is_table = any(typing.get_origin(one) is dict or one is dict or hasattr(one, "model_fields") for one in tables)
@@ -241,7 +252,7 @@ def _above(schema: type[BaseModel], name: str) -> str:
 
 
 def _other_kind(schema: type[BaseModel], data: dict[str, Any], source: str) -> InputError | None:
-    """A model file where a study file is asked for, or the other way round."""
+    """Return the error for a model file given in place of a study file, or vice versa; None in other cases."""
     fields = schema.model_fields
     if "mechanism" in fields and "body" in data and "mechanism" not in data:
         name = f'mechanism = "{source}"'
@@ -254,7 +265,7 @@ def _other_kind(schema: type[BaseModel], data: dict[str, Any], source: str) -> I
 
 
 def _tag_problem(tags: list[str], table: str, value: Any) -> InputError:
-    """What is wrong with the field that says of which kind a table is."""
+    """Build the error of a missing, unknown or misspelt `type` of a table."""
     choice = " or ".join([", ".join(f'"{tag}"' for tag in tags[:-1]), f'"{tags[-1]}"'])
     given = value if isinstance(value, dict) else {}
     if _TAG in given:
@@ -269,7 +280,7 @@ def _tag_problem(tags: list[str], table: str, value: Any) -> InputError:
 
 
 def _tags(schema: type[BaseModel], location: tuple) -> list[str]:
-    """What the `type` of a body, path or load may be."""
+    """Return the allowed values of `type` of a body, path or load."""
     annotation: Any = schema.model_fields[str(location[0])].annotation
     while typing.get_origin(annotation) in (dict, typing.Annotated):
         annotation = typing.get_args(annotation)[0 if typing.get_origin(annotation) is typing.Annotated else -1]
@@ -278,7 +289,7 @@ def _tags(schema: type[BaseModel], location: tuple) -> list[str]:
 
 
 def _fields(schema: type[BaseModel], data: Any, problem: Any) -> list:
-    """An error's location without the variants of unions in it, which are no names in the file."""
+    """Return an error's location without the variants of unions, which are not names in the file."""
     location, found = problem["loc"], []
     tag = _tag_position(schema, location[0]) if location else None
     for position, part in enumerate(location):
@@ -291,7 +302,7 @@ def _fields(schema: type[BaseModel], data: Any, problem: Any) -> list:
 
 
 def _tag_position(schema: type[BaseModel], table: Any) -> int | None:
-    """Where an error's location has the `type` of a body, path or load, behind the table's name; None for others."""
+    """Return the position of the `type` of a body, path or load in an error's location; None for other tables."""
     info = schema.model_fields.get(str(table))
     if info is None:
         return None
@@ -303,23 +314,26 @@ def _tag_position(schema: type[BaseModel], table: Any) -> int | None:
 
 
 def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
-    """How well a problem explains itself: a misspelt name best, for it explains the missing one beside it."""
+    """Return the rank of a problem, the lowest being the most informative.
+
+    A misspelt name is ranked first, because it explains the missing field as well.
+    """
     location = _fields(schema, data, problem)
     model = field_at(schema, data, location).owner
     known = set(model.model_fields) if model is not None else set()
     name = str(location[-1]) if location else ""
     if problem["type"] == "extra_forbidden":
-        if name in known:  # said by another variant of a union than the one that is meant
+        if name in known:  # reported by another variant of the union than the intended one
             return 2
         return 0 if get_close_matches(name, list(known), n=1) else 1
-    # A list for a table, and the like, is said by all variants of a union but the one that is meant.
+    # A wrong type, such as a list for a table, is reported by all variants of a union except the intended one.
     if problem["type"] in (*_NO_TABLE, "list_type") and len(location) < len(problem["loc"]):
         return 2
     return 2 if problem["type"] == "missing" and name not in known else 1
 
 
 def _is_variant(part: Any) -> bool:
-    """Whether a part of an error's location names a variant of a union and not a field of the file."""
+    """Check whether a part of an error's location names a variant of a union, not a field of the file."""
     return isinstance(part, str) and (
         part.endswith("Table") or "[" in part or part.removeprefix("constrained-") in ("int", "float", "str")
     )

@@ -1,6 +1,6 @@
-"""Rows of numbers from a text file, such as a motion or a force measured or computed elsewhere.
+"""Reading of rows of numbers from text files, such as a measured motion or force.
 
-Headings may give units in brackets, "t [ms], x [N]"; columns without are in SI units.
+Headings may give units in brackets, "t [ms], x [N]"; columns without units are in SI units.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from paraflex.files.read import text_of
 from paraflex.files.schema import ModelTable, PathFile
 from paraflex.units import spelt, unit_named, unit_of, unknown_unit
 
-# Columns that a file may have: what they are called, and what stands in them.
+# Possible numbers of columns of a file, with their names and meanings in errors.
 _TWO, _THREE, _PATH = (2,), (3,), (2, 3)
 _COUNTS = {_TWO: "two", _THREE: "three", _PATH: "two or three"}
 _VALUES = {
@@ -32,28 +32,28 @@ _VALUES = {
 }
 _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
 _BETWEEN_HEADINGS = re.compile(r"[,;\t]")
-# A unit at the end of a heading; round brackets may also hold a remark.
+# Patterns of a unit at the end of a heading; round brackets may also hold a remark.
 _SQUARE_ANYWHERE = re.compile(r"\[([^\[\]]*)\]")
 _SQUARE, _ROUND = re.compile(r"\[([^\[\]]*)\]\W*$"), re.compile(r"\(([^()]*)\)\W*$")
 
 
 def with_rows(data: dict[str, Any], folder: Path, asked: Container[Any] = ()) -> dict[str, Any]:
-    """A model's data with the rows of the files its prescribed motions and loads name in place of the names.
+    """Replace the file names in a model's prescribed motions, loads, torques and paths by the rows of the files.
 
     Parameters
     ----------
     data : dict
-        As parsed.
+        Parsed data; not modified.
     folder : Path
-        Where the model file is; names are relative to it.
+        Folder of the model file, to which names are relative.
     asked : container of values
-        Absolute ones may lie outside the folder: the user named them, not the file.
+        Values set by the user; absolute file names among them may lie outside the folder.
 
     Raises
     ------
     InputError
-        A file that lies outside the folder without permission, cannot be read, or has anything but so many columns of
-        numbers below one line of headings, or a unit in these that is not the column's.
+        File outside the folder without permission, unreadable file, wrong number of columns, anything but numbers below
+        one line of headings, or unit that does not fit its column.
     """
     if not any(isinstance(entry.get("table"), str) for _, entry, _ in _entries(data)):
         return data
@@ -68,7 +68,10 @@ def with_rows(data: dict[str, Any], folder: Path, asked: Container[Any] = ()) ->
 
 
 def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
-    """A model's data with the names of files in place of their rows, where a text has names that hold for a folder."""
+    """Replace rows in a model's data by the names of the files from which they come.
+
+    A name is taken from the text of the model file, if that file, relative to the folder, still has these rows.
+    """
     named = {place: entry.get("table") for place, entry, _ in _entries(tomllib.loads(text))}
     data = copy.deepcopy(data)
     for place, entry, columns in _entries(data):
@@ -80,7 +83,7 @@ def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
 
 
 def _entries(data: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any], tuple[int, ...]]]:
-    """The tables of a model's data that may name a file as their `table`: where each is, itself, and columns."""
+    """Yield place, table and numbers of columns of all tables of a model that may name a file as their `table`."""
     for group in ("prescribed", "load"):
         for name, entry in _tables(data.get(group)):
             yield (group, name), entry, _THREE if group == "load" and entry.get("type") == "force" else _TWO
@@ -88,7 +91,7 @@ def _entries(data: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any], tupl
     for name, entry in _tables(study.get("torques") if isinstance(study, dict) else None):
         yield ("study", "torques", name), entry, _TWO
     paths: Any = data.get("path")
-    # A file of one path has it in place of its name.
+    # In a file with one path, the table itself takes the place of the names.
     if isinstance(paths, dict) and isinstance(paths.get("type"), str):
         yield ("path",), paths, _PATH
         return
@@ -103,7 +106,7 @@ def _tables(given: Any) -> list[tuple[str, dict[str, Any]]]:
 def _read_rows(
     data: dict[str, Any], place: Place, folder: Path, name: str, columns: tuple[int, ...]
 ) -> list[list[float]]:
-    """Rows of a file for the table at a place, in SI units; errors quote files in the model's folder alone."""
+    """Read the rows of a file in SI units; errors do not quote the content of files outside the model's folder."""
     field = _field(place)
     unread, wrong = "name a file, seen from the model file's folder", f"save {_COUNTS[columns]} columns as CSV"
     lines = text_of(folder / name, field, name, unread=unread, wrong=wrong).splitlines()
@@ -124,7 +127,7 @@ def _field(place: Place) -> str:
 def _rows_of(
     data: dict[str, Any], place: Place, lines: list[str], name: str, columns: tuple[int, ...]
 ) -> list[list[float]]:
-    """Rows of a file's lines for the table at a place, in SI units."""
+    """Convert the lines of a file to rows in SI units, for the table at a place."""
     field, count = _field(place), _COUNTS[columns]
     rows: list[list[float]] = []
     headings, comment = None, ""
@@ -148,7 +151,7 @@ def _rows_of(
 
 
 def _in_si(data: dict[str, Any], place: Place, file: str, headings: str, rows: list[list[float]]) -> list[list[float]]:
-    """Rows in SI units, of those that the headings give in brackets."""
+    """Convert rows to SI units from the units that the headings give in brackets."""
     schema = PathFile if place == ("path",) else ModelTable
     field = _field(place)
     found = [list(column) for column in zip(*rows, strict=True)]
@@ -171,7 +174,7 @@ def _in_si(data: dict[str, Any], place: Place, file: str, headings: str, rows: l
 
 
 def _units(headings: str, count: int, file: str, field: str) -> list[tuple[str, str | None]]:
-    """Headings of so many columns, each with the unit that stands in its brackets."""
+    """Split headings into those of the columns, each with the unit in its brackets or None."""
     parts = [part.strip() for part in _BETWEEN_HEADINGS.split(headings.strip())]
     given = _SQUARE_ANYWHERE.findall(headings)
     if len(parts) == count:

@@ -1,4 +1,4 @@
-"""Fields that a description says, as against those that are as they are by default."""
+"""Explicit fields of a description, those that differ from their defaults, and checks of given fields."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from paraflex.errors import InputError
 
 
 def fields_said(given: Any, *left_out: str) -> dict[str, Any]:
-    """The fields of a dataclass that are not as they are by default."""
+    """Return the fields of a dataclass that differ from their defaults, without those in `left_out`."""
     out = {}
     for field in fields(given):
         value = getattr(given, field.name)
@@ -27,7 +27,24 @@ def check_fields(
     place: str,
     described: Callable[[Field[Any]], str],
 ) -> None:
-    """Refuse what a table gives and its class does not have, and what the class needs and is not given."""
+    """Check the fields of a table against those of its class.
+
+    Parameters
+    ----------
+    given : mapping
+        Fields of the table.
+    own : mapping of str to Field
+        Fields of the class.
+    what, place : str
+        Name of the object and place of the table, for errors.
+    described : callable
+        Function that returns the description of a field, for errors.
+
+    Raises
+    ------
+    InputError
+        Field that the class does not have, or missing required field.
+    """
     for key, value in given.items():
         if key not in own:
             raise InputError(f"a {what} has no {key}", field=f"{place}.{key}", value=value, remedy="leave it out")
@@ -37,5 +54,5 @@ def check_fields(
 
 
 def unsayable(field: str, value: object, remedy: str) -> InputError:
-    """The error for what a model has and its file has no words for."""
+    """Return the error for a part of a model that cannot be expressed in a file."""
     return InputError("a model file cannot say this", field=field, value=value, remedy=remedy)

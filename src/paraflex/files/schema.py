@@ -1,7 +1,7 @@
-"""The model file as pydantic sees it: which fields there are, of what type and unit.
+"""Schema of the model file in pydantic: its fields, their types and units.
 
-Numbers are in SI units and radians; one with another unit is a text, "80 mm". What a field must satisfy beyond its
-type (positive lengths, points that exist) is checked once, in `mechanism.checks` and by the paths themselves.
+Numbers are in SI units and radians; a number with another unit is a text, "80 mm". Conditions beyond the type of a
+field (positive lengths, points that exist) are checked once, in `mechanism.checks` and by the paths themselves.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from paraflex.mechanism.quantities import joint_pair
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
-    """An expression's value; what is no text is left to the type."""
+    """Return the value of an expression; anything but a text is returned unchanged and checked by its type."""
     if not isinstance(value, str):
         return value
     try:
@@ -47,7 +47,7 @@ def _number(value: Any, info: ValidationInfo) -> Any:
 
 
 def _function(value: Any, info: ValidationInfo) -> Any:
-    """A finite number as it is, or an expression of the time t found right in form."""
+    """Return a finite number as a float, or an expression of the time t after a check of its syntax."""
     example = 'say "0.2 * sin(3 * t)"'
     if isinstance(value, str):
         try:
@@ -63,7 +63,7 @@ def _function(value: Any, info: ValidationInfo) -> Any:
 
 
 class NumberOfText(float):
-    """The value of an expression, with its text: the unit is checked where its field is known."""
+    """Value of an expression, with its text, because its unit can be checked only where the field is known."""
 
     text: str = ""
 
@@ -97,7 +97,7 @@ FunctionOfTime = Annotated[Any, BeforeValidator(_function, json_schema_input_typ
 Count = Annotated[int, Field(strict=True, ge=-WHOLE, le=WHOLE)]
 Text = Annotated[str, Field(strict=True, max_length=TEXT_LETTERS)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-# Rows of two or three numbers; the name of a file stands for its rows, which `rows.with_rows` has put in its place.
+# Rows of two or three numbers. A file may give the name of another file; `rows.with_rows` replaces it by its rows.
 Rows = Annotated[list[Pair], BeforeValidator(lambda value: value, json_schema_input_type=list[Pair] | str)]
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
 PathRows = Annotated[
@@ -112,7 +112,7 @@ class _Table(BaseModel):
 
 
 def _optional(description: str, default: Any = None) -> Any:
-    """A field that a file may leave out."""
+    """Return a field that may be omitted in a file."""
     return Field(default=default, description=description)
 
 
@@ -123,20 +123,20 @@ _PAIR_IN_TIME = Annotated[list[FunctionOfTime], Field(min_length=2, max_length=2
 
 
 class ForcePiece(_Table):
-    """One of the pieces of a force."""
+    """One piece of a force."""
 
     until: Number | None = _UNTIL
     force: _PAIR_IN_TIME = Field(description="[x, y] in the ground frame in N, numbers or expressions of the time t")
 
 
 class TorquePiece(_Table):
-    """One of the pieces of a torque."""
+    """One piece of a torque."""
 
     until: Number | None = _UNTIL
     torque: FunctionOfTime = Field(description="the torque in N m, a number or an expression of the time t")
 
 
-# How files write a component, or both, that may be a law in time: by a function, by pieces, by rows of a table.
+# Schema of one component, or of two, that may be time profiles: a function, pieces, rows of a table, and the columns.
 _IN_TIME: dict[Any, tuple[Any, Any, Any, str]] = {
     InTime: (FunctionOfTime, TorquePiece, Rows, "[t, torque] in s and N m, or the name of a file with two"),
     tuple[InTime, InTime]: (
@@ -146,7 +146,7 @@ _IN_TIME: dict[Any, tuple[Any, Any, Any, str]] = {
 
 
 def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
-    """Fields of a table for what may be a law in time."""
+    """Return the fields of a table for a quantity that may be a time profile."""
     written, piece, rows, columns = _IN_TIME[hint]
     pieces: Any = Annotated[list[piece], Field(min_length=1)]
     example = f"a list of {{ until = s, {name} = ... }}, the last without until"
@@ -163,7 +163,7 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
 
 TwoPoints = TwoJoints = Annotated[list[Text], Field(min_length=2, max_length=2)]
 Yes = Annotated[bool, Field(strict=True)]
-# How files write what a field of a member is.
+# Schema type of a field by the type annotation of a member's class.
 _WRITTEN: dict[Any, Any] = {
     float: Number, int: Count, str: Text, bool: Yes, PointRef: Text, tuple[float, float]: Pair, NoneType: NoneType,
     Mapping[str, float]: dict[Text, Number],
@@ -171,7 +171,7 @@ _WRITTEN: dict[Any, Any] = {
 
 
 def _number_or_word(words: Sequence[str]) -> Any:
-    """A number or an expression, or one of some words; without words any name that is no parameter's."""
+    """Return the type of a number, an expression or one of the words; without words, of any name but a parameter's."""
 
     def read(value: Any, info: ValidationInfo) -> Any:
         if not isinstance(value, str) or value in words:
@@ -203,7 +203,10 @@ def _written(hint: Any) -> Any:
 
 
 def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
-    """Fields of the table of a member from those of its class, needed or not; two points or joints stand together."""
+    """Return the fields of a member's table from those of its class, with two points or joints in one field.
+
+    If `needed` is False, all fields become optional.
+    """
     hints, found = get_type_hints(member), {}
     together = ["name"]
     if hints.get("a") is PointRef:
@@ -226,13 +229,13 @@ def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
 
 
 def _choice(words: Sequence[str], known: Sequence[str]) -> Any:
-    """The field `type` that is one of some words, of all that are known."""
+    """Return the field `type` with some allowed words; its description lists all known words."""
     quoted = [f'"{word}"' for word in known]
     return Literal[tuple(words)], Field(description=f"{', '.join(quoted[:-1])} or {quoted[-1]}")
 
 
 def _member_table(members: Sequence[Any]) -> Any:
-    """The table of a member that is of one of some classes."""
+    """Return the table of a member that belongs to one of several classes."""
     tables = []
     for one in members:
         said = _fields_of(one)
@@ -244,7 +247,7 @@ def _member_table(members: Sequence[Any]) -> Any:
 
 
 def _joint_table() -> Any:
-    """The table of a joint of any kind, with the fields of all: what one needs others do not have."""
+    """Return the table of a joint of any kind, with the fields of all kinds, all of them optional."""
     found = {"type": _choice(list(JOINT_KINDS), list(JOINT_KINDS))}
     for kind in JOINT_KINDS.values():
         found = found | {name: one for name, one in _fields_of(kind, needed=False).items() if name not in found}
@@ -252,7 +255,7 @@ def _joint_table() -> Any:
 
 
 class SectionTable(_Table):
-    """A cross-section, by its shape or by its properties: what one shape needs others do not have."""
+    """A cross-section, given by its shape or by its properties; the fields depend on the shape."""
 
     shape: Literal["rectangle", "round", "tube"] | None = _optional(
         '"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
@@ -282,7 +285,7 @@ class LumpTable(_Table):
 
 
 class DampingTable(_Table):
-    """Structural damping of a body: by ratios, by a loss factor, or in proportion to mass and stiffness."""
+    """Structural damping of a body: modal damping ratios, a loss factor, or Rayleigh damping."""
 
     ratios: list[Number] = _optional(
         "the damping ratio of each mode of the body as its joints hold it; the last serves the rest", []
@@ -343,14 +346,14 @@ class RigidTable(_Table):
 if TYPE_CHECKING:
 
     class JointTable(_Table):
-        """What all joints have."""
+        """Fields common to all joints."""
 
         type: str
         points: list[str]
 else:
     JointTable = _joint_table()
 
-# A revolute joint may be written as its two points alone. Tags are such that errors do not show them.
+# A revolute joint may be written as its two points alone. The tags are chosen such that errors do not show them.
 JointEntry = Annotated[
     Annotated[TwoPoints, Tag("list[point]")] | Annotated[JointTable, Tag("JointTable")],
     Discriminator(lambda value: "JointTable" if isinstance(value, dict) else "list[point]"),
@@ -358,7 +361,7 @@ JointEntry = Annotated[
 
 
 class AssumedModesTable(_Table):
-    """A bar along its x axis that deforms in given shape functions of z = x/length."""
+    """A beam along its x axis that deforms in given shape functions of z = x/length."""
 
     type: Literal["assumed-modes"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     length: Number = Field(description="the length in m")
@@ -376,7 +379,7 @@ class AssumedModesTable(_Table):
 
 
 class ModalPointTable(_Table):
-    """A point of a body of given matrices."""
+    """A point of a body given by its matrices."""
 
     position: Pair = Field(description="[x, y] in the body frame in m")
     shape: list[list[Number]] = Field(description="two rows, displacement along x and y per flexible coordinate")
@@ -384,7 +387,7 @@ class ModalPointTable(_Table):
 
 
 class ModalTable(_Table):
-    """A flexible body by its own matrices."""
+    """A flexible body given by its matrices."""
 
     type: Literal["modal"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     mass: Number = Field(description="the mass in kg")
@@ -404,7 +407,7 @@ class ModalTable(_Table):
 
 
 class PieceTable(_Table):
-    """One of the pieces of a law."""
+    """One piece of a profile."""
 
     until: Number | None = _UNTIL
     angle: FunctionOfTime | None = _optional("the angle in rad, an expression of the time t")
@@ -412,7 +415,7 @@ class PieceTable(_Table):
 
 
 class PrescribedTable(_Table):
-    """A joint's angle, or where it slides its displacement, given in time."""
+    """A prescribed motion: the angle of a joint, or the displacement of a sliding joint, as a profile."""
 
     joint: Text = Field(description="the name of a joint")
     angle: FunctionOfTime | None = _optional(
@@ -431,7 +434,7 @@ class PrescribedTable(_Table):
 
 
 class AssemblyTable(BaseModel):
-    """Approximate angles of bodies by name, and places of points from which the other angles follow."""
+    """Approximate angles of bodies by name, and positions of points that determine the other angles."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, Number] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -442,12 +445,12 @@ class AssemblyTable(BaseModel):
 
     @property
     def angles(self) -> dict[str, float]:
-        """Of the bodies that have one [rad]."""
+        """Angles of the bodies for which one is given [rad]."""
         return dict(self.__pydantic_extra__ or {})
 
 
 class DeflectionTable(_Table):
-    """How far a point of a beam is off its place in the body frame."""
+    """Deflection of a point of a beam from its undeformed position in the body frame."""
 
     axial: Number | None = _optional("the stretch along the beam in m")
     transverse: Number | None = _optional("the displacement across the beam in m")
@@ -473,14 +476,14 @@ class RatesTable(_Table):
 
 
 class VelocityTable(_Table):
-    """Velocities at the start; the rest follows."""
+    """Velocities at the start, from which the others follow by the constraints."""
 
     angular: dict[str, Number] = _optional("the rate of each body's angle in rad/s", {})
     point: dict[str, Pair] = _optional('[x, y] in m/s for each "body.point"', {})
 
 
 class StartTable(_Table):
-    """How a model without a path starts."""
+    """Initial state of a model without a path."""
 
     deflection: dict[str, dict[str, Pair | DeflectionTable]] = _optional(
         "[axial, transverse] in m, or a table of axial, transverse, slope, for points of beams", {}
@@ -491,14 +494,14 @@ class StartTable(_Table):
 
 
 class EndEffectorTable(_Table):
-    """The point that is to follow a path."""
+    """The end-effector, a point that follows a path."""
 
     point: Text = Field(description='"body.point"')
     coordinates: list[Text] = _optional('task coordinates from "x", "y", "angle"', ["x", "y"])
 
 
 class PayloadTable(_Table):
-    """What the end-effector carries, fixed to its point."""
+    """A payload fixed to the point of the end-effector."""
 
     mass: Number = Field(description="the mass in kg")
     inertia: Number = _optional("the moment of inertia about its centre of mass in kg m^2", 0.0)
@@ -509,7 +512,7 @@ class PayloadTable(_Table):
 
 
 class ShaperTable(_Table):
-    """An input shaper, by which a path or torques leave modes of vibration at rest."""
+    """An input shaper, which modifies a path or torques such that they leave modes of vibration at rest."""
 
     type: Literal["zv", "zvd", "zvdd", "ei"] = Field(description='the kind: "zv", "zvd", "zvdd" or "ei"')
     frequencies: Number | list[Number] = Field(
@@ -563,7 +566,7 @@ class PointsTable(_PathTable):
 
 
 class TabulatedPathTable(_PathTable):
-    """A smooth curve through many points, such as those of a file."""
+    """A smooth curve through many points, such as points read from a file."""
 
     type: Literal["table"]
     table: PathRows = Field(
@@ -575,7 +578,7 @@ class TabulatedPathTable(_PathTable):
 
 
 class SequenceTable(_PathTable):
-    """Paths one after another in one motion."""
+    """Several paths, one after the other, in one motion."""
 
     type: Literal["sequence"]
     paths: list[Text] = Field(description="names of other [path.NAME] tables, in order")
@@ -589,7 +592,7 @@ PathTable = Annotated[
 
 
 class TorqueTable(_Table):
-    """A motor's torque in time, by pieces or a table."""
+    """The torque of a motor as a profile: an expression, pieces or a table."""
 
     torque: FunctionOfTime | None = _optional("the torque in N m, an expression of the time t")
     pieces: Annotated[list[TorquePiece], Field(min_length=1)] | None = _optional(
@@ -599,14 +602,14 @@ class TorqueTable(_Table):
     interpolation: InterpolationName | None = _INTERPOLATION
 
 
-# A number or an expression of the time, or a table. Tags are such that errors do not show them.
+# A number or an expression of the time, or a table. The tags are chosen such that errors do not show them.
 TorqueEntry = Annotated[
     Annotated[FunctionOfTime, Tag("number[t]")] | Annotated[TorqueTable, Tag("TorqueTable")],
     Discriminator(lambda value: "TorqueTable" if isinstance(value, dict) else "number[t]"),
 ]
 
 
-# Of all motors or by motor, and of all sensors or by sensor.
+# One number for all motors or sensors, or numbers by motor or sensor.
 NumbersOf = Number | dict[str, Number]
 Matrix = list[list[Number]]
 
@@ -619,7 +622,7 @@ ReferenceEntry = Annotated[
 
 
 class ControllerTable(_Table):
-    """A sampled controller: what stands around its law."""
+    """A sampled controller: settings common to all control laws."""
 
     period: Number = Field(description="the time between samples in s")
     delay: Number = _optional("the time from a sample until its torques act in s", 0.0)
@@ -648,7 +651,7 @@ class ControllerTable(_Table):
 
 
 class PIDTable(ControllerTable):
-    """A PID law of the angles of motors."""
+    """A PID control law of the angles or displacements of motors."""
 
     type: Literal["pid"]
     stiffness: NumbersOf = Field(description="the proportional gain in N m/rad or N/m, of all motors or by motor")
@@ -659,7 +662,7 @@ class PIDTable(ControllerTable):
 
 
 class StateSpaceTable(ControllerTable):
-    """A discrete model from readings to torques."""
+    """A discrete state-space model from readings to torques."""
 
     type: Literal["state-space"]
     D: Matrix = Field(description="rows of the matrix from readings to torques")
@@ -669,7 +672,7 @@ class StateSpaceTable(ControllerTable):
 
 
 class ComputedTorqueTable(ControllerTable):
-    """Computed torque of the rigid mechanism in task space, in place of planned torques."""
+    """Computed-torque control of the rigid mechanism in task space, in place of planned torques."""
 
     type: Literal["computed-torque"]
     frequency: Number = Field(description="the frequency of the end-effector's error, as of an oscillator, in Hz")
@@ -678,7 +681,7 @@ class ComputedTorqueTable(ControllerTable):
 
 
 class RateFeedbackTable(ControllerTable):
-    """Feedback of rates of readings, such as strains."""
+    """Feedback of the rates of readings, such as strains."""
 
     type: Literal["rate-feedback"]
     gains: dict[str, dict[str, Number]] = Field(
@@ -689,7 +692,7 @@ class RateFeedbackTable(ControllerTable):
 
 
 class LQGTable(ControllerTable):
-    """LQG designed as a run starts, on the linear model of the mechanism in its mode."""
+    """LQG control, designed at the start of a run for the linear model of the mechanism in its mode."""
 
     type: Literal["lqg"]
     deviations: dict[str, Number] = Field(
@@ -724,7 +727,7 @@ AnyControllerTable = Annotated[
 
 
 class StudyDefaultsTable(_Table):
-    """What `paraflex run` does unless asked otherwise."""
+    """Default settings of `paraflex run`."""
 
     path: Text | None = _optional("the name of a [path.NAME] table")
     paths: list[Text] = _optional(
@@ -769,7 +772,7 @@ class StudyDefaultsTable(_Table):
 
 
 def _quoted(value: Any) -> Any:
-    """Values by names of coordinates: a name without quotes would be tables within tables."""
+    """Check that names of coordinates are quoted, because TOML reads an unquoted name as nested tables."""
     for name, each in value.items() if isinstance(value, dict) else ():
         if isinstance(each, dict):
             raise _refused(f'"{name}" is a table: a name with points stands in quotes', 'write "body.point.x" = ...')
@@ -780,7 +783,7 @@ NumbersByName = Annotated[dict[str, Number], BeforeValidator(_quoted, json_schem
 
 
 class StaticsTable(_Table):
-    """What `paraflex statics` finds unless asked otherwise."""
+    """Default settings of `paraflex statics`."""
 
     loads: NumbersByName = _optional(
         'the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"', {}
@@ -846,7 +849,7 @@ class ModelTable(_WithGroups):
 
 
 def model_schema() -> dict[str, Any]:
-    """JSON Schema of a model file, for editors."""
+    """Return the JSON Schema of a model file, for editors."""
     schema = ModelTable.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "paraflex model"}
 

@@ -1,4 +1,4 @@
-"""A [start] table as a start by names."""
+"""Reading of the [start] table of a model file."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from paraflex.mechanism import BodyValues, Deflection, Mechanism, PointRef, Star
 
 
 def read_start(table: StartTable, mechanism: Mechanism) -> Start:
-    """What a file says of the start.
+    """Build the start of a model from its table.
 
     Raises
     ------
     InputError
-        See `mechanism.check_start`.
+        Invalid start; see `mechanism.check_start`.
     """
     start = Start(
         deflection={

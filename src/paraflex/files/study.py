@@ -1,4 +1,4 @@
-"""The study that a model proposes: what a run of it does unless asked otherwise."""
+"""Default settings of the runs of a model, from its [study] table."""
 
 from __future__ import annotations
 
@@ -17,42 +17,45 @@ from paraflex.mechanism.quantities import known
 
 @dataclass(frozen=True)
 class StudyDefaults:
-    """What a study of the model does unless asked otherwise.
+    """Default settings of runs and studies of a model.
 
     Attributes
     ----------
     path : str or None
-        The name of one of the model's paths.
+        Name of one of the model's paths.
     paths : tuple of str
-        In its place names of several: `paraflex run` and studies of many designs take all, what takes one the first.
+        Names of several paths, in place of `path`. `paraflex run` and studies of many designs use all of them, other
+        functions the first.
     modes : tuple of str
+        Names of actuation modes; empty for all modes of the mechanism.
     duration : float or None
-        [s]; the path's own where None.
+        Duration including the dwell [s]; None for that of the path.
     samples : int
+        Number of output samples.
     assembly : str or None
-        The first of the mechanism where None.
+        Name of the assembly; None for the first one of the mechanism.
     torques : mapping of str to float or AngleLaw
-        Motor torques of a run without a path, constant or in time [N m].
+        Motor torques of a run without a path, constant or as profiles [N m].
     orientation : float
-        Angle of the end-effector along the path, where it is a task coordinate [rad].
+        Angle of the end-effector along the path, if it is a task coordinate [rad].
     method : str or None
-        Of integration; the program's own where None.
+        Integration method; None for the default.
     tolerance : float or None
-        Of the integration [m].
+        Tolerance of the integration [m]; None for the default.
     tolerance_per, control : str or None
-        Of the integration: see `IntegrationOptions`.
+        Options of the error control; see `IntegrationOptions`.
     step : float or None
-        Fixed [s].
+        Fixed step size [s]; None for steps chosen by the method.
     after : str
-        What the active motors do after the path: "free" or "hold".
+        State of the active motors after the path: "free" or "hold".
     reduced : int or None
-        Flexible coordinates that runs keep of all bodies together; all where None or 0.
+        Number of flexible coordinates that runs keep, of all bodies together; None or 0 for all.
     error : str
-        Which tracking error ranks modes: that of the "motion", or of the "whole" run.
+        Time span of the tracking error that ranks modes: the "motion", or the "whole" run.
     controllers : tuple of str
-        Names of the model's controllers that act, beside the torques planned along a path.
+        Names of the model's controllers that act in addition to the torques planned along a path.
     shaper : Shaper or None
-        Of the torques planned along a path: see `shape_torques`.
+        Input shaper of the torques planned along a path; see `shape_torques`.
     """
 
     path: str | None = None
@@ -76,24 +79,29 @@ class StudyDefaults:
 
     @property
     def first_path(self) -> str | None:
-        """The name of its path, or of the first of several; None where it names none."""
+        """Name of the path, or of the first of several; None if there is none."""
         return self.path or next(iter(self.paths), None)
 
     def filled(self, **chosen: Any) -> StudyDefaults:
-        """The study with what a caller chooses of it; what is None stays as the study says."""
+        """Return the study with the chosen values replaced; None and empty strings leave a value unchanged."""
         return replace(self, **{name: value for name, value in chosen.items() if value not in (None, "")})
 
     def integration(self, chosen: Mapping[str, Any] | None = None) -> IntegrationOptions:
-        """How runs are integrated: as a caller chooses, then as the study says, else as `IntegrationOptions` has it.
+        """Return the integration options: those chosen, else those of the study, else the defaults.
 
-        A step goes with a method: where another method is chosen the study's step is left out, and where the method or
-        the step chosen leaves `tolerance_per` or `control` without effect the study's as well. `parameters` of the
-        method are in the words of files and commands.
+        A step size belongs to a method: if another method is chosen, the study's step is ignored. If `tolerance_per` or
+        `control` has no effect with the chosen method or step, the study's value is ignored as well.
+
+        Parameters
+        ----------
+        chosen : mapping, optional
+            Options that replace those of the study, by name. `parameters` of the method are written as in files and
+            commands.
 
         Raises
         ------
         InputError
-            Options that do not go together.
+            Incompatible options.
         """
         given = {name: value for name, value in (chosen or {}).items() if value is not None}
         own = {name: getattr(self, name) for name in ("method", "tolerance", "tolerance_per", "control", "step")}
@@ -109,7 +117,13 @@ class StudyDefaults:
 
 
 def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDefaults) -> None:
-    """Check that a study names what the mechanism and its paths have, and that its numbers can be."""
+    """Check that a study refers to existing paths and members of the mechanism, and that its numbers are valid.
+
+    Raises
+    ------
+    InputError
+        Unknown name, or invalid number or combination of options.
+    """
     if study.path is not None:
         known(study.path, paths, "study.path", "path")
         if study.paths:

@@ -1,4 +1,4 @@
-"""The tables of a model file from the mechanism, the paths, the study, start and statics that it is to say."""
+"""Conversion of a model to the tables of its file: mechanism, paths, controllers, start, study and statics."""
 
 from __future__ import annotations
 
@@ -40,31 +40,33 @@ from paraflex.mechanism import (
 from paraflex.mechanism.quantities import joint_pair
 
 _BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
-# What all beams of a file may have in common at its top, and what they have where it says nothing.
+# Properties of beams that a file may give once for all of them, at its top, with their defaults.
 _SHARED = {"reference": "pinned", "curvature": "separate"}
-# Tables that bodies name, and the field of a body that has the names.
+# Tables to which bodies refer by name, with the field of a body that holds the names.
 _NAMED_TABLES = {"section": "section", "material": "material", "lump": "lumps"}
 
 
 def model_tables(
     model: Any, *, file: Mapping[str, Any] | None = None, before: Mechanism | None = None, each: bool = False
 ) -> dict[str, Any]:
-    """What a model file says of a model; what is as it is where a file says nothing is left out.
+    """Build the tables of the file of a model, without entries that equal their defaults.
 
     Parameters
     ----------
     model : Model
+        Model to write.
     file : mapping, optional
-        Data of a file whose names for sections, materials and lumps are kept.
+        Data of a file whose names of sections, materials and lumps are kept.
     before : Mechanism, optional
-        That of the file.
+        Mechanism described by that file.
     each : bool
-        Whether every beam says its reference condition and its treatment of curvature, or the file for all that agree.
+        Whether every beam gives its own reference condition and treatment of curvature. By default the file gives them
+        once if all beams agree.
 
     Raises
     ------
     InputError
-        A member that a file has no words for.
+        Member that cannot be expressed in a file.
     """
     mechanism, study = model.mechanism, model.study
     if mechanism.bases:
@@ -113,7 +115,7 @@ def model_tables(
 
 
 def _member(member: Any) -> dict[str, Any]:
-    """The fields of a member; its points a and b together, and so two joints."""
+    """Return the fields of a member's table, with its points a and b in one field, and likewise two joints."""
     together = {"points": ["a", "b"] if hasattr(member, "a") else [], "joints": joint_pair(member)}
     pairs = {key: [getattr(member, name) for name in names] for key, names in together.items() if names}
     if isinstance(member, PointForce | AppliedTorque):
@@ -123,7 +125,7 @@ def _member(member: Any) -> dict[str, Any]:
 
 
 def _laws(model: Any) -> Iterator[tuple[str, AngleLaw]]:
-    """Laws in time of a model, each with its place in a file."""
+    """Yield the time profiles of a model, each with its field in a file."""
     torques = model.study.torques
     yield from ((f"prescribed.{one.name}.law", one.law) for one in model.mechanism.prescribed)
     yield from ((f"load.{load.name}.{load.kind}", law) for load in model.mechanism.loads for law in load.laws)
@@ -135,7 +137,7 @@ def _laws(model: Any) -> Iterator[tuple[str, AngleLaw]]:
 
 
 def _plain(value: Any, field: str) -> Any:
-    """Values as TOML has them: texts, numbers, lists and tables."""
+    """Convert values to those of TOML: texts, numbers, booleans, lists and tables."""
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, bool):
@@ -163,23 +165,23 @@ def _text(text: str, field: str) -> str:
 
 
 def _agreed(mechanism: Mechanism) -> dict[str, str]:
-    """What all beams have in common of reference condition and curvature."""
+    """Return the reference condition and the curvature treatment, each if all beams agree in it."""
     beams = [body for body in mechanism.bodies if isinstance(body, FlexibleBeam)]
     values = {key: {getattr(beam, key).value for beam in beams} for key in _SHARED}
     return {key: found.pop() for key, found in values.items() if len(found) == 1}
 
 
 class _Names:
-    """Names of the sections, materials or lumps of a mechanism, and what they name.
+    """Names of the sections, materials or lumps of a mechanism, with their values.
 
-    A name that a file has stays where it is. It gets another value where all that had the old one have another.
+    Names in a file are kept where they are used. A name gets a new value if all of its users have changed theirs.
 
     Attributes
     ----------
     at : mapping
-        Names by body and place: the number of a span, or the name of a point.
+        Names by body and place, which is the number of a span or the name of a point.
     values : mapping
-        By name.
+        Values by name.
     """
 
     def __init__(self, kind: str, mechanism: Mechanism, file: Mapping[str, Any], before: Mechanism | None) -> None:
@@ -202,7 +204,7 @@ class _Names:
 
 
 def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
-    """Every section, material or lump by body and place."""
+    """Return every section, material or lump by body and place."""
     out: dict[tuple[str, Any], Any] = {}
     for body in mechanism.bodies:
         given = getattr(body, _NAMED_TABLES[kind], ())
@@ -222,7 +224,7 @@ def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
 
 
 def _name_at(file: Mapping[str, Any], field: str, body: str, place: Any) -> str | None:
-    """The name that a file has there."""
+    """Return the name that a file uses at a place of a body; None if there is none."""
     found = file.get("body", {}).get(body, {}).get(field, ())
     if isinstance(found, Mapping):
         return found.get(place)
@@ -231,7 +233,7 @@ def _name_at(file: Mapping[str, Any], field: str, body: str, place: Any) -> str 
 
 
 def _section(section: Section, name: str, file: Mapping[str, Any]) -> dict[str, Any]:
-    """The table of a section; a rectangle says so where the file's does."""
+    """Build the table of a section; the shape of a rectangle is given only if the file gives it."""
     shape = section.shape
     if shape is None:
         return fields_said(section)
@@ -260,7 +262,7 @@ def _body(body: Body, names: Mapping[str, _Names], shared: Mapping[str, str]) ->
 
 
 def _functions(functions: Sequence[ShapeFunction], field: str, direction: str) -> dict[str, Any]:
-    """Shape functions as files have them: the first sines, then polynomials."""
+    """Convert shape functions to the fields of a file: the number of sines, then the polynomials."""
     sines = [function.half_waves for function in functions if isinstance(function, Sine)]
     polynomials = [function.coefficients for function in functions[len(sines) :] if isinstance(function, Polynomial)]
     if sines != list(range(1, len(sines) + 1)) or len(sines) + len(polynomials) != len(functions):
@@ -304,7 +306,7 @@ def _shaper(shaper: Shaper) -> dict[str, Any]:
 
 
 def _torques(study: StudyDefaults) -> dict[str, Any]:
-    """Torques of motors: a number or an expression alone where that says it."""
+    """Build the entries of motor torques: a single number or expression if sufficient, else a table."""
     said = {}
     for name, law in study.torques.items():
         with within(f"study.torques.{name}"):

@@ -1,4 +1,4 @@
-"""Many runs as one result."""
+"""Studies: sets of runs evaluated together and returned as one result."""
 
 from paraflex.designs.derivatives.gradient import metric_gradients as metric_gradients
 from paraflex.designs.sweep import (

@@ -1,4 +1,4 @@
-"""Runs of several models of one mechanism, and their distances."""
+"""Results of a verification: runs of several models of one mechanism, and the distances between them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from paraflex.validity import doubtful_numbers
 
 
 class Refinement(Enum):
-    """Runs of one model: the base run, and finer ones whose distance from it shows its convergence."""
+    """Refinement levels of a model's runs: the distance of the finer runs from the base run shows its convergence."""
 
     NONE = "base"
     STEP = "finer step"
@@ -42,22 +42,22 @@ class ModelRuns:
     Attributes
     ----------
     records : mapping of Refinement to Record
-        Runs that were started; the figures of a failed one have its status.
+        Runs that were started; the `figures` of a failed run contain its status.
     failure : str
-        Why one of them failed; empty where none did.
+        Reason of the first failure; empty if no run failed.
     """
 
     records: Mapping[Refinement, Record]
     failure: str = ""
 
     def finished(self, level: Refinement | str) -> Record | None:
-        """A run that reached its end."""
+        """Return the run at a refinement level if it reached its end, else None."""
         run = self.records.get(as_enum(Refinement, level, "level"))
         return run if run is not None and run.figures["status"] == "complete" else None
 
     @property
     def base(self) -> Record | None:
-        """The run to compare, if it reached its end."""
+        """Base run, which is compared with other models; None if it did not reach its end."""
         return self.finished(Refinement.NONE)
 
 
@@ -69,16 +69,18 @@ class Verification(Result):
     Attributes
     ----------
     task : TrackingTask
+        Task that every model was run on.
     models : tuple of str
+        Names of the models.
     runs : mapping of str to mapping of str to ModelRuns
-        By mode and model.
+        Runs by mode, then by model.
     interrupted : bool
-        Whether the user stopped it; models that were not begun are missing.
+        Whether the user stopped the study; models that were not started are missing.
     parameters : mapping or None
-        Kept as provenance.
+        Parameters stored as provenance.
     error : ErrorSpan
-        What tracking errors are of: the motion, or the whole run, dwell included. Distances between models are of the
-        whole run.
+        Time span of the tracking errors: the motion, or the whole run including the dwell. Distances between models
+        always refer to the whole run.
     """
 
     kept_as = VERIFICATION
@@ -100,9 +102,10 @@ class Verification(Result):
 
     @cached_property
     def data(self) -> xr.Dataset | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The base runs as one dataset, with a dimension `model` besides those of a tracking study.
+        """Base runs as one dataset, with a dimension `model` in addition to those of a tracking study.
 
-        Modes that every model began; where there is none, models that every mode begun has; None where there are none.
+        The dataset holds the modes in which every model was started. If there is no such mode, it holds the models that
+        were started in every mode with any run. It is None if neither exists.
         """
         begun = {
             mode: {name: runs.records[Refinement.NONE] for name, runs in by_model.items() if runs.records}
@@ -117,7 +120,7 @@ class Verification(Result):
             tracking_dataset([records[name] for records in kept.values()], parameters=self.parameters, error=self.error)
             for name in names
         ]
-        # Models differ in what they give besides: section forces, angles of joints.
+        # Models differ in their further variables, such as section forces and joint angles.
         common = set.intersection(*(set(part.variables) for part in parts))
         parts = [part.drop_vars(set(part.variables) - common) for part in parts]
         methods = [part.attrs.pop("method") for part in parts]
@@ -126,7 +129,7 @@ class Verification(Result):
         return data.assign(method=("model", methods))
 
     def to_dict(self) -> dict[str, Any]:
-        """Errors and distances of the models in plain values; None for what a run did not reach."""
+        """Return errors and distances of the models as plain values; None where a run did not reach its end."""
         task, reference = self.task, reference_model(self.models)
         part = part_of(task.path, float(task.motion.t[-1]))
         findings = [*doubtful_numbers(task.mechanism), *([] if part is None else [part.finding()])]
@@ -148,7 +151,11 @@ class Verification(Result):
 
 @checked_arguments()
 def reference_model(models: Sequence[str]) -> str:
-    """The reference of a comparison: second-order geometry, or else the first model with flexible links."""
+    """Return the reference model of a comparison: second-order geometry, or else the first model with flexible links.
+
+    The order of preference is second-order, exudyn, segments, mujoco, linear, ked. If none of them is among the models,
+    the first model is returned.
+    """
     for name in ("second-order", "exudyn", "segments", "mujoco", "linear", "ked"):
         if name in models:
             return name
@@ -203,7 +210,7 @@ def _change(runs: ModelRuns, level: Refinement) -> float | None:
 
 
 def _tracking_error(task: TrackingTask, span: ErrorSpan, run: Record | None) -> float | None:
-    """Root mean square distance from the desired path during the motion, or over all samples (Eq. 64) [m]."""
+    """Compute the RMS distance from the desired path during the motion, or over all samples (Eq. 64) [m]."""
     if run is None:
         return None
     position, motion = run.end_effector.position, task.motion
@@ -213,7 +220,7 @@ def _tracking_error(task: TrackingTask, span: ErrorSpan, run: Record | None) -> 
 
 
 def _distance(a: Record, b: Record) -> float:
-    """Largest distance between the end-effectors of two whole runs [m]."""
+    """Compute the largest distance between the end-effectors of two whole runs [m]."""
     return float(_gaps(a.end_effector.position, b.end_effector.position).max())
 
 

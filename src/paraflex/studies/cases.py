@@ -1,4 +1,4 @@
-"""Cases on which methods are compared: one motion, run by any method, and the points of its error."""
+"""Test cases for comparing integration methods: one motion, and the points whose positions define the error."""
 
 from __future__ import annotations
 
@@ -30,15 +30,18 @@ class Case:
     Attributes
     ----------
     name : str
-        In words.
+        Short description of the case.
     system : System
+        System whose equations of motion are integrated.
     duration : float
-        [s]
+        Duration of the motion [s].
     samples : int
+        Number of output samples.
     points : tuple of PointRef
-        Whose places are compared; the origins of all body frames where there are none.
+        Points whose positions are compared; if empty, the origins of all body frames.
     solve : callable
-        The solution with options, telling a callable the time reached [s].
+        Function that integrates the motion with given options and returns the solution. Its second argument, a callable
+        or None, receives the time reached [s].
     """
 
     name: str
@@ -49,7 +52,7 @@ class Case:
     solve: Callable[[IntegrationOptions, Progress | None], Solution]
 
     def places(self, solution: Solution) -> Array:
-        """Positions (k, points, 2) at the samples [m]."""
+        """Compute the positions of the compared points at the samples (k, points, 2) [m]."""
         q, v, a = solution.q, solution.v, solution.a
         if not self.points:
             return np.stack([q[:, body.position] for body in self.system.bodies], axis=1)
@@ -58,12 +61,19 @@ class Case:
 
 @checked_arguments()
 def tracking_case(task: TrackingTask, mode: str | ActuationMode) -> Case:
-    """One mode of a task; the error is the end-effector's.
+    """Build the case of one mode of a task; the error is that of the end-effector.
+
+    Parameters
+    ----------
+    task : TrackingTask
+        Planned motion along a path.
+    mode : str or ActuationMode
+        Actuation mode.
 
     Raises
     ------
     InputError
-        No such mode.
+        Unknown mode.
     """
     chosen, effector = task.mode(mode), task.mechanism.end_effector
     assert effector is not None
@@ -86,7 +96,7 @@ def motion_case(
     torques: Mapping[str, InTime] | None = None,
     start: State,
 ) -> Case:
-    """A mechanism's motion without a path; the error is the end-effector's, or else the largest of all named points.
+    """Build the case of a motion without a path; the error is that of the end-effector, or else of all named points.
 
     Parameters
     ----------
@@ -96,7 +106,7 @@ def motion_case(
     Raises
     ------
     InputError
-        A duration or number of samples that makes no sense.
+        Invalid duration or number of samples.
     """
     check_times(duration, samples)
     effector = mechanism.end_effector
@@ -114,7 +124,7 @@ def motion_case(
 
 
 def _solution(run: Callable[[], TrackingRun | MotionRun]) -> Solution:
-    """Solution of a run; that of a failed one from its error."""
+    """Return the solution of a run; an IntegrationError is passed on with the partial solution."""
     try:
         return run().solution
     except IntegrationError as error:

@@ -1,4 +1,4 @@
-"""Work and precision of every method on one motion: runs one after the other, each against a converged one."""
+"""Work-precision comparison of integration methods on one motion, with errors relative to a converged run."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from paraflex.integrators.methods import Family, Method, find_method
 from paraflex.studies.cases import Case
 from paraflex.studies.comparison import Measurement, MethodComparison, Reference
 
-# The reference is asked for this part of the tightest tolerance, its check for twice that; both may take this
-# many times the limit of a run.
+# The reference run uses the tightest tolerance divided by the first number, its check run twice that tolerance. Their
+# time limit is that of a run times the second number.
 _FINER, _REFERENCE_PATIENCE = 10.0, 20.0
-# Repetitions are for short runs: none is begun after so long [s].
+# Only short runs are repeated: no repetition starts after this total wall time [s].
 _LONG_ENOUGH = 3.0
 _RUN_COUNTS = (
     "wall_time",
@@ -45,13 +45,13 @@ class ComparisonOptions(CheckedFields):
     Attributes
     ----------
     tolerances : tuple of float
-        Of methods that choose their steps [m].
+        Tolerances of the methods with error control [m].
     steps : tuple of float
-        Of methods that take one, besides [s].
+        Step sizes of the methods that accept a fixed step [s]; none by default.
     limit : float
         Wall time at which a run is stopped [s].
     repetitions : int
-        Of each run, at most; the fastest counts.
+        Largest number of repetitions of each run; the fastest counts.
     """
 
     tolerances: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6)
@@ -70,38 +70,38 @@ class ComparisonOptions(CheckedFields):
 
     @property
     def tightest(self) -> float:
-        """The tightest tolerance, or that of the defaults [m]."""
+        """Tightest tolerance, or that of the defaults if there are none [m]."""
         return min(self.tolerances or ComparisonOptions.tolerances)
 
 
 class _TooSlowError(Exception):
-    """A run longer than the time limit."""
+    """Error raised when a run exceeds the time limit."""
 
 
 @dataclass(frozen=True)
 class ComparisonStudy(WholeStudy[MethodComparison], CheckedFields):
-    """One motion by every method at every tolerance: time, work and error of each.
+    """Comparison of integration methods: one motion by every method at every tolerance, with time, work and error.
 
-    Runs come one after the other, so that their wall times can be compared: workers have no part in it.
+    The runs are sequential, so that their wall times are comparable; workers are not accepted.
 
     Attributes
     ----------
     case : Case
-        From `studies.tracking_case` or `studies.motion_case`.
+        Motion to integrate, built by `studies.tracking_case` or `studies.motion_case`.
     methods : sequence of Method or str, or None
-        From `METHODS`, with their default parameters; all where None. One that cannot run is listed with its
-        reason and the others go on.
+        Methods of `METHODS` with their default parameters; None for all. A method that cannot run is listed with the
+        reason, and the comparison continues with the others.
     options : ComparisonOptions or None
-        The defaults where None.
+        Options of the comparison; None for the defaults.
     parameters : dict or None
-        Kept as provenance.
+        Parameters stored as provenance.
 
     Raises
     ------
     InputError
-        From `run`: an unknown method, or one with parameters of its own, before anything runs.
+        Unknown method, or one with parameters other than the defaults; raised by `run` before anything runs.
     IntegrationError
-        From `run`: no converged run to compare with.
+        No converged run to compare with; raised by `run`.
     """
 
     gives: ClassVar[type[Result]] = MethodComparison
@@ -156,12 +156,20 @@ def compare_methods(
     options: ComparisonOptions | None = None,
     on_progress: OnProgress | None = None,
 ) -> MethodComparison:
-    """Run a motion by every method at every tolerance: `ComparisonStudy(case, methods, options).run()` in one call."""
+    """Run a motion by every method at every tolerance: a shortcut for `ComparisonStudy(case, methods, options).run()`.
+
+    Parameters
+    ----------
+    case, methods, options
+        See `ComparisonStudy`.
+    on_progress : callable, optional
+        See `Study.run`.
+    """
     return ComparisonStudy(case, methods, options).run(on_progress=on_progress)
 
 
 def _chosen(methods: Iterable[Method | str]) -> list[Method]:
-    """Methods, each once: runs are distinguished by their names."""
+    """Return the methods, each once, because runs are distinguished by the name of their method."""
     chosen = list(dict.fromkeys(map(find_method, methods)))
     for method in chosen:
         if method != METHODS.get(method.name):
@@ -174,7 +182,7 @@ def _chosen(methods: Iterable[Method | str]) -> list[Method]:
 
 @dataclass(frozen=True)
 class _Setting:
-    """A tolerance, or a step with the tolerance of Newton's iteration."""
+    """Tolerance of a run with error control, or step size with the tolerance of Newton's iteration."""
 
     tolerance: float
     step: float | None = None
@@ -183,7 +191,7 @@ class _Setting:
         return IntegrationOptions(method=method, tolerance=self.tolerance, step=self.step)
 
     def row(self, method: str, status: str = "complete", reason: str = "", warned: Sequence[str] = ()) -> Measurement:
-        """A row of a run, without results."""
+        """Return a row for a run, without results."""
         tolerance = self.tolerance if self.step is None else None
         return Measurement(method, tolerance, self.step, status, reason, warnings=tuple(warned))
 
@@ -192,7 +200,7 @@ class _Setting:
 
 
 def _plan(method: Method, options: ComparisonOptions) -> list[_Setting]:
-    """Settings of a method, loosest first; at least one, which the method may refuse."""
+    """Return the settings of a method, loosest first; at least one, which the method may reject."""
     tolerances = [_Setting(value) for value in sorted(set(options.tolerances), reverse=True)]
     steps = [_Setting(options.tightest, value) for value in sorted(set(options.steps), reverse=True)]
     fitting = (tolerances if method.error_control else []) + (steps if method.fixed_step else [])
@@ -219,7 +227,7 @@ def _measurements(
                 _warm_up(case, setting.options(method.name))
             measured = _measure(case, method.name, setting, places, options)
         except (InputError, ImportError) as error:
-            # The method fails, not this run: a wrong argument, or a package that is not installed.
+            # The method itself cannot run: it rejects an argument, or its package is not installed.
             yield Measurement(method.name, status="unavailable", reason=str(error))
             return
         if measured.status == "too slow":
@@ -228,18 +236,18 @@ def _measurements(
 
 
 def _warm_up(case: Case, options: IntegrationOptions) -> None:
-    """Run the first slice of a run, which compiles and loads what is needed at the first call."""
+    """Start a run and stop it at once, so that compiling and loading are not part of the measured times."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             _solve(case, options, 0.0)
         except (_TooSlowError, NumericalError):
-            # A run that fails is reported when it is measured.
+            # A failure is reported when the run is measured.
             return
 
 
 def _measure(case: Case, method: str, setting: _Setting, places: Array, options: ComparisonOptions) -> Measurement:
-    """A run, repeated if it is quick."""
+    """Measure a run, and repeat it if it is short."""
     chosen, solutions = setting.options(method), list[Solution]()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -259,14 +267,14 @@ def _measure(case: Case, method: str, setting: _Setting, places: Array, options:
 
 
 def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
-    """A run to its end.
+    """Integrate a case to its end.
 
     Raises
     ------
     _TooSlowError
-        It took longer than the limit.
+        Run longer than the limit.
     KeyboardInterrupt
-        The user stopped it.
+        Run stopped by the user.
     """
     began, over = time.perf_counter(), False
 
@@ -283,7 +291,10 @@ def _solve(case: Case, options: IntegrationOptions, limit: float) -> Solution:
 
 
 def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, Array]:
-    """Two tight runs, by the two methods of highest order that succeed; errors are distances from the first."""
+    """Compute two runs at tight tolerances with the ESDIRK methods of highest order that succeed.
+
+    Errors of other runs are distances from the first of them. Returns the reference and the positions of its points.
+    """
     ours = sorted((x for x in METHODS.values() if x.family is Family.ESDIRK), key=lambda x: -x.order)
     tolerance = options.tightest / _FINER
     runs: list[tuple[Method, float, Solution]] = []
@@ -316,7 +327,7 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, Array
 
 
 def _distance(one: Array, other: Array) -> float:
-    """Largest distance over points and samples [m]."""
+    """Compute the largest distance over points and samples [m]."""
     return float(np.max(np.linalg.norm(one - other, axis=-1)))
 
 

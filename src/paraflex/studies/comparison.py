@@ -1,4 +1,4 @@
-"""Results of a comparison of methods: a row for each run, the reference, times for an error."""
+"""Results of a comparison of methods: one row per run, the reference, and the wall time needed for an error."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from paraflex.campaign import Result
 from paraflex.folders import COMPARISON
 from paraflex.integrators import DEFAULT_METHOD, METHODS
 
-# Errors at which times are compared [m], and the one in the table.
+# Errors at which wall times are compared [m], and the one used in the table.
 LEVELS, TABLE_LEVEL = (1e-3, 1e-4, 1e-5, 1e-6), 1e-5
 # Fields of a measurement that are not numbers.
 _TEXTS = ("method", "status", "reason")
-# Packages whose version has a part in the times.
+# Packages whose versions influence the wall times.
 _TIMING_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "scikit-sundae")
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The converged run from which errors are distances.
+    """Converged reference run; errors are distances from it.
 
     Attributes
     ----------
     method, check_method : str
-        Of the run, and of a second one that it is held against.
+        Methods of the reference run and of a second run that it is checked against.
     tolerance, check_tolerance : float
-        [m]
+        Tolerances of the two runs [m].
     uncertainty : float
-        Largest distance between the two [m]: smaller errors are not distinguishable from the reference's own.
+        Largest distance between the two runs [m]; smaller errors cannot be distinguished from that of the reference.
     wall_time : float
-        Of the run [s].
+        Wall time of the reference run [s].
     """
 
     method: str
@@ -50,28 +50,31 @@ class Reference:
 
 @dataclass(frozen=True)
 class Measurement:
-    """One method at one tolerance or step.
+    """Measured run of one method at one tolerance or step size.
 
     Attributes
     ----------
     method : str
+        Name of the method.
     tolerance, step : float or None
-        Which of the two was chosen, in metres or seconds; both None where the method cannot run at all.
+        Tolerance [m] or step size [s] of the run, the other one being None; both None if the method cannot run at all.
     status : str
-        "complete"; "failed"; "too slow" for one stopped at the limit of time; "skipped", as what is looser was too slow
+        "complete"; "failed"; "too slow" if stopped at the time limit; "skipped" if a looser setting was too slow
         already; "unavailable".
     reason : str
-        Why it is not complete.
+        Reason why the run is not complete.
     wall_time : float or None
-        Of the fastest repetition [s]; None, like all that follows, where the run did not get to its end.
+        Wall time of the fastest repetition [s]; None, like the following counts, if the run did not reach its end.
     error : float or None
         Largest distance from the reference at the samples [m].
     steps, rejected, newton_iterations, factorisations, evaluations : int or None
+        Counts of the solver; see `Solution`.
     constraint_position_max, constraint_velocity_max, energy_balance_max : float or None
-        See `Solution`.
+        Largest constraint violations and energy imbalance; see `Solution`.
     repetitions : int
+        Number of repetitions that were run.
     warnings : tuple of str
-        What was warned of on the way, each once.
+        Warnings issued during the run, each once.
     """
 
     method: str
@@ -100,19 +103,21 @@ class MethodComparison(Result):
     Attributes
     ----------
     case, mechanism : str
-        What was integrated, in words, and of which mechanism.
+        Short description of the integrated motion, and name of the mechanism.
     duration : float
-        [s]
+        Duration of the motion [s].
     samples : int
+        Number of output samples.
     coordinates, rows : int
-        Of the system: generalised coordinates and constraint rows, those of springs among them.
+        Numbers of generalised coordinates and of constraint rows of the system; the rows include those of springs.
     reference : Reference or None
-        None where the comparison was interrupted before there was one.
+        Reference run; None if the comparison was interrupted before it was computed.
     measurements : tuple of Measurement
+        Measured runs.
     interrupted : bool
-        Whether the user stopped it; runs that were not begun are missing.
+        Whether the user stopped the comparison; runs that were not started are missing.
     parameters : mapping or None
-        Kept as provenance.
+        Parameters stored as provenance.
     """
 
     kept_as = COMPARISON
@@ -140,7 +145,7 @@ class MethodComparison(Result):
 
     @property
     def data(self) -> xr.Dataset:
-        """Every run, (run,): method, tolerance or step, status, error, time and work; NaN for missing values."""
+        """All runs, along dimension `run`: method, tolerance or step, status, error, time, work; NaN where missing."""
         columns = {}
         for name in (each.name for each in fields(Measurement) if each.name != "warnings"):
             values = [getattr(run, name) for run in self.measurements]
@@ -149,14 +154,22 @@ class MethodComparison(Result):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """The methods in the order of their runs."""
+        """Names of the methods, in the order of their runs."""
         return tuple(dict.fromkeys(run.method for run in self.measurements))
 
     def time_to_reach(self, method: str, error: float) -> float | None:
-        """Wall time of a method for an error [s]; None if no run of it was so accurate.
+        """Return the wall time that a method needs for an error [s]; None if no run of it was as accurate.
 
-        Straight lines in the logarithms of both between the runs none of which is slower and less close than another;
-        that of the fastest run where it is closer already.
+        The time is interpolated linearly in the logarithms of time and error along the Pareto front of the runs. If the
+        fastest run is already more accurate, its time is returned. Errors of runs that are below the uncertainty of the
+        reference count as that uncertainty.
+
+        Parameters
+        ----------
+        method : str
+            Name of the method.
+        error : float
+            Error to reach [m].
         """
         assert self.reference is not None or not self.measurements
         floor = self.reference.uncertainty if self.reference is not None else 0.0
@@ -175,18 +188,18 @@ class MethodComparison(Result):
         return float(np.exp(np.interp(-np.log(error), -errors, times)))
 
     def relative_time(self, method: str, error: float = TABLE_LEVEL) -> float | None:
-        """`time_to_reach` as a multiple of the default method's."""
+        """Return `time_to_reach` as a multiple of that of the default method; None if either is missing."""
         own, default = self.time_to_reach(method, error), self.time_to_reach(DEFAULT_METHOD, error)
         return None if own is None or default is None else own / default
 
     def fastest(self, error: float) -> str | None:
-        """The method that reaches an error first; None if none does."""
+        """Return the method that reaches an error [m] in the least wall time; None if no method reaches it."""
         times = {method: self.time_to_reach(method, error) for method in self.methods}
         reached = {method: time for method, time in times.items() if time is not None}
         return min(reached, key=lambda method: reached[method]) if reached else None
 
     def to_dict(self) -> dict[str, Any]:
-        """The comparison in plain values: the content of `compare-methods.json`."""
+        """Return the comparison as plain values: the content of `compare-methods.json`."""
         out = {
             "mechanism": self.mechanism,
             "case": self.case,
@@ -221,7 +234,7 @@ class MethodComparison(Result):
 
 
 def machine() -> dict[str, Any]:
-    """The machine of the measurements."""
+    """Return the description of this machine: processor, number of processors, operating system, Python version."""
     model = platform.processor() or platform.machine()
     listing = Path("/proc/cpuinfo")
     if listing.exists():

@@ -1,4 +1,4 @@
-"""Results of studies in notebooks: main results and progress."""
+"""HTML representation of the results of studies in notebooks."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from paraflex.studies.optimisation.result import SearchResult
 from paraflex.studies.sensitivities.study import Sensitivities
 from paraflex.studies.tracking import StudyResult
 
-# Rows of tables that could be long.
+# Largest number of rows shown of a table that could be long.
 _MOST_LISTED = 60
 
 
 @view.register(StudyResult)
 def study_html(result: StudyResult) -> str:
-    """Status, errors and torques of every mode, and counts of the solver; reasons of failures."""
+    """Return status, errors and torques of every mode, counts of the solver, and reasons of failures as HTML."""
     if result.data is None:
         reasons = [sentence(f"{mode}: {reason}") for mode, reason in result.failed.items()]
         return page("study: no mode ran", *reasons)
@@ -61,7 +61,7 @@ def study_html(result: StudyResult) -> str:
 
 @view.register(SweepResult)
 def sweep_html(result: SweepResult) -> str:
-    """Number of runs by status, and the place of the table."""
+    """Return the number of runs by status and the path of the table as HTML."""
     rate = f"{result.fresh} runs in {result.seconds:.3g} s" if result.fresh else None
     known = [
         ("runs", f"{result.done} of {result.total}"),
@@ -74,7 +74,7 @@ def sweep_html(result: SweepResult) -> str:
 
 @view.register(OptimisationResult)
 def optimisation_html(result: OptimisationResult) -> str:
-    """The best design and the start: parameters, objective, metrics."""
+    """Return the best design and the start, with parameters, objective and metrics, as HTML."""
     numbers = [(name, result.start[name], value, result.bounds.get(name, "")) for name, value in result.values.items()]
     metrics = [("objective", result.start_objective, result.objective, "")]
     metrics += [(name, result.start_metrics.get(name), value, "") for name, value in result.metrics.items()]
@@ -90,7 +90,7 @@ def optimisation_html(result: OptimisationResult) -> str:
 
 @view.register(IdentificationResult)
 def identification_html(result: IdentificationResult) -> str:
-    """The parameters found, with deviations, and the value of every target."""
+    """Return the identified parameters, their deviations, and the value of every target as HTML."""
     found = result.confidence
     deviations: Mapping[str, float | None] = {} if found is None else found.deviations
     reasons: Mapping[str, str] = {} if found is None else found.reasons
@@ -119,7 +119,7 @@ def identification_html(result: IdentificationResult) -> str:
 
 @view.register(IndicesResult)
 def indices_html(result: IndicesResult) -> str:
-    """First-order and total indices of every parameter, one row each."""
+    """Return first-order and total indices, one row per metric, path, mode and parameter, as HTML."""
     names = ("metric", "path", "mode", "parameter", "first", "first_confidence", "total", "total_confidence")
     rows = [tuple(row[name] for name in names) for row in result.to_dict()["indices"]]
     heads = ("metric", "path", "mode", "parameter", "first order", "±", "total", "±")
@@ -129,7 +129,7 @@ def indices_html(result: IndicesResult) -> str:
 
 @view.register(Sensitivities)
 def sensitivities_html(found: Sensitivities) -> str:
-    """Elasticities of every metric by every parameter, one row per metric, path and mode."""
+    """Return the elasticities of every metric by every parameter, one row per metric, path and mode, as HTML."""
     relative = found.relative
     rows = [
         (metric, path, mode, float(found.values[i, j]), unit, *(float(x) for x in relative[i, j]))
@@ -144,7 +144,7 @@ def sensitivities_html(found: Sensitivities) -> str:
 
 @view.register(Verification)
 def verification_html(verification: Verification) -> str:
-    """Every model in every mode: tracking error, distance from the reference, time."""
+    """Return tracking error, distance from the reference and wall time of every model in every mode as HTML."""
     found = verification.to_dict()
     rows = [
         (mode, name, run["status"], _millimetres(run.get("tracking_error")), _millimetres(run.get("distance_max")),
@@ -165,7 +165,7 @@ def verification_html(verification: Verification) -> str:
 
 @view.register(MethodComparison)
 def comparison_html(comparison: MethodComparison) -> str:
-    """Every run of every method: error, time, steps."""
+    """Return error, wall time and number of steps of every run of every method as HTML."""
     found = comparison.to_dict()
     rows = [
         (method["title"], run["tolerance"], run["step"], run["status"], run["error"], run["wall_time"], run["steps"])
@@ -185,7 +185,7 @@ def comparison_html(comparison: MethodComparison) -> str:
 
 @view.register(LawComparison)
 def laws_html(comparison: LawComparison) -> str:
-    """Every law in every mode: how it ended, and its metrics."""
+    """Return the status and the metrics of every control law in every mode as HTML."""
     found, data = comparison.to_dict(), comparison.dataset
     units = {name: unit_shown(data, name) for name in comparison.metrics}
     cells = [(law, mode, cell) for law, one in found["laws"].items() for mode, cell in one["modes"].items()]

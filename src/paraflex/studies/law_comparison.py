@@ -1,4 +1,4 @@
-"""Results of control laws in several actuation modes: one table, a cell for each law in each mode."""
+"""Results of a comparison of control laws: one table with a cell for each law in each actuation mode."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from paraflex.units import DisplayUnit, printed_unit
 if TYPE_CHECKING:
     import pandas as pd
 
-# The kind of dataset, and the law without controllers.
+# Kind of the dataset, and name of the law without controllers.
 KIND, OPEN_LOOP = "laws", "open loop"
-# Of a cell whose run an interruption left undone.
+# Status of a cell that was not run because of an interruption.
 NOT_RUN = "not run"
 CSV = "laws.csv"
 _TOGETHER = ", "
@@ -43,10 +43,10 @@ class LawComparison(Result):
     Attributes
     ----------
     dataset : xarray.Dataset
-        Of dimensions law and mode: metrics with their units, `status` and `reason` of every cell, `time_reached` [s].
-        A law that cannot run in a mode has NaN there. `controllers` and `path` tell what a law is.
+        Dataset of dimensions law and mode: metrics with their units, `status` and `reason` of every cell,
+        `time_reached` [s]. A law that cannot run in a mode has NaN there. `controllers` and `path` identify a law.
     interrupted : bool
-        Whether the user stopped it; cells that were not begun are marked so.
+        Whether the user stopped the comparison; cells that were not run have the status "not run".
     """
 
     kept_as = LAW_COMPARISON
@@ -57,12 +57,12 @@ class LawComparison(Result):
 
     @property
     def data(self) -> xr.Dataset:
-        """All metrics over law and mode."""
+        """Dataset of all metrics over law and mode."""
         return self.dataset
 
     @property
     def complete(self) -> bool:
-        """Whether every law was run in every mode, with success or not."""
+        """Whether every law was run in every mode, successfully or not."""
         return not self.interrupted
 
     @property
@@ -87,11 +87,11 @@ class LawComparison(Result):
 
     @property
     def table(self) -> pd.DataFrame:
-        """A row for each law in each mode; its `attrs` hold `units` and `meanings` of the columns."""
+        """Table with a row for each law in each mode; its `attrs` hold `units` and `meanings` of the columns."""
         return next(iter(result_tables(self.dataset).values()))
 
     def to_dict(self) -> dict[str, Any]:
-        """The comparison in plain values: the content of `laws.json`; None for what is not a number.
+        """Return the comparison as plain values, the content of `laws.json`; None for values that are not finite.
 
         Returns
         -------
@@ -136,7 +136,7 @@ def _plain_cell(cell: xr.Dataset, metrics: Sequence[str]) -> dict[str, Any]:
 
 
 def unit_shown(data: xr.Dataset, metric: str) -> DisplayUnit:
-    """The unit in which a metric of laws has few digits in tables: errors are in mm, shares in %."""
+    """Return the unit in which tables show a metric: mm and mm/s for lengths and speeds, % for shares."""
     unit = data[metric].attrs["units"]
     return _SHARE if metric.endswith("_share") else _UNITS.get(unit, printed_unit(unit))
 
@@ -149,21 +149,22 @@ def law_dataset(
     members: Members,
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
-    """The dataset of some cells.
+    """Build the dataset of a comparison from its cells.
 
     Parameters
     ----------
     laws : mapping of str to (names, path)
-        Controllers and path of every law, by its name.
+        Names of the controllers, and path, of every law by its name.
     modes : sequence of str
+        Names of the modes.
     cells : mapping of (law, mode) to dict
-        Metrics and how each run ended, by column; those that are missing were not run.
+        Metrics and outcome of each run, by column; missing cells were not run.
     metrics : sequence of str
-        Columns.
+        Columns of the metrics.
     members : mapping
-        Of the mechanism: see `designs.measure.members_of`.
+        Members of the mechanism; see `designs.measure.members_of`.
     attrs : mapping
-        What it is of, for provenance.
+        Attributes of the dataset, its provenance.
     """
     rows = [[cells.get((law, mode), {"status": NOT_RUN}) for mode in modes] for law in laws]
 

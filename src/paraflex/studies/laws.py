@@ -1,4 +1,4 @@
-"""Control laws in several actuation modes: every law is run in every mode."""
+"""Comparison of control laws in several actuation modes: every law is run in every mode."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from paraflex.results.metrics import METRICS
 from paraflex.studies.law_comparison import OPEN_LOOP, LawComparison, law_dataset
 from paraflex.tracking import TrackingTask
 
-# Between the names of controllers that act together.
+# Separator of the names of controllers that act together.
 _AND = "+"
-# Root mean square and largest error come first: those of the motion, or of the whole run.
+# Default metrics: RMS and largest tracking error of the span come first, then these.
 _LARGEST = {ErrorSpan.MOTION: "tracking_max_motion", ErrorSpan.WHOLE: "tracking_max"}
 _JUDGED = (
     "residual_vibration", "settling_time", "overshoot", "peak_torque_max", "internal_torque_max", "motor_energy",
@@ -41,30 +41,34 @@ Cell = tuple[str, str]
 
 @dataclass(frozen=True)
 class LawStudy(WholeStudy[LawComparison], CheckedFields):
-    """Control laws along one path or several, each in several actuation modes.
+    """Comparison of control laws along one path or several, each in several actuation modes.
 
-    A law that cannot run in a mode is marked there with its reason. Progress is that of runs. Workers are threads.
+    If a law cannot run in a mode, its cell contains the reason. Progress counts runs. Workers are threads.
 
     Attributes
     ----------
     tasks : mapping of str to TrackingTask
-        By the name of the path, all of one mechanism. Along several paths each law has a row for each.
+        Planned motions by the name of the path, all of one mechanism. With several paths, each law has one row per
+        path.
     laws : mapping of str to sequence of ControllerDescription or SampledController
-        Controllers that act together beside the planned torques; none of them is the open loop.
+        Controllers of each law, which act together in addition to the planned torques; an empty sequence is the open
+        loop.
     modes : sequence of str or ActuationMode
+        Actuation modes.
     options : IntegrationOptions or None
-        The defaults where None.
+        Integration options; None for the defaults.
     metrics : sequence of str
-        Names of `METRICS`; by default those that laws are judged by.
+        Names of `METRICS`; by default tracking errors, vibration, settling time, overshoot, torques, energy and
+        saturation.
     error : ErrorSpan or str
-        Whether errors are those of the "motion" or of the "whole" run, where no metrics are named.
+        Time span of the default tracking errors: the "motion" or the "whole" run.
     parameters : dict or None
-        Kept as provenance.
+        Parameters stored as provenance.
 
     Raises
     ------
     InputError
-        From `run`: a mode that is none of the mechanism's, or workers that are no threads, before anything runs.
+        Unknown mode, or workers that are not threads; raised by `run` before anything runs.
     """
 
     _own = ("laws",)
@@ -96,7 +100,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
 
     @property
     def rows(self) -> dict[str, tuple[str, str]]:
-        """The law and the path of every row, by its name: that of the law, with the path where there are several."""
+        """Law and path of every row by the row's name: that of the law, followed by the path if there are several."""
         return {
             law if len(self.tasks) == 1 else f"{law}, {path}": (law, path) for law in self.laws for path in self.tasks
         }
@@ -117,7 +121,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
             if on_progress is not None:
                 on_progress(Progress(len(found), len(cells), len(found), time.perf_counter() - began))
 
-        # Runs that are stopped halfway tell nothing of a law.
+        # Results of interrupted runs are discarded, because they do not characterise a law.
         with suppress(KeyboardInterrupt):
             tell()
             with workers.open() as engine:
@@ -130,7 +134,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
     def _cell(self, cell: Cell, watch: Any) -> Row:
         name, mode = cell
         law, path = self.rows[name]
-        # Controllers have states, and several modes are run at once.
+        # Controllers have internal states, and several modes are run at once.
         planned = under_control(self.tasks[path], copy.deepcopy(tuple(self.laws[law])))
         row, _ = measured_mode(planned, mode, self.options or IntegrationOptions(), self.metrics, watch)
         return row
@@ -147,19 +151,21 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
 
 
 def laws_of(model: Model, names: Sequence[str] = ()) -> dict[str, tuple[ControllerDescription, ...]]:
-    """Control laws of a model by name, the open loop first.
+    """Return the control laws of a model by name, the open loop first.
 
     Parameters
     ----------
     model : Model
+        Model with its controllers.
     names : sequence of str
-        Controllers, of which several that act together are joined, "joints+tip"; "none" for the open loop alone. By
-        default every controller by itself, and those of the study together.
+        Names of controllers; names of controllers that act together are joined, as in "joints+tip"; "none" for the open
+        loop alone. By default every controller by itself, and all controllers of the study together if it has several.
 
     Raises
     ------
     InputError
-        An unknown controller, or periods of several that are no multiples of the shortest.
+        Unknown controller, sample periods that are not multiples of the shortest one, or two laws that each give the
+        whole torque.
     """
     together = [_AND.join(model.study.controllers)] if len(model.study.controllers) > 1 else []
     wanted = [name for name in names or [*model.controllers, *together] if name != NONE]
@@ -174,10 +180,10 @@ def laws_of(model: Model, names: Sequence[str] = ()) -> dict[str, tuple[Controll
 def reduced_tasks(
     model: Model, tasks: Mapping[str, TrackingTask], modes: Sequence[str | ActuationMode]
 ) -> dict[str, TrackingTask]:
-    """Plans with as few flexible coordinates as the model's study keeps; as they are where it keeps all."""
+    """Return the tasks with reduced bodies if the model's study asks for a reduction, else the tasks unchanged."""
     if not model.study.reduced:
         return dict(tasks)
-    # One mechanism for all, as results of several would differ by that too.
+    # One reduced mechanism serves all paths, so that their results do not differ by the reduction.
     mechanism = reduced_mechanism(next(iter(tasks.values())), model.study.reduced, modes=modes)
     return {name: task.remodelled(mechanism) for name, task in tasks.items()}
 
@@ -197,35 +203,37 @@ def compare_laws(
     workers: int | None = None,
     on_progress: OnProgress | None = None,
 ) -> LawComparison:
-    """Run control laws in several actuation modes, and compare what they come to.
+    """Run control laws in several actuation modes, and compare their metrics.
 
     Parameters
     ----------
     model : Model, str or Path
-        A model, or the name or file of one.
+        Model, or its name or file.
     modes : sequence of str
-        By default those of its study.
+        Names of the modes; by default those of the model's study.
     laws : sequence of str, or mapping of str to sequence of controllers
-        Names of its controllers, "a+b" for two that act together; by default all, each by itself. Or controllers by
-        the name of the law: `ControllerDescription` or `SampledController`. The open loop comes first.
+        Names of the model's controllers, "a+b" for two that act together; by default as in `laws_of`. Alternatively
+        a mapping from the name of a law to its controllers: `ControllerDescription` or `SampledController`. The open
+        loop is added as the first law.
     paths : sequence of str
-        By default that of its study, or the first. Along several, such as one and the same with a shaper, each law has
-        a row for each.
+        Names of the paths; by default that of the study, or the first. With several paths, such as one path with and
+        without a shaper, each law has one row per path.
     metrics : sequence of str
         Names of `METRICS`; by default tracking errors, vibration, settling, overshoot, torques, energy, saturation.
     duration, samples, assembly
         See `plan`.
     options : IntegrationOptions, optional
-        By default as the model's study has it.
+        Integration options; by default those of the model's study.
     workers : int, optional
-        Threads; as many as there are processors by default. The results do not depend on it.
+        Number of threads; by default the number of processors. The results do not depend on it.
     on_progress : callable, optional
         See `Study.run`.
 
     Raises
     ------
     InputError
-        An unknown mode, controller, path or metric. A law that cannot run in a mode is no error: its cell says why.
+        Unknown mode, controller, path or metric. A law that cannot run in a mode raises no error; its cell contains the
+        reason.
     AssemblyError
         See `plan`.
     """

@@ -1,4 +1,4 @@
-"""The paper's study: one path, several actuation modes, one dataset."""
+"""Tracking study, as in the paper: one path in several actuation modes, with the results in one dataset."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Simulator(Protocol):
     def __call__(
         self, task: TrackingTask, mode: str | ActuationMode, *, on_progress: Callable[[float], None] | None = None
     ) -> TrackingRun:
-        """The run; an IntegrationError carries what was computed."""
+        """Run the mode and return the run; an IntegrationError carries the partial run."""
         ...
 
 
@@ -46,11 +46,11 @@ class StudyResult(Result):
     Attributes
     ----------
     dataset : xarray.Dataset or None
-        Of every mode that ran, whole or in part; None where none did.
+        Dataset of every mode that ran, completely or in part; None if no mode ran.
     failed : dict
-        Modes that could not start, each with its reason.
+        Reasons of failure by mode, for modes that could not start.
     interrupted : bool
-        Whether the user stopped it.
+        Whether the user stopped the study.
     """
 
     kept_as = RUN
@@ -62,7 +62,7 @@ class StudyResult(Result):
 
     @property
     def data(self) -> xr.Dataset | None:
-        """Data of every mode that ran, whole or in part; None if none did."""
+        """Dataset of every mode that ran, completely or in part; None if no mode ran."""
         return self.dataset
 
     @property
@@ -78,44 +78,46 @@ class StudyResult(Result):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Results of all modes in plain values; reasons of failures if none ran."""
+        """Return the results of all modes as plain values, or the reasons of failure if no mode ran."""
         return {"failed": self.failed} if self.data is None else summary(self.data, self.failed)
 
 
 @dataclass(frozen=True)
 class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
-    """One path in several actuation modes.
+    """Study of one path in several actuation modes.
 
-    A mode that fails is reported and the others go on. Progress is that of each mode in seconds of its motion. Workers
-    are threads.
+    A mode that fails is reported, and the study continues with the others. Progress counts the simulated seconds of
+    each mode. Workers are threads.
 
     Attributes
     ----------
     task : TrackingTask
+        Planned motion along the path.
     modes : sequence of str or ActuationMode
+        Actuation modes.
     options : IntegrationOptions or None
-        The defaults where None.
+        Integration options; None for the defaults.
     parameters : dict or None
-        Kept as provenance.
+        Parameters stored as provenance.
     method : Simulator or None
-        `simulate` with the options where None.
+        Function that runs a mode; None for `simulate` with the options.
     error : ErrorSpan or str
-        Which tracking error ranks the modes: that of the "motion", or of the "whole" run, dwell included.
+        Time span of the tracking error that ranks the modes: the "motion", or the "whole" run including the dwell.
     warning : bool
-        Whether runs beyond what their model can describe issue a `ValidityWarning` each, those of implausible results
-        a `ResultWarning`.
+        Whether to issue a `ValidityWarning` for each run beyond the validity of its model, and a `ResultWarning` for
+        implausible results.
     findings : iterable of Finding
-        Reasons to doubt the model, found before; kept with the results.
+        Doubts about the model found beforehand; stored with the results.
     full : TrackingTask, optional
-        The task with all flexible coordinates, where bodies of the other are reduced: each mode is run with it too, and
-        how far off the reduced run is stands in the results.
+        Task with all flexible coordinates, if the bodies of `task` are reduced. Each mode is run with it as well, and
+        the results contain the deviation of the reduced run from it.
     controllers : sequence of ControllerDescription
-        They act in every mode beside its planned torques.
+        Controllers that act in every mode in addition to the planned torques.
 
     Raises
     ------
     InputError
-        From `run`: a mode that is none of the mechanism's, or workers that are no threads, before anything runs.
+        Unknown mode, or workers that are not threads; raised by `run` before anything runs.
     """
 
     _own = ("method",)
@@ -146,7 +148,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
 
     def _run(self, chosen: Sequence[ActuationMode], workers: Workers, on_progress: OnProgress | None) -> StudyResult:
         stop = threading.Event()
-        # The kernels release the GIL, so threads are enough; each run is the same whichever thread it is in.
+        # The kernels release the GIL, so threads run in parallel; results do not depend on the thread.
         with ThreadPoolExecutor(workers.number or os.cpu_count()) as pool:
             futures: dict[str, Future[TrackingRun | str | None]] = {}
             whole: dict[str, Future[TrackingRun | str | None]] = {}
@@ -161,7 +163,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
                 while left:
                     left -= calls.done()
             except KeyboardInterrupt:
-                # Ctrl-C reaches the main thread only; runs stop at their next progress report and keep their samples.
+                # Only the main thread receives Ctrl-C; runs stop at their next progress report and keep their samples.
                 stop.set()
         outcomes, full = ({name: future.result() for name, future in each.items()} for each in (futures, whole))
         return self._result(outcomes, full, interrupted=stop.is_set())
@@ -169,7 +171,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     def _mode(
         self, task: TrackingTask, mode: ActuationMode, stop: threading.Event, on_progress: OnProgress | None
     ) -> TrackingRun | str | None:
-        """A mode's run of a task, or the reason why there is none."""
+        """Run a mode of a task; return the reason of failure if there is no run, None if it was not started."""
         end, began = float(self.task.motion.t[-1]), time.perf_counter()
 
         def report(reached: float) -> None:
@@ -225,14 +227,14 @@ def run_study(
     on_progress: OnProgress | None = None,
     **details: Any,
 ) -> StudyResult:
-    """Simulate every mode: `TrackingStudy(task, modes, **details).run()` in one call.
+    """Simulate every mode: a shortcut for `TrackingStudy(task, modes, **details).run()`.
 
     Parameters
     ----------
     task, modes, **details
         Fields of `TrackingStudy`: options, parameters, method, error, warning, findings, controllers.
     workers : int, optional
-        Threads; as many as there are processors by default. The results do not depend on it.
+        Number of threads; by default the number of processors. The results do not depend on it.
     on_progress : callable, optional
         See `Study.run`.
     """

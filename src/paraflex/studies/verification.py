@@ -1,4 +1,4 @@
-"""One mechanism, path and mode by every model and in other engines, each with finer steps and meshes."""
+"""Verification study: one mechanism and path by several models and engines, each with finer steps and meshes."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ FIDELITIES = ("rigid", "ked", "linear", "second-order", "segments")
 
 @dataclass(frozen=True)
 class VerificationOptions(CheckedFields):
-    """Resolution of the runs; the finer ones have a quarter of the tolerance, half the step, or twice the mesh.
+    """Resolution of the runs; finer runs use a quarter of the tolerance, half the step, or twice as many elements.
 
     Attributes
     ----------
     tolerance : float
-        Of paraflex's own runs with error control [m].
+        Tolerance of the runs of paraflex with error control [m].
     ked_step, exudyn_step, mujoco_step : float
-        Of those with fixed steps [s].
+        Step sizes of the runs with fixed steps [s].
     method : Method or str
-        Of paraflex's own runs with error control: see `IntegrationOptions`.
+        Integration method of the runs of paraflex with error control; see `IntegrationOptions`.
     segments : int
-        On the longest flexible beam; others get as many as their length takes.
+        Number of segments of the longest flexible beam; the others get a number in proportion to their length.
     """
 
     _own = ("method",)
@@ -59,30 +59,31 @@ class VerificationOptions(CheckedFields):
 
 @dataclass(frozen=True)
 class VerificationStudy(WholeStudy[Verification], CheckedFields):
-    """Every model in every mode, each with a finer step and a finer mesh.
+    """Verification study: every model in every mode, each also with a finer step and a finer mesh.
 
-    A model that fails does not stop the others. Runs come one after the other, so that their wall times can be
-    compared: workers have no part in it.
+    A model that fails does not stop the others. The runs are sequential, so that their wall times are comparable;
+    workers are not accepted.
 
     Attributes
     ----------
     task : TrackingTask
-        Of a mechanism with flexible beams; its own geometry does not matter.
+        Task of a mechanism with flexible beams; each model sets the geometry (linear or second order) itself.
     modes : sequence of str or ActuationMode
+        Actuation modes.
     models : sequence of str
-        From FIDELITIES and engines.ENGINES.
+        Names of models, from FIDELITIES and engines.ENGINES.
     options : VerificationOptions or None
-        The defaults where None.
+        Resolution of the runs; None for the defaults.
     parameters : dict or None
-        Kept as provenance.
+        Parameters stored as provenance.
     error : ErrorSpan or str
-        What tracking errors are of: the "motion", or the "whole" run, dwell included.
+        Time span of the tracking errors: the "motion", or the "whole" run including the dwell.
 
     Raises
     ------
     InputError
-        From `run`: an unknown model or mode, an engine that is not installed, or one that cannot express the
-        mechanism, before anything runs.
+        Unknown model or mode, engine that is not installed, or engine that cannot represent the mechanism or the dwell;
+        raised by `run` before anything runs.
     """
 
     gives: ClassVar[type[Result]] = Verification
@@ -124,7 +125,7 @@ class VerificationStudy(WholeStudy[Verification], CheckedFields):
                 if on_progress is not None:
                     on_progress(Progress(number, len(plan), number, doing=f"{mode.name}: {name}, {level.value}"))
                 extended = _extended(so_far, level, partial(run_model, task, mode, name, level, options))
-                # A stopped run returns its samples, but cannot be compared.
+                # An interrupted run returns its samples, but cannot be compared.
                 if any(run.figures["status"] == "interrupted" for run in extended.records.values()):
                     raise KeyboardInterrupt
                 runs[mode.name][name] = extended
@@ -142,7 +143,15 @@ def verify(
     options: VerificationOptions | None = None,
     on_progress: OnProgress | None = None,
 ) -> Verification:
-    """Run every model in every mode: `VerificationStudy(task, modes, models, options).run()` in one call."""
+    """Run every model in every mode: a shortcut for `VerificationStudy(task, modes, models, options).run()`.
+
+    Parameters
+    ----------
+    task, modes, models, options
+        See `VerificationStudy`.
+    on_progress : callable, optional
+        See `Study.run`.
+    """
     return VerificationStudy(task, modes, models, options).run(on_progress=on_progress)
 
 
@@ -159,12 +168,12 @@ def _extended(runs: ModelRuns, level: Refinement, run: Callable[[], Record]) -> 
 def run_model(
     task: TrackingTask, mode: ActuationMode, name: str, level: Refinement, options: VerificationOptions
 ) -> Record:
-    """One run of one model.
+    """Run one model in one mode at one refinement level.
 
     Raises
     ------
     NumericalError
-        See the model's own function.
+        Failure of the model's simulation function.
     """
     finer, denser = level is Refinement.STEP, 2 if level is Refinement.MESH else 1
     half = 0.5 if finer else 1.0
@@ -188,12 +197,19 @@ def run_model(
 
 @checked_arguments()
 def check_model(name: str, mechanism: Mechanism) -> None:
-    """Check that a mechanism can be run in a model.
+    """Check that a mechanism can be run with a model.
+
+    Parameters
+    ----------
+    name : str
+        Name of the model, from FIDELITIES and engines.ENGINES.
+    mechanism : Mechanism
+        Mechanism to run.
 
     Raises
     ------
     InputError
-        No such model, an engine that is not installed, or one that cannot express the mechanism.
+        Unknown model, engine that is not installed, or model that cannot represent the mechanism.
     """
     if name not in FIDELITIES + ENGINES:
         raise InputError("unknown model", field="model", value=name, remedy=suggestion(name, FIDELITIES + ENGINES))
@@ -204,5 +220,8 @@ def check_model(name: str, mechanism: Mechanism) -> None:
 
 
 def _has_meaning(name: str, level: Refinement, mechanism: Mechanism) -> bool:
-    """Whether a refinement applies: rigid bodies and given shapes have no mesh; MuJoCo's is that of own segments."""
+    """Check whether a refinement level applies to a model.
+
+    Rigid bodies and given shapes have no mesh; the mesh of MuJoCo's model is that of the segments.
+    """
     return level is not Refinement.MESH or not (name in ("rigid", "mujoco") or given_shapes(mechanism.bodies))

@@ -1,1 +1,1 @@
-"""Searches for designs: optimisation, identification, and Sobol indices."""
+"""Optimisation, parameter identification, and Sobol indices."""

@@ -1,4 +1,4 @@
-"""The model file of the best design."""
+"""Model file of the best design."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ BEST = "best.toml"
 
 
 def write_best(folder: Path, study: DesignStudy[Result], design: tuple[float, ...]) -> Path:
-    """Write the mechanism's file with a design's numbers in it.
+    """Write the mechanism's file with the parameter values of a design, and return its path.
 
     Raises
     ------
     OutputError
-        The folder cannot be written.
+        Folder that cannot be written.
     """
     from paraflex.files.document import document_text
 

@@ -1,4 +1,4 @@
-"""How well targets determine the parameters of a fit, and whether the estimate is valid."""
+"""Confidence intervals of identified parameters, and checks of their validity."""
 
 from __future__ import annotations
 
@@ -16,38 +16,38 @@ from paraflex.studies.optimisation.fit import residuals
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.study import DesignStudy
 
-# Beyond this condition of the Jacobian, parameters as shares of their ranges, its weakest direction is not known.
+# Condition number of the Jacobian, with parameters as fractions of their ranges, above which its weakest direction is
+# undetermined.
 ILL_CONDITIONED = 1e3
-# Largest relative difference of a change of residuals from the Jacobian's prediction.
+# Largest accepted relative difference between a change of the residuals and the prediction by the Jacobian.
 _AGREES = 0.5
-# Probability within one standard deviation of a normal distribution.
+# Probability of a normally distributed value within one standard deviation of its mean.
 ONE_DEVIATION = math.erf(math.sqrt(0.5))
 
 
 @dataclass(frozen=True)
 class Confidence:
-    """How well targets determine the parameters, to first order about the design found.
+    """Accuracy to which the targets determine the parameters, linearised about the identified design.
 
     Attributes
     ----------
     deviations : mapping of str to float or None
-        Half the widths of intervals that hold the parameters with a probability of 68.27 %, in their units: standard
-        errors, from the residuals that are left, times the factor of Student's distribution. None where `reasons` says
-        why there are none.
+        Half-widths of the 68.27 % confidence intervals of the parameters, in their units: standard errors, from the
+        residuals of the fit, times the factor of Student's distribution. None for parameters listed in `reasons`.
     errors : mapping of str to float or None
-        Standard errors alone, the square roots of the diagonal of s^2 (J^T J)^-1.
+        Standard errors, the square roots of the diagonal of s^2 (J^T J)^-1.
     reasons : mapping of str to str
-        Why a parameter has no deviation.
+        Reasons why parameters have no deviation.
     freedom : int
-        Targets less free parameters.
+        Degrees of freedom: number of targets minus number of free parameters.
     correlation : (free, free) array
-        Of the parameters that are not at a bound.
+        Correlation matrix of the free parameters.
     free : tuple of str
-        Their names.
+        Names of the free parameters, which are not at a bound.
     condition : float
-        Of the Jacobian, parameters as shares of their ranges.
+        Condition number of the Jacobian, with parameters as fractions of their ranges.
     weakest : mapping of str to float
-        The direction of unit length, in shares of the ranges, that changes residuals least.
+        Direction of unit length, in fractions of the ranges, that changes the residuals least.
     """
 
     deviations: Mapping[str, float | None]
@@ -61,11 +61,11 @@ class Confidence:
 
     @property
     def telling(self) -> bool:
-        """Whether the targets distinguish the parameters."""
+        """Whether the targets distinguish the parameters: the condition number is below `ILL_CONDITIONED`."""
         return self.condition < ILL_CONDITIONED
 
     def to_dict(self) -> dict[str, Any]:
-        """The estimate in plain values, with None for infinity and NaN, which JSON does not have."""
+        """Return the estimate as plain values, with None for infinity and NaN, which JSON does not have."""
         return {
             "deviations": dict(self.deviations),
             "errors": dict(self.errors),
@@ -79,16 +79,16 @@ class Confidence:
         }
 
     def withheld(self, reason: str) -> Confidence:
-        """The same without deviations."""
+        """Return a copy without deviations and standard errors, with a reason for each free parameter."""
         none = dict.fromkeys(self.deviations)
         reasons = {name: self.reasons[name] if name not in self.free else reason for name in none}
         return replace(self, deviations=none, errors=none, reasons=reasons)
 
 
 def student_factor(freedom: int) -> float:
-    """Half the width of an interval of 68.27 % in standard errors that are estimated with so many degrees of freedom.
+    """Return the half-width of the 68.27 % interval of Student's distribution, in standard errors.
 
-    1.84 of one, 1.32 of two, 1 of infinitely many: Student's distribution.
+    The factor is 1.84 for one degree of freedom, 1.32 for two, and 1 in the limit of infinitely many.
     """
     from scipy.special import stdtrit
 
@@ -98,17 +98,20 @@ def student_factor(freedom: int) -> float:
 def confidence(
     study: DesignStudy[Result], targets: Sequence[Target], design: Evaluated, jacobian: Array, bound: Mapping[str, str]
 ) -> Confidence:
-    """Estimate of the deviations from the Jacobian at the design found.
+    """Estimate the deviations of the parameters from the Jacobian at the identified design.
 
     Parameters
     ----------
     study : DesignStudy
+        Study with the parameters and their ranges.
     targets : sequence of Target
+        Targets of the identification.
     design : Evaluated
+        Identified design.
     jacobian : (targets, parameters) array
-        By the place in the unit cube.
+        Jacobian of the residuals with respect to the coordinates in the unit cube.
     bound : mapping of str to str
-        Parameters at a bound, and at which: these are taken as known.
+        Parameters at a bound, with the name of that bound; they are treated as known.
     """
     names = study.setting.names
     free = [k for k, name in enumerate(names) if name not in bound]
@@ -155,11 +158,11 @@ def checked(
     jacobian: Array,
     found: Confidence,
 ) -> Confidence:
-    """Withhold deviations if residuals do not change as the Jacobian predicts.
+    """Remove the deviations if the residuals do not change as the Jacobian predicts.
 
-    Along every principal direction of the Jacobian two designs lie one standard error to both sides. Residuals change
-    from one to the other by twice their own standard deviation where the Jacobian is right and they are straight; noise
-    of the runs, slopes that are but noise and bends all show as a difference.
+    Along every principal direction of the Jacobian, two designs are evaluated one standard error to either side. If the
+    Jacobian is correct and the residuals are linear, the residuals differ between the two by twice their standard
+    deviation. Noise of the runs, wrong derivatives and nonlinearity all appear as a deviation from this prediction.
     """
     if all(value is None for value in found.deviations.values()):
         return found
@@ -169,7 +172,7 @@ def checked(
     steps = np.zeros((len(free), middle.size))
     steps[:, free] = directions * (_standard_deviation(targets, design, found.freedom) / stretches)[:, None]
     for step in steps:
-        # Within the bounds, to both sides alike.
+        # Shorten the step so that both sides lie within the bounds.
         room = np.minimum(middle, 1.0 - middle) / np.maximum(np.abs(step), np.finfo(float).tiny)
         step *= min(1.0, float(room[free].min()))
     done = evaluate([study.design(middle + sign * step) for step in steps for sign in (-1.0, 1.0)])
@@ -190,5 +193,5 @@ def checked(
 
 
 def _standard_deviation(targets: Sequence[Target], design: Evaluated, freedom: int) -> float:
-    """Standard deviation of the residuals, from those of the fit."""
+    """Estimate the standard deviation of the residuals from the fit."""
     return float(np.sqrt(np.sum(residuals(targets, design) ** 2) / freedom))

@@ -1,4 +1,4 @@
-"""Evaluation of designs: each once, several in parallel, each with its rows of the table."""
+"""Evaluation of designs, each once and several in parallel, with the rows of their runs."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ RunTask = Callable[..., Outcome]
 
 
 class LimitReached(Exception):
-    """The limit of evaluated designs has been reached."""
+    """Exception raised when the limit of evaluated designs is reached."""
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A design and its rows.
+    """Evaluated design and the rows of its runs.
 
     Attributes
     ----------
     number : int
-        In the order designs were asked for.
+        Number of the design, in the order of requests.
     design : tuple of float
-        Its numbers.
+        Parameter values.
     rows : tuple of dict
-        Of all its runs: paths, and modes of each.
+        Rows of all runs of the design, ordered by path, then by mode.
     counting : tuple of str
-        Columns that must be numbers.
+        Columns whose values must be finite.
     """
 
     number: int
@@ -48,7 +48,7 @@ class Evaluated:
 
     @property
     def reason(self) -> str:
-        """Reason why the design cannot be used; empty if all runs are complete."""
+        """Reason why the design cannot be used; empty if all runs are complete with finite metrics."""
         for row in self.rows:
             whose = f'{row["path"]}, mode "{row["mode"]}": ' if row["mode"] else ""
             if row["status"] != STATUS_COMPLETE:
@@ -60,29 +60,31 @@ class Evaluated:
 
     @property
     def complete(self) -> bool:
-        """Whether all its runs are complete."""
+        """Whether all runs of the design are complete."""
         return not self.reason
 
     def metric(self, column: str) -> Array:
-        """A metric of every run, (runs,)."""
+        """Return a metric of every run (runs,)."""
         return np.array([row[column] for row in self.rows], dtype=float)
 
 
 class Evaluate:
-    """Evaluation of designs; rows of a folder are read, not computed.
+    """Evaluator of designs, which reads existing rows from the journal instead of computing them again.
 
     Parameters
     ----------
     study : DesignStudy
+        Study whose designs are evaluated.
     journal : Journal
-        What has rows there is read.
+        Journal of the study's folder; designs with rows in it are not computed again.
     engine : Engine
+        Workers that compute the runs.
     run : callable
-        What is done for a task: `run_task` but in tests.
+        Function that runs a task: `run_task`, replaced in tests only.
     on_evaluated : callable, optional
-        Called with each design as it is done.
+        Function called with the evaluator and each design when it is evaluated.
     run_slopes : callable, optional
-        What is done for exact derivatives: its rows hold what `slopes.run_slopes` finds.
+        Function that computes exact derivatives for a task, in rows as those of `slopes.run_slopes`.
     """
 
     def __init__(
@@ -108,16 +110,16 @@ class Evaluate:
 
     @property
     def history(self) -> list[Evaluated]:
-        """All designs requested and evaluated, in that order."""
+        """Evaluated designs in the order in which they were requested."""
         return sorted(self.known.values(), key=lambda each: each.number)
 
     def __call__(self, designs: Sequence[Design]) -> list[Evaluated]:
-        """Designs with their rows, in the order given.
+        """Evaluate designs, and return them with their rows in the given order.
 
         Raises
         ------
         LimitReached
-            Not all of them are within the limit; those that are have been evaluated.
+            Limit of designs exceeded; the designs within the limit have been evaluated.
         """
         for design in designs:
             self._numbers.setdefault(design, len(self._numbers))
@@ -133,7 +135,7 @@ class Evaluate:
         return [self.known[design] for design in designs]
 
     def add_slopes(self, at: Evaluated) -> Evaluated:
-        """A design with the derivatives of `run_slopes` in its rows, which are kept with it."""
+        """Compute exact derivatives at a design, store them in its rows, and return the extended design."""
         assert self.run_slopes is not None
         for _, found in self._compute([at.design], self.run_slopes):
             rows = tuple(row | more for row, more in zip(at.rows, found, strict=True))
@@ -157,7 +159,7 @@ class Evaluate:
             self.on_evaluated(self, done)
 
     def _compute(self, designs: list[Design], run: RunTask) -> Iterator[tuple[Design, tuple[Row, ...]]]:
-        """Designs and all their rows, in order of completion."""
+        """Compute designs, and yield each with all its rows in order of completion."""
         setting = self.study.setting
         rows: dict[Design, dict[tuple[str, str], Row]] = {design: {} for design in designs}
         for job, outcome in outcomes(self.engine, partial(_do, run), self._jobs(designs)):
@@ -172,7 +174,7 @@ class Evaluate:
                 yield design, tuple(row | {"run": first + k, "design": number} for k, row in enumerate(ordered))
 
     def _jobs(self, designs: list[Design]) -> Iterator[Job]:
-        """One job per design and path, or per mode if workers would be idle. Rows do not depend on it."""
+        """Yield one job per design and path, or one per mode if workers would be idle; rows do not depend on it."""
         setting = self.study.setting
         apart = len(designs) * len(setting.paths) < self.engine.workers
         for design in designs:
@@ -182,7 +184,7 @@ class Evaluate:
 
 
 class Job(NamedTuple):
-    """A task, and its modes."""
+    """Task with the setting that holds its modes."""
 
     setting: Setting
     task: Task

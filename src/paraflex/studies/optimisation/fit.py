@@ -1,4 +1,4 @@
-"""The least-squares problem of an identification, and the estimate from its Jacobian."""
+"""Least-squares problem of an identification."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
 
-# Relative change at which it ends, of residuals and parameters.
+# Default tolerance of the fit: relative change of the cost and of the parameters, and norm of the gradient.
 _FIT_TOLERANCE = 1e-6
 
 
 def residuals(targets: Sequence[Target], design: Evaluated) -> Array:
-    """Residuals of all targets, (targets,); infinite for a design that does not run."""
+    """Compute the residuals of all targets (targets,); they are infinite for a design that does not run."""
     if not design.complete:
         return np.full(len(targets), np.inf)
     return np.array([target.residual(design) for target in targets])
 
 
 def root_mean_square(targets: Sequence[Target], design: Evaluated) -> float:
-    """Root mean square of the residuals."""
+    """Compute the root mean square of the residuals."""
     return float(np.sqrt(np.mean(residuals(targets, design) ** 2)))
 
 
 def closest(targets: Sequence[Target], designs: Sequence[Evaluated]) -> Evaluated | None:
-    """The complete design with the least residuals, the earliest of equal ones."""
+    """Return the complete design with the smallest residuals, the earliest of equal ones; None if there is none."""
     complete = [design for design in designs if design.complete]
     return min(complete, key=lambda each: (root_mean_square(targets, each), each.number), default=None)
 
@@ -38,14 +38,14 @@ def closest(targets: Sequence[Target], designs: Sequence[Evaluated]) -> Evaluate
 def fit(
     study: DesignStudy[Result], targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: Evaluated
 ) -> str:
-    """Minimise the residuals from a start; the reason of the end, in words.
+    """Minimise the residuals from a start, and return the reason of termination as text.
 
-    A trial that does not run has infinite residuals, which SciPy's trust region answers by a shorter step.
+    A trial design that does not run has infinite residuals, and SciPy's trust-region method then shortens the step.
 
     Raises
     ------
     LimitReached
-        As many designs as the study allows.
+        Limit of evaluated designs reached.
     """
     from scipy.optimize import least_squares
 
@@ -74,5 +74,5 @@ def fit(
 
 
 def residual_slopes(targets: Sequence[Target], slopes: Mapping[str, Array]) -> Array:
-    """Jacobian of the residuals by the place in the unit cube, (targets, parameters)."""
+    """Compute the Jacobian of the residuals with respect to the unit-cube coordinates (targets, parameters)."""
     return np.array([target.slope(slopes) for target in targets])

@@ -1,4 +1,4 @@
-"""The parameters that reproduce given metrics."""
+"""Identification of the parameters that reproduce given metrics."""
 
 from __future__ import annotations
 
@@ -27,15 +27,16 @@ from paraflex.studies.optimisation.study import DesignStudy, SweepStudy, base_st
 
 @dataclass(frozen=True)
 class Reached:
-    """A target and its value at the best design.
+    """Target with its metric at the best design and at the start.
 
     Attributes
     ----------
     target : Target
+        Target with its value and weight.
     reached, start : float
-        The metric at the best design and at the start.
+        Values of the metric at the best design and at the start.
     residual : float
-        weight (reached - value) / value, or without the division.
+        Residual weight (reached - value) / |value|, without the division if the target is not relative.
     """
 
     target: Target
@@ -44,23 +45,25 @@ class Reached:
     residual: float
 
     def to_dict(self) -> dict[str, Any]:
-        """The target in plain values."""
+        """Return target, metric and residual as plain values."""
         return self.target.to_dict() | {"reached": self.reached, "start": self.start, "residual": self.residual}
 
 
 @dataclass(frozen=True, kw_only=True)
 class IdentificationResult(SearchResult):
-    """State of an identification after a session: see `SearchResult`; its history has root mean square residuals.
+    """State of an identification after a session; see `SearchResult`. Its history holds RMS residuals.
 
     Attributes
     ----------
     residual, start_residual : float or None
-        Root mean square of all residuals; None before the start has run.
+        Root mean square of all residuals at the best design and at the start; None before the start has run.
     targets : tuple of Reached
+        Targets with the values reached.
     confidence : Confidence or None
-        None where the search ended before derivatives at the best design were known.
+        Confidence intervals of the parameters; None if the search ended before the derivatives at the best design were
+        computed.
     derivatives : str
-        "exact", or "differences" and why.
+        Kind of derivatives: "exact" or "differences", with the reason for differences; empty if the search ended early.
     """
 
     kind: ClassVar[str] = "identification"
@@ -71,7 +74,7 @@ class IdentificationResult(SearchResult):
     derivatives: str
 
     def to_dict(self) -> dict[str, Any]:
-        """The result in plain values, without times and counts of a session."""
+        """Return the result as plain values, without the times and counts of the session."""
         return super().to_dict() | {
             "targets": [each.to_dict() for each in self.targets],
             "confidence": None if self.confidence is None else self.confidence.to_dict(),
@@ -81,11 +84,12 @@ class IdentificationResult(SearchResult):
 @given_as("an identification", "what load_identification returns")
 @dataclass(frozen=True)
 class IdentificationStudy(DesignStudy[IdentificationResult]):
-    """A search for the parameters that reproduce targets, by least squares within bounds; see `DesignStudy`.
+    """Identification of the parameters that reproduce targets, by bounded least squares; see `DesignStudy`.
 
     Attributes
     ----------
     targets : tuple of Target
+        Metrics to reproduce.
     """
 
     targets: tuple[Target, ...]
@@ -97,7 +101,7 @@ class IdentificationStudy(DesignStudy[IdentificationResult]):
         return tuple(dict.fromkeys(target.column for target in self.targets))
 
     def sought(self) -> dict[str, Any]:
-        """The targets, in plain values."""
+        """Return the targets as plain values."""
         return {"targets": [vars(target) for target in self.targets]}
 
     def run(
@@ -108,7 +112,7 @@ class IdentificationStudy(DesignStudy[IdentificationResult]):
         on_progress: OnProgress | None = None,
         run: RunTask | None = None,
     ) -> IdentificationResult:
-        """Search for the parameters; see `OptimisationStudy.run`."""
+        """Identify the parameters; see `OptimisationStudy.run`."""
         folder, solution = kept_in(folder), _Solution(self)
         watch = None if on_progress is None else _watch(self, on_progress)
         result = partial(_result, self, folder, solution)
@@ -141,9 +145,16 @@ def identify(
     on_progress: OnProgress | None = None,
     run: RunTask | None = None,
 ) -> IdentificationResult:
-    """Search for the parameters that reproduce the targets of a study, or of its file.
+    """Identify the parameters that reproduce the targets of a study.
 
-    `study.run(folder)` in one call: see there and `Workers`.
+    Parameters
+    ----------
+    study : IdentificationStudy, str or Path
+        Study, or its file.
+    folder, workers, on_progress
+        See `Study.run`; an integer number of workers is a number of threads.
+    run : callable, optional
+        Function that runs a task; `run_task` by default.
     """
     study = study if isinstance(study, IdentificationStudy) else load_identification(study)
     return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
@@ -177,7 +188,7 @@ def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:
 
 
 class _Solution:
-    """The search: its end, the estimate from the derivatives there, and how these were taken."""
+    """Solution of an identification: best design, confidence intervals there, and kind of derivatives."""
 
     def __init__(self, study: IdentificationStudy) -> None:
         self.study = study
@@ -186,7 +197,7 @@ class _Solution:
         self.derivatives = ""
 
     def solve(self, evaluate: Evaluate) -> str:
-        """Search from the start, or the best of samples, for the least residuals."""
+        """Minimise the residuals from the best of the start and the initial samples; return the reason of the end."""
         study, slopes = self.study, slopes_of(self.study, evaluate)
         running_start(study, evaluate)
         start = sampled_start(study, evaluate, lambda designs: closest(study.targets, designs))
@@ -204,7 +215,7 @@ class _Solution:
 
 
 def _how(study: IdentificationStudy, slopes: object) -> str:
-    """How derivatives were taken, and the reason if they are not exact."""
+    """Describe the kind of derivatives used, with the reason if they are not exact."""
     if isinstance(slopes, ExactSlopes):
         others = list(dict.fromkeys(slopes.reasons))
         return f"exact; differences at {len(slopes.reasons)} designs ({others[0]})" if others else "exact"

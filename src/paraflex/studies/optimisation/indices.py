@@ -1,4 +1,4 @@
-"""Global sensitivity: the share of a metric's variance explained by each parameter, alone and with the others."""
+"""Global sensitivity analysis: Sobol indices, the shares of a metric's variance explained by the parameters."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from paraflex.studies.optimisation.schema import StudyTable
 from paraflex.writing import GO_ON, write_json
 
 TABLE = "indices.parquet"
-# SALib's names of the shares, and columns of a row.
+# Names of the indices in SALib, and columns of a row.
 _SHARES = {"first": "S1", "first_confidence": "S1_conf", "total": "ST", "total_confidence": "ST_conf"}
 _ROW_COLUMNS = ("path", "mode", "metric", "parameter", *_SHARES, "samples", "dropped")
-# Default number of base samples, and the least number for an estimate.
+# Default number of base samples, and the smallest number that gives an estimate.
 _BASE_SAMPLES, _FEWEST_BASE_SAMPLES = 128, 8
 
 
 @dataclass(frozen=True)
 class IndicesResult(SweptResult):
-    """State of a study of indices after a session; see `SweptResult`.
+    """State of a study of Sobol indices after a session; see `SweptResult`.
 
     Attributes
     ----------
     indices : xarray.Dataset
-        `first` and `total` (index, parameter): shares of the variance, NaN of a metric that does not vary;
-        `first_confidence`, `total_confidence`: half the width of their intervals of 95 %, from resampling. `mean` and
-        `deviation` (index,) of the metric over the ranges, in its unit; `samples` and `dropped`: base samples that
-        count, and those left out for a run of them that is not complete. Coordinates `metric`, `path`, `mode` say what
-        an index is of. There are none before all runs are done.
+        Sobol indices; the dimension `index` runs over metric, path and mode, which are coordinates. It is empty before
+        all runs are done. Variables: `first` and `total` (index, parameter), the first-order and total indices, NaN for
+        a metric that does not vary; `first_confidence` and `total_confidence`, half-widths of their 95 % intervals from
+        resampling; `mean` and `deviation` (index,), mean and standard deviation of the metric over the ranges, in its
+        unit; `samples` and `dropped`, numbers of base samples used and of those omitted because of incomplete runs.
     """
 
     values_file = "indices.json"
@@ -53,16 +53,16 @@ class IndicesResult(SweptResult):
 
     @property
     def table(self) -> Path:
-        """Table of the indices."""
+        """Path of the table of indices."""
         return self.folder / TABLE
 
     @property
     def data(self) -> xr.Dataset:
-        """The indices."""
+        """Dataset of the indices."""
         return self.indices
 
     def to_dict(self) -> dict[str, Any]:
-        """The indices in plain values: one row per index and parameter."""
+        """Return the indices as plain values: one row per index and parameter."""
         table = (
             self.indices.to_dataframe(dim_order=["index", "parameter"])
             .reset_index()
@@ -77,17 +77,18 @@ class IndicesResult(SweptResult):
 
 @dataclass(frozen=True)
 class IndicesStudy(Study[IndicesResult]):
-    """A sweep over Saltelli's samples.
+    """Study of Sobol indices: a sweep over Saltelli's samples.
 
     Attributes
     ----------
     sweep : SweepStudy
-        Its designs are blocks, one a base sample.
+        Sweep whose designs are ordered in blocks, one block per base sample.
     columns : tuple of str
-        Metrics whose variance is explained.
+        Metrics whose variance is analysed.
     samples : int
-        Base samples.
+        Number of base samples.
     seed : int
+        Seed of the samples and of the resampling.
     """
 
     sweep: SweepStudy
@@ -103,14 +104,14 @@ class IndicesStudy(Study[IndicesResult]):
         on_progress: OnProgress | None = None,
         run: RunTask = run_task,
     ) -> IndicesResult:
-        """Do the runs, and compute the indices when all are done; see `SweepStudy.run`.
+        """Run the sweep, and compute the indices when all runs are done; see `SweepStudy.run`.
 
-        The folder gets the sweep's table, `indices.parquet` and `indices.json`.
+        The table of the sweep, `indices.parquet` and `indices.json` are written into the folder.
 
         Raises
         ------
         InputError
-            Too few samples are complete; see `Study.run` for others.
+            Too few complete base samples; see `Study.run` for other reasons.
         """
         import pyarrow as pa
 
@@ -127,23 +128,24 @@ class IndicesStudy(Study[IndicesResult]):
 def load_indices(
     file: str | Path, metrics: list[str] | None = None, samples: int | None = None, seed: int | None = None
 ) -> IndicesStudy:
-    """Read the study file of global indices: a sweep's, or an optimisation's, with ranges for all parameters.
+    """Read a study of Sobol indices from the file of a sweep or an optimisation with ranges for all parameters.
 
     Parameters
     ----------
     file : str or Path
+        Study file, TOML.
     metrics : list of str, optional
-        Whose variance is explained; those of the file by default.
+        Metrics whose variance is analysed; by default those of the file.
     samples : int, optional
-        Base samples, a power of two; `number` of [sampling] by default, else 128. There are (parameters + 2) times as
-        many designs.
+        Number of base samples, a power of two; by default `number` of [sampling], else 128. The number of designs is
+        larger by the factor (parameters + 2).
     seed : int, optional
-        That of [sampling] by default.
+        Seed of the samples; by default that of [sampling].
 
     Raises
     ------
     InputError
-        See `load_optimisation`; or SALib is not installed.
+        Invalid file as described in `load_optimisation`, invalid number of samples, or SALib not installed.
     """
     with study_table(StudyTable, file) as (table, folder):
         chosen = table.sampling.seed if seed is None else seed
@@ -175,10 +177,18 @@ def indices(
     run: RunTask = run_task,
     **read: Any,
 ) -> IndicesResult:
-    """First-order and total Sobol indices of metrics, from Saltelli's samples run as a sweep.
+    """Compute first-order and total Sobol indices of metrics from Saltelli's samples, run as a sweep.
 
-    `study.run(folder)` in one call: see there and `Workers`. Of a file `metrics`,
-    `samples` and `seed` may be given as to `load_indices`.
+    Parameters
+    ----------
+    study : IndicesStudy, str or Path
+        Study, or its file.
+    folder, workers, on_progress
+        See `Study.run`; an integer number of workers is a number of threads.
+    run : callable, optional
+        Function that runs a task; `run_task` by default.
+    **read
+        Arguments `metrics`, `samples` and `seed` of `load_indices`, used with a file only.
     """
     study = study if isinstance(study, IndicesStudy) else load_indices(study, **read)
     return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
@@ -188,7 +198,7 @@ def _indices(study: IndicesStudy, table: Path) -> list[dict[str, Any]]:
     setting = study.sweep.setting
     shape = (len(study.sweep.designs), len(setting.paths), len(setting.modes))
     read = read_parquet(table, ["status", *study.columns])
-    # Rows are in order of designs, then paths, then modes.
+    # Rows are ordered by design, then by path, then by mode.
     complete = (read["status"].to_numpy() == STATUS_COMPLETE).reshape(shape)
     out = []
     for column in study.columns:
@@ -203,7 +213,7 @@ def _indices(study: IndicesStudy, table: Path) -> list[dict[str, Any]]:
 def _analysed(
     study: IndicesStudy, names: tuple[str, str, str], values: Array, usable: NDArray[np.bool_]
 ) -> dict[str, Any]:
-    """Indices from the base samples with complete runs only."""
+    """Compute the indices from the base samples whose runs are all complete."""
     kept = usable.reshape(study.samples, -1).all(axis=1)
     count = int(np.count_nonzero(kept))
     if count < _FEWEST_BASE_SAMPLES:
@@ -215,7 +225,7 @@ def _analysed(
     mean, deviation = float(np.mean(values)), float(np.std(values))
     found, parameters = {}, study.sweep.setting.names
     if deviation > 1e-12 * abs(mean):
-        # SALib takes 0 for no seed at all.
+        # SALib treats a seed of 0 as no seed.
         analyse, seed = _salib().analyze.sobol.analyze, study.seed + 1
         found = analyse(_problem(parameters), values, calc_second_order=False, seed=seed)
     none = np.full(len(parameters), np.nan)

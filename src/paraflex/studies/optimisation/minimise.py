@@ -1,4 +1,4 @@
-"""Methods of optimisation: those of SciPy and of Optuna, on one problem in the unit cube."""
+"""Optimisation methods of SciPy and Optuna, applied to one problem in the unit cube."""
 
 from __future__ import annotations
 
@@ -17,27 +17,36 @@ EVOLUTION, OPTUNA = "differential-evolution", "optuna"
 WITH_SLOPES = (SLSQP, TRUST, LBFGSB)
 DEFAULT_SEARCH = SLSQP
 
-# Metrics are known no better than to this share: time steps are chosen anew for each design.
+# Relative accuracy of metrics, limited because time steps are chosen anew for each design: the default tolerance.
 _METRIC_TOLERANCE = 1e-4
-# More iterations than any limit of evaluations allows.
+# Exceeds any limit of evaluations, which ends the search instead.
 _ITERATION_LIMIT = 100_000
-# Edges of the first simplex, as shares of the ranges.
+# Edge length of the initial simplex, as a fraction of the ranges.
 _SIMPLEX = 0.1
-# Members of a population per parameter.
+# Members of the population per parameter.
 _POPULATION = 8
-# Designs that Optuna is asked for at a time: as many whatever the number of workers, so that all find the same.
+# Designs requested from Optuna at a time, fixed so that results do not depend on the number of workers.
 _BATCH = 4
 
 
 def minimise(problem: DesignProblem, method: str | None, start: Array) -> str:
-    """Search for the least objective from a start; the reason of the end, in words.
+    """Minimise the objective from a start, and return the reason of termination as text.
+
+    Parameters
+    ----------
+    problem : DesignProblem
+        Objective and limits over the unit cube.
+    method : str or None
+        Name of the method; None for `DEFAULT_SEARCH`.
+    start : (parameters,) array
+        Initial point in the unit cube.
 
     Raises
     ------
     InputError
-        A method that takes no limits was given some, or Optuna is not installed.
+        Limits given to a method that accepts none, or Optuna not installed.
     LimitReached
-        As many designs as the study allows.
+        Limit of evaluated designs reached.
     """
     name = method or DEFAULT_SEARCH
     if name == LBFGSB and problem.objective.limits:
@@ -48,7 +57,7 @@ def minimise(problem: DesignProblem, method: str | None, start: Array) -> str:
             remedy=f'say "{SLSQP}" or "{TRUST}", or drop at_most',
         )
     with warnings.catch_warnings():
-        # SciPy says so of quasi-Newton updates whose slopes do not change, as at bounds and beside failures.
+        # SciPy warns of quasi-Newton updates whose gradients do not change, as at bounds and near failures.
         warnings.filterwarnings("ignore", message="delta_grad == 0.0")
         return _METHODS[name](problem, start)
 
@@ -99,7 +108,7 @@ def _scipy(problem: DesignProblem, start: Array, method: str, **given: Any) -> s
 def _simplex(problem: DesignProblem, start: Array) -> str:
     from scipy.optimize import minimize
 
-    # Edges point away from the nearer bound.
+    # The edges point away from the nearer bound.
     corners = np.vstack([start, start + np.diag(np.where(start > 0.5, -_SIMPLEX, _SIMPLEX))])
     tolerance = _tolerance(problem)
     problem.scores(list(corners))

@@ -1,4 +1,4 @@
-"""Noise of a computed number, estimated from differences of high order."""
+"""Noise of a computed quantity, estimated from differences of high order."""
 
 from __future__ import annotations
 
@@ -6,23 +6,24 @@ import numpy as np
 
 from paraflex.arrays import Array
 
-# Values close together that noise is measured from.
+# Number of closely spaced values from which noise is estimated.
 NOISE_POINTS = 8
-# Estimates of three orders that lie within this factor agree.
+# Largest ratio of the estimates of three successive orders that agree.
 _AGREE = 4.0
 
 
 def noise_of(values: Array) -> Array:
-    """Standard deviation of the noise in values at equally spaced places close together.
+    """Estimate the standard deviation of the noise in values at closely and equally spaced points.
 
     Differences of order k of independent noise of variance s^2 have variance s^2 (2k)! / (k!)^2, while those of a
-    smooth function vanish with growing k. The first of three orders whose estimates agree, and whose differences change
-    sign, gives the noise; where none do, the least estimate bounds it (More and Wild, Estimating computational noise,
-    SIAM J. Sci. Comput. 33, 2011).
+    smooth function vanish with growing k. The noise is given by the first order whose differences change sign and whose
+    estimate agrees with those of the next two orders. If there is none, the smallest estimate is a bound (More and
+    Wild, Estimating computational noise, SIAM J. Sci. Comput. 33, 2011).
 
     Parameters
     ----------
-    values : (places, ...) array
+    values : (points, ...) array
+        Values at the points; the noise of each component is estimated separately.
     """
     columns = values.reshape(values.shape[0], -1)
     return np.array([_noise(column) for column in columns.T]).reshape(values.shape[1:])

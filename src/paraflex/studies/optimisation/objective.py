@@ -1,4 +1,4 @@
-"""Objectives and targets: numbers of a design from the metrics of its runs, and their derivatives."""
+"""Objectives and targets: scalar values of a design from the metrics of its runs, and their derivatives."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ WORST, MEAN = "worst", "mean"
 
 
 class Measured(Protocol):
-    """A design with complete runs."""
+    """Protocol of a design with complete runs."""
 
     def metric(self, column: str) -> Array:
-        """A metric of every run, (runs,)."""
+        """Return a metric of every run (runs,)."""
         ...
 
 
 @dataclass(frozen=True)
 class Objective:
-    """A weighted sum of metrics, and limits of metrics.
+    """Objective function, a weighted sum of metrics, with upper limits of metrics.
 
     Attributes
     ----------
     weights : mapping of str to float
-        By column of the table.
+        Weights of the metrics by column of the table.
     over : str
-        "worst" or "mean": what is taken of a metric's values in all paths and modes.
+        Aggregation of a metric over all paths and modes: "worst" or "mean".
     relative : bool
         Whether each metric is divided by its value at the start.
     limits : tuple of (str, float)
-        Columns and what they are at most, in their units.
+        Columns and their upper limits, in the units of the metrics.
     """
 
     weights: Mapping[str, float]
@@ -48,25 +48,25 @@ class Objective:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Every metric of the objective and its limits, once."""
+        """Columns of the objective and its limits, each once."""
         return tuple(dict.fromkeys([*self.weights, *(column for column, _ in self.limits)]))
 
     def metrics(self, design: Measured) -> dict[str, float]:
-        """The worst or mean value of every metric."""
+        """Compute the worst or mean value of every metric."""
         return {column: float(self._shares(design, column) @ design.metric(column)) for column in self.columns}
 
     def scales(self, start: Measured) -> dict[str, float]:
-        """Divisors of metrics, from the design at the start; a metric that is zero there has none."""
+        """Compute the scales by which metrics are divided, from the design at the start; 1 if not `relative`."""
         metrics = self.metrics(start)
         return {column: abs(metrics[column]) if self.relative else 1.0 for column in self.weights}
 
     def value(self, design: Measured, scales: Mapping[str, float]) -> float:
-        """Sum of weight times metric over its scale."""
+        """Compute the objective, the sum of weight times metric divided by its scale."""
         metrics = self.metrics(design)
         return sum(weight * metrics[column] / scales[column] for column, weight in self.weights.items())
 
     def slope(self, design: Measured, scales: Mapping[str, float], slopes: Mapping[str, Array]) -> Array:
-        """Derivatives of `value`, from those of the metrics (runs, parameters): of the worst run, or the mean."""
+        """Compute the derivatives of `value` (parameters,) from those of the metrics (runs, parameters)."""
         terms = [
             weight / scales[column] * (self._shares(design, column) @ slopes[column])
             for column, weight in self.weights.items()
@@ -74,21 +74,21 @@ class Objective:
         return np.sum(terms, axis=0)
 
     def room(self, design: Measured) -> Array:
-        """Distance of metrics from their limits, relative to the limit (to 1 if it is 0); (limits,)."""
+        """Compute the margins of metrics to their limits (limits,), relative to the limit (to 1 if it is 0)."""
         metrics = self.metrics(design)
         return np.array([(limit - metrics[column]) / (abs(limit) or 1.0) for column, limit in self.limits])
 
     def room_slope(self, design: Measured, slopes: Mapping[str, Array]) -> Array:
-        """Derivatives of `room`, (limits, parameters)."""
+        """Compute the derivatives of `room` (limits, parameters)."""
         rows = [-(self._shares(design, column) @ slopes[column]) / (abs(limit) or 1.0) for column, limit in self.limits]
         return np.array(rows)
 
     def violation(self, design: Measured) -> float:
-        """Sum of the relative violations of the limits."""
+        """Compute the sum of the relative violations of the limits."""
         return float(np.sum(np.maximum(-self.room(design), 0.0)))
 
     def _shares(self, design: Measured, column: str) -> Array:
-        """Contribution of each run to the worst or mean of a metric."""
+        """Compute the weight of each run in the worst or mean value of a metric (runs,)."""
         values = design.metric(column)
         if self.over == MEAN:
             return np.full(values.size, 1.0 / values.size)
@@ -97,20 +97,22 @@ class Objective:
 
 @dataclass(frozen=True)
 class Target:
-    """A number to be reproduced.
+    """Value of a metric to be reproduced by an identification.
 
     Attributes
     ----------
     column : str
-        Of the table.
+        Column of the metric in the table.
     run : int
-        Among those of a design: paths, and modes of each.
+        Index of the run among those of a design, which are ordered by path, then by mode.
     path, mode : str
+        Names of the path and the mode of the run.
     value : float
-        In the metric's unit.
+        Value to reproduce, in the unit of the metric.
     weight : float
+        Weight of the residual.
     relative : bool
-        Whether its residual is divided by the value.
+        Whether the residual is divided by the absolute value of `value`.
     """
 
     column: str
@@ -123,17 +125,17 @@ class Target:
 
     @property
     def factor(self) -> float:
-        """Factor of the difference."""
+        """Factor of the difference in the residual."""
         return self.weight / (abs(self.value) if self.relative else 1.0)
 
     def residual(self, design: Measured) -> float:
-        """Weight times difference of the metric from the target, divided by the target if `relative`."""
+        """Compute weight times metric minus target value, divided by the absolute target value if `relative`."""
         return self.factor * float(design.metric(self.column)[self.run] - self.value)
 
     def slope(self, slopes: Mapping[str, Array]) -> Array:
-        """Derivatives of `residual`, (parameters,)."""
+        """Compute the derivatives of `residual` (parameters,) from those of the metrics (runs, parameters)."""
         return self.factor * slopes[self.column][self.run]
 
     def to_dict(self) -> dict[str, Any]:
-        """The target in plain values."""
+        """Return the target as plain values."""
         return {"path": self.path, "mode": self.mode, "metric": self.column, "value": self.value}

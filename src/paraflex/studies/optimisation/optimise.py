@@ -1,4 +1,4 @@
-"""Optimisation: the design with the least objective."""
+"""Optimisation of a design: the search for the minimum of an objective."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from paraflex.studies.optimisation.session import Session, sampled_start, search
 from paraflex.studies.optimisation.slopes import slopes_of
 from paraflex.studies.optimisation.study import DesignStudy, base_study, read_search
 
-# Step of differences, as a share of a range.
+# Default step of finite differences, as a fraction of a parameter's range.
 _DIFFERENCE_SHARE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
 class OptimisationResult(SearchResult):
-    """State of an optimisation after a session: see `SearchResult`; its history has objectives.
+    """State of an optimisation after a session; see `SearchResult`. Its history holds objectives.
 
     Attributes
     ----------
     method : str
-        By which it was looked for.
+        Name of the optimisation method.
     sought : mapping
-        The objective in plain values.
+        Objective function as plain values.
     objective, start_objective : float or None
-        None before the start has run.
+        Objective at the best design and at the start; None before the start has run.
     metrics, start_metrics : mapping of str to float
-        Worst or mean of all runs, as the study says.
+        Metrics at the best design and at the start: worst or mean of all runs, as the objective specifies.
     holds_limits : bool
-        Whether the best design passes no limit.
+        Whether the best design violates no limit.
     """
 
     kind: ClassVar[str] = "optimisation"
@@ -59,11 +59,12 @@ class OptimisationResult(SearchResult):
 @given_as("an optimisation", "what load_optimisation returns")
 @dataclass(frozen=True)
 class OptimisationStudy(DesignStudy[OptimisationResult]):
-    """A search for the design whose objective is least; see `DesignStudy`.
+    """Optimisation study: the search for the design with the least objective; see `DesignStudy`.
 
     Attributes
     ----------
     objective : Objective
+        Objective function and limits.
     """
 
     objective: Objective
@@ -74,7 +75,7 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
         return self.objective.columns
 
     def sought(self) -> dict[str, Any]:
-        """The objective, in plain values."""
+        """Return the objective as plain values."""
         return {"objective": vars(self.objective) | {"weights": dict(self.objective.weights)}}
 
     def run(
@@ -85,15 +86,21 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
         on_progress: OnProgress | None = None,
         run: RunTask | None = None,
     ) -> OptimisationResult:
-        """Search for the design; see `Study.run`.
+        """Search for the best design; see `Study.run`.
 
-        The folder gets the table of all runs, `result.json` and `best.toml`. `run` is what is done for a task, the
-        simulation unless given.
+        The table of all runs, `result.json` and `best.toml` are written into the folder.
+
+        Parameters
+        ----------
+        folder, workers, on_progress
+            See `Study.run`.
+        run : callable, optional
+            Function that runs a task; `run_task` by default.
 
         Raises
         ------
         InputError
-            The start cannot be run; see `Study.run` for others.
+            Start that cannot be run; see `Study.run` for other reasons.
         """
         folder = kept_in(folder)
         watch = _Watch(self, on_progress)
@@ -108,12 +115,12 @@ def load_optimisation(file: str | Path) -> OptimisationStudy:
     Parameters
     ----------
     file : str or Path
-        TOML; see docs/optimisation.md.
+        Study file, TOML; see docs/optimisation.md.
 
     Raises
     ------
     InputError
-        Anything in it that does not fit the file or the mechanism: it names file, field, value and remedy.
+        Invalid entry, or one that does not fit the mechanism. The error names file, field, value and remedy.
     """
     with study_table(StudyTable, file) as (table, folder):
         if table.objective is None:
@@ -138,9 +145,16 @@ def optimise(
     on_progress: OnProgress | None = None,
     run: RunTask | None = None,
 ) -> OptimisationResult:
-    """Search for the design of a study, or of its file, with the least objective.
+    """Search for the design of a study with the least objective.
 
-    `study.run(folder)` in one call: see there and `Workers`.
+    Parameters
+    ----------
+    study : OptimisationStudy, str or Path
+        Study, or its file.
+    folder, workers, on_progress
+        See `Study.run`; an integer number of workers is a number of threads.
+    run : callable, optional
+        Function that runs a task; `run_task` by default.
     """
     study = study if isinstance(study, OptimisationStudy) else load_optimisation(study)
     return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
@@ -192,7 +206,7 @@ def _result(study: OptimisationStudy, folder: Path, session: Session) -> Optimis
 
 
 class _Watch:
-    """Reports the progress of an optimisation, with the best objective so far."""
+    """Callback that reports the progress of an optimisation, with the best objective so far."""
 
     def __init__(self, study: OptimisationStudy, on_progress: OnProgress | None) -> None:
         self.study, self.objective, self.on_progress = study, study.objective, on_progress
@@ -200,7 +214,7 @@ class _Watch:
         self.scales: Mapping[str, float] | None = None
 
     def __call__(self, evaluate: Evaluate, done: Evaluated) -> None:
-        """Record a design; the start is the first."""
+        """Record an evaluated design and report the progress; the first design is the start."""
         if self.on_progress is None:
             return
         if self.scales is None and done.complete:

@@ -1,4 +1,4 @@
-"""An optimisation as functions on the unit cube that have a value everywhere."""
+"""Optimisation problem as functions on the unit cube, defined everywhere, even for designs that do not run."""
 
 from __future__ import annotations
 
@@ -15,28 +15,33 @@ from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
 
-# Relative violation of a limit that still counts as none.
+# Relative violation of a limit that is tolerated.
 _LIMIT_EXCESS = 1e-6
-# Cost of a design that violates a limit, and of one that does not run, in objectives of the start.
+# Cost of a design that violates a limit, and of one that does not run, as multiples of the objective at the start.
 _OUTSIDE, _FAILED = 1e2, 1e4
-# The same for methods with slopes, which accept nothing above the start: more would spoil what they learn of curvature.
+# Cost of a failed design for gradient-based methods. They accept no design worse than the start, and a larger value
+# would spoil their approximation of the curvature.
 _REFUSED = 3.0
 
 
 class DesignProblem:
-    """The objective and its limits over the unit cube.
+    """Objective and limits as functions on the unit cube.
 
     Parameters
     ----------
     study : DesignStudy
+        Study with the parameters and the start.
     objective : Objective
+        Objective function and limits.
     evaluate : Evaluate
+        Evaluator of designs.
     slopes : Slopes
+        Derivatives of the metrics.
 
     Raises
     ------
     InputError
-        The start cannot be run, or a metric of it that others would be divided by is zero.
+        Start that cannot be run, or metric that is zero at the start and therefore cannot serve as a scale.
     """
 
     def __init__(self, study: DesignStudy[Result], objective: Objective, evaluate: Evaluate, slopes: Slopes) -> None:
@@ -52,32 +57,32 @@ class DesignProblem:
                     field=f"objective.minimise.{column}", remedy="say relative = false",
                 )  # fmt: skip
         self.start: Array = study.unit(study.start)
-        # Slopes of designs that fail lead back to the last one that did not.
+        # The gradient at a failed design points away from the last successful one.
         self._safe = self.start
 
     @cached_property
     def cost(self) -> float:
-        """The objective at the start, or 1 if that is 0: the scale of penalties and of tolerances."""
+        """Absolute objective at the start, or 1 if that is 0: the scale of penalties and of tolerances."""
         (start,) = self.evaluate([self.study.start])
         return abs(self.objective.value(start, self.scales)) or 1.0
 
     def at(self, x: Array) -> Evaluated:
-        """The design at a place."""
+        """Evaluate the design at a point of the unit cube."""
         return self.evaluate([self.study.design(x)])[0]
 
     def scores(self, places: Sequence[Array]) -> list[float]:
-        """For methods without gradients: the objective, and more for designs that violate limits or fail."""
+        """Compute the objective, with penalties for violated limits and failed designs, for gradient-free methods."""
         return [self._score(design) for design in self.evaluate([self.study.design(x) for x in places])]
 
     def value(self, x: Array) -> float:
-        """For methods with gradients: the objective, and beyond the designs that run more than at the start."""
+        """Compute the objective for gradient-based methods; a failed design costs more than the start."""
         design = self.at(x)
         if design.complete:
             return self.objective.value(design, self.scales)
         return _REFUSED * self.cost * (1.0 + float(np.linalg.norm(x - self._safe)))
 
     def slope(self, x: Array) -> Array:
-        """Derivatives of `value`, (parameters,)."""
+        """Compute the derivatives of `value` (parameters,)."""
         design = self.at(x)
         if design.complete:
             self._safe = np.array(x)
@@ -86,12 +91,12 @@ class DesignProblem:
         return _REFUSED * self.cost * away / (float(np.linalg.norm(away)) or 1.0)
 
     def room(self, x: Array) -> Array:
-        """Distance of metrics from their limits, (limits,); none if the design fails."""
+        """Compute the margins of metrics to their limits (limits,); -1 if the design fails."""
         design = self.at(x)
         return self.objective.room(design) if design.complete else np.full(len(self.objective.limits), -1.0)
 
     def room_slope(self, x: Array) -> Array:
-        """Derivatives of `room`, (limits, parameters)."""
+        """Compute the derivatives of `room` (limits, parameters); zero if the design fails."""
         design = self.at(x)
         if design.complete:
             return self.objective.room_slope(design, self.slopes(design))
@@ -107,12 +112,12 @@ class DesignProblem:
 
 
 def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> Evaluated:
-    """The start, evaluated.
+    """Evaluate the start, and check that it runs.
 
     Raises
     ------
     InputError
-        It cannot be run.
+        Start that cannot be run.
     """
     (start,) = evaluate([study.start])
     if not start.complete:
@@ -124,7 +129,10 @@ def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> Evaluated:
 
 
 def best_of(objective: Objective, scales: Mapping[str, float], designs: Sequence[Evaluated]) -> Evaluated | None:
-    """The complete design within all limits with the least objective, or else that with the least violation."""
+    """Return the complete design within the limits with the least objective, or else that with the least violation.
+
+    None is returned if no design is complete.
+    """
 
     def rank(design: Evaluated) -> tuple[float, float, int]:
         violation = objective.violation(design)
@@ -135,5 +143,5 @@ def best_of(objective: Objective, scales: Mapping[str, float], designs: Sequence
 
 
 def holds_limits(objective: Objective, design: Evaluated) -> bool:
-    """Whether no limit is violated."""
+    """Check whether a design satisfies all limits."""
     return objective.violation(design) <= _LIMIT_EXCESS

@@ -1,4 +1,4 @@
-"""Base class of the results of searches for designs."""
+"""Base class of the results of optimisations and identifications."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from paraflex.studies.optimisation.session import Session
 from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.writing import GO_ON, write_json
 
-# So near a bound, as a share of the range, a parameter is at it.
+# Distance from a bound, as a fraction of the range, below which a parameter counts as being at it.
 _AT_BOUND = 1e-4
-# Different reasons of failures that are listed.
+# Largest number of different reasons of failure listed.
 _MOST_REASONS = 5
-# Of a session, and no results.
+# Fields that describe a session, not the result.
 _OF_SESSION = ("fresh", "seconds", "folder")
 
 
@@ -30,24 +30,25 @@ class SearchResult(KeptResult):
     Attributes
     ----------
     name : str
-        Of the study.
+        Name of the study.
     folder : Path
+        Folder of the study.
     values, start : mapping of str to float
-        The best design's numbers, and those of the start.
+        Parameter values of the best design and of the start.
     bounds : mapping of str to str
-        "low" or "high" for parameters at a bound.
+        Parameters of the best design at a bound, with "low" or "high".
     evaluations, fresh, failed : int
-        Designs, of these in this session, and those that do not run.
+        Number of evaluated designs, of those evaluated in this session, and of those that do not run.
     reasons : tuple of str
-        Why some of them do not.
+        First different reasons of failure, five at most.
     stopped : str
-        Why it ended.
+        Reason of termination.
     interrupted : bool
-        Whether the user stopped it.
+        Whether the user stopped the search.
     seconds : float
-        The session took.
+        Wall time of the session [s].
     history : tuple of (int, float or None, bool)
-        Of every design its number, how good it is (None where it failed), and whether limits hold.
+        Number, objective or residual (None if it failed), and satisfaction of the limits, for every design.
     """
 
     values_file = "result.json"
@@ -72,7 +73,7 @@ class SearchResult(KeptResult):
         return not self.interrupted
 
     def to_dict(self) -> dict[str, Any]:
-        """The result in plain values, without times and counts of a session."""
+        """Return the result as plain values, without the times and counts of the session."""
         out = {name: value for name, value in vars(self).items() if name not in _OF_SESSION}
         listed = {"history": [list(each) for each in self.history], "reasons": list(self.reasons)}
         return {"kind": self.kind} | out | listed
@@ -85,7 +86,7 @@ class SearchResult(KeptResult):
 
 
 def of_session(study: DesignStudy[Result], folder: Path, session: Session, best: Evaluated | None) -> dict[str, Any]:
-    """Fields of a `SearchResult` from a session and its best design, without the history."""
+    """Return the fields of a `SearchResult` for a session and its best design, without the history."""
     history, names = session.evaluate.history, study.setting.names
     reasons = [each.reason for each in history if not each.complete]
     return {
@@ -105,7 +106,7 @@ def of_session(study: DesignStudy[Result], folder: Path, session: Session, best:
 
 
 def at_bounds(study: DesignStudy[Result], design: Sequence[float]) -> dict[str, str]:
-    """The numbers of a design that are at an end of their range."""
+    """Return the parameters of a design that are at a bound, with "low" or "high"."""
     places = dict(zip(study.setting.names, study.unit(design), strict=True))
     low = {name: "low" for name, place in places.items() if place < _AT_BOUND}
     return low | {name: "high" for name, place in places.items() if place > 1.0 - _AT_BOUND}

@@ -1,4 +1,4 @@
-"""One session of a search: it locks the folder, starts workers, and writes rows however it ends."""
+"""Session of a search, which locks the folder, starts the workers, and always writes the rows."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ class Session:
     Attributes
     ----------
     evaluate : Evaluate
-        With all designs asked for.
+        Evaluator with all evaluated designs.
     stopped : str
-        Why it ended, in words.
+        Reason of termination, as text.
     interrupted : bool
-        Whether the user stopped it.
+        Whether the user stopped the session.
     seconds : float
-        It took.
+        Wall time of the session [s].
     """
 
     evaluate: Evaluate
@@ -55,10 +55,10 @@ class Session:
 
 
 class Found(Protocol):
-    """What a search finds."""
+    """Protocol of the result of a search."""
 
     def write(self, study: DesignStudy[Result], folder: Path) -> None:
-        """Write it into a folder."""
+        """Write the result into a folder."""
 
 
 R = TypeVar("R", bound=Found)
@@ -74,30 +74,31 @@ def search(
     run: RunTask | None = None,
     result: Callable[[Session], R],
 ) -> R:
-    """Solve a study in a folder, which is locked meanwhile.
+    """Run a search in a folder, which is locked meanwhile, and return its result.
 
     Parameters
     ----------
     study : DesignStudy
+        Study to solve.
     folder : Path
-        One that another session left is gone on with: what it has rows of is read.
+        Folder of the study. A folder left by an earlier session is continued: designs with rows in it are read.
     open_workers : callable
-        Gives who computes.
+        Function that starts the workers.
     solve : callable
-        Asks for designs; tells why it ended.
+        Search method: it requests designs from the evaluator and returns the reason of termination.
     on_evaluated : callable, optional
-        Called with each design as it is done.
+        Function called with the evaluator and each design when it is evaluated.
     run : callable, optional
-        What is done for a task: `run_task` but in tests.
+        Function that runs a task: `run_task`, replaced in tests only.
     result : callable
-        Makes the result of a session, which is written with the table.
+        Function that builds the result of a session, which is written together with the table.
 
     Raises
     ------
     InputError
-        The study cannot be, the folder is another's, or the engine cannot be had.
+        Invalid study, folder of another study, or engine that is not available.
     OutputError
-        The folder cannot be written any more; what was written stays, and the same call goes on from there.
+        Folder that can no longer be written. Results written before are kept, and the same call continues from them.
     """
     began = time.perf_counter()
     exact = _slopes_run(study, run)
@@ -117,7 +118,7 @@ def search(
 
 
 def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
-    """Columns of the table: those of a sweep, and exact derivatives of the metrics."""
+    """Return the columns of the table: those of a sweep, and exact derivatives of the metrics if `slopes` is True."""
     import pyarrow as pa
 
     schema = table_schema(study.setting, study.base.members)
@@ -130,7 +131,7 @@ def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
 def sampled_start(
     study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[Evaluated]], Evaluated | None]
 ) -> Evaluated:
-    """The best of the start and the initial samples of the study."""
+    """Evaluate the start and the initial samples of the study, and return the best of them."""
     number, asked = study.search.samples, [study.start]
     if number:
         points = designs(study.parameters, SOBOL, number, study.search.seed)
@@ -148,12 +149,12 @@ def _solved(evaluate: Evaluate, solve: Callable[[Evaluate], str]) -> str:
 
 
 def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | None:
-    """Function for exact derivatives; None if differences are taken.
+    """Return the function that computes exact derivatives; None if finite differences are used.
 
     Raises
     ------
     InputError
-        They are asked for, and there are none.
+        Exact derivatives requested but not available, or not used by the method.
     """
     asked = study.search.gradients
     if asked == DIFFERENCES or (asked is None and (run is not None or not study.least_squares)):

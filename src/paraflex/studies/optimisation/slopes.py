@@ -1,4 +1,4 @@
-"""Derivatives of metrics by the place of a design in the unit cube: differences, or exact derivatives of the runs."""
+"""Derivatives of metrics with respect to unit-cube coordinates: finite differences, or exact derivatives of runs."""
 
 from __future__ import annotations
 
@@ -19,36 +19,37 @@ from paraflex.studies.optimisation.noise import NOISE_POINTS, noise_of
 from paraflex.studies.optimisation.study import DesignStudy
 
 EXACT, DIFFERENCES = "exact", "differences"
-# Column with the reason why a run has no exact derivatives.
+# Column of the reason why a run has no exact derivatives.
 NO_SLOPES = "slope.reason"
-# Bounds of a step adapted to noise, as a fraction of the ranges: beyond the upper one curvature dominates.
+# Bounds of the step adapted to noise, as fractions of the ranges; above the upper bound curvature dominates the error.
 _LEAST_STEP, _MOST_STEP = 1e-3, 0.05
 
 
 def slope_column(column: str, parameter: str) -> str:
-    """Column of a metric's exact derivative by a parameter."""
+    """Return the name of the column of a metric's exact derivative by a parameter."""
     return f"slope.{column}.{parameter}"
 
 
 class Slopes(Protocol):
-    """Derivatives of the metrics of an objective or of targets."""
+    """Protocol of a function that computes derivatives of the metrics of an objective or of targets."""
 
     def __call__(self, at: Evaluated) -> Mapping[str, Array]:
-        """Derivatives by column (runs, parameters), at a complete design."""
+        """Compute the derivatives at a complete design, a (runs, parameters) array for each column."""
         ...
 
 
 def slopes_of(study: DesignStudy[Result], evaluate: Evaluate) -> Slopes:
-    """Derivatives of the kind a study asks for; exact ones if the evaluation has them."""
+    """Return exact derivatives if the evaluator computes them, else finite differences."""
     differing = Differences(study, evaluate)
     return differing if evaluate.run_slopes is None else ExactSlopes(study, evaluate, differing)
 
 
 class Differences:
-    """Central differences with the step of the study, or one adapted to the noise of its metrics.
+    """Central differences with the step of the study, or with a step adapted to the noise of its metrics.
 
-    Noise is measured once, where derivatives are first asked for. The step that balances it against what a smooth
-    metric bends by, if it bends by itself over a range, is its cubic root (Press et al., Numerical Recipes, 5.7).
+    The noise is measured once, at the design where derivatives are first requested. The step that balances relative
+    noise against truncation error is the cube root of the noise, for a metric whose scale of variation is the range of
+    the parameter (Press et al., Numerical Recipes, 5.7).
     """
 
     def __init__(self, study: DesignStudy[Result], evaluate: Evaluate) -> None:
@@ -57,7 +58,7 @@ class Differences:
         self.step = study.search.difference
 
     def __call__(self, at: Evaluated) -> Mapping[str, Array]:
-        """See `Slopes`."""
+        """Compute the derivatives; see `Slopes`."""
         if self.step is None:
             self.step = float(np.clip(np.cbrt(relative_noise(self.study, self.evaluate, at)), _LEAST_STEP, _MOST_STEP))
         return differences(self.study, self.evaluate, at, self.step)
@@ -65,7 +66,7 @@ class Differences:
 
 @dataclass
 class ExactSlopes:
-    """Exact derivatives of the runs; differences at designs that have none, with the reasons."""
+    """Exact derivatives of the runs, replaced by differences at designs without them; `reasons` holds the reasons."""
 
     study: DesignStudy[Result]
     evaluate: Evaluate
@@ -73,7 +74,7 @@ class ExactSlopes:
     reasons: list[str] = field(default_factory=list)
 
     def __call__(self, at: Evaluated) -> Mapping[str, Array]:
-        """See `Slopes`."""
+        """Compute the derivatives; see `Slopes`."""
         if not _has_slopes(self.study, at):
             at = self.evaluate.add_slopes(at)
         for row in at.rows:
@@ -84,9 +85,9 @@ class ExactSlopes:
 
 
 def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated) -> float:
-    """Largest relative noise of a metric, from designs close together on a line."""
+    """Estimate the largest relative noise of a metric from closely spaced designs on a line; 0 if one does not run."""
     middle = study.unit(at.design)
-    # Along the diagonal, inwards; as far in all as the least difference reaches.
+    # Along the diagonal, away from the nearer bounds, over the span of the smallest central difference.
     along = np.where(middle > 0.5, -1.0, 1.0) * 2.0 * _LEAST_STEP
     done = evaluate([study.design(middle + share * along) for share in np.linspace(0.0, 1.0, NOISE_POINTS)])
     complete = [each for each in done if each.complete]
@@ -101,11 +102,11 @@ def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated
 
 
 def differences(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated, step: float) -> Mapping[str, Array]:
-    """Central differences, all of their designs evaluated at once.
+    """Compute central differences, with all designs evaluated at once.
 
-    The step is a share of the range: long against what the choice of time steps makes of a metric, short against the
-    metric's own bends. At a bound, and beside a design that fails, the difference is one-sided; beside two that fail
-    it is zero.
+    The step is a fraction of the range. It should be large compared with the noise from the choice of time steps, and
+    small compared with the curvature of the metric. At a bound, or if one of the two designs fails, the difference is
+    one-sided; if both fail it is zero.
     """
     middle = study.unit(at.design)
     sides = np.clip(middle[:, None] + step * np.array([-1.0, 1.0]), 0.0, 1.0)
@@ -121,7 +122,7 @@ def differences(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated, s
 
 
 def _moved(study: DesignStudy[Result], at: Evaluated, k: int, place: float) -> tuple[float, ...]:
-    """A design with one of its numbers changed within its range."""
+    """Return a design with one parameter moved to another unit-cube coordinate."""
     if place == study.unit(at.design)[k]:
         return at.design
     moved = study.design(np.full(len(at.design), place))[k]
@@ -129,7 +130,7 @@ def _moved(study: DesignStudy[Result], at: Evaluated, k: int, place: float) -> t
 
 
 def exact_slopes(study: DesignStudy[Result], at: Evaluated) -> Mapping[str, Array]:
-    """Derivatives in the rows; see `run_slopes`."""
+    """Return the exact derivatives stored in the rows, scaled to unit-cube coordinates; see `run_slopes`."""
     scale = study.per_unit(at.design)
     return {
         column: scale * np.array([[row[slope_column(column, name)] for name in study.setting.names] for row in at.rows])
@@ -143,7 +144,7 @@ def _has_slopes(study: DesignStudy[Result], at: Evaluated) -> bool:
 
 
 def no_exact_slopes(study: DesignStudy[Result]) -> str:
-    """Reason why a study has no exact derivatives; empty if it has."""
+    """Return the reason why a study has no exact derivatives; empty if it has them."""
     from paraflex.designs.derivatives.plans import check_differentiable_study
 
     try:
@@ -160,15 +161,16 @@ def run_slopes(
     task: Task,
     watch: Callable[[float], None] | None = None,
 ) -> Outcome:
-    """Exact derivatives of some metrics, or the reason why there are none, one row per mode.
+    """Compute exact derivatives of metrics, or the reason why there are none, as one row per mode.
 
     Parameters
     ----------
     columns : tuple of str
+        Columns of the metrics to differentiate.
     sizes : tuple of float
-        What steps of parameters are parts of where these are zero.
+        Sizes of the parameters from which the steps are chosen where a parameter is zero.
     setting, task, watch
-        See `run_task`.
+        See `run_task`; `watch` is not used.
     """
     from paraflex.designs.derivatives.gradient import metric_gradients
 
@@ -184,7 +186,7 @@ def run_slopes(
                 if not np.all(np.isfinite(found)):
                     raise NumericalError(f"the derivative of {column} is not finite")
                 row |= {slope_column(column, name): x for name, x in zip(setting.names, found, strict=True)}
-        # Any failure of exact derivatives is replaced by differences.
+        # After any failure of exact derivatives, finite differences are used.
         except Exception as error:
             row[NO_SLOPES] = trouble(error)["reason"]
         rows.append(row)

@@ -1,4 +1,4 @@
-"""A search for designs, read from its file: a sweep's settings, the start, and the search."""
+"""Base class of optimisation and identification studies, and reading of their files."""
 
 from __future__ import annotations
 
@@ -38,17 +38,20 @@ class Search:
     Attributes
     ----------
     method : str or None
+        Optimisation method; None for the default.
     evaluations : int
-        Designs at most.
+        Largest number of evaluated designs.
     samples : int
-        Sobol samples that are looked at first.
+        Number of Sobol samples evaluated first.
     seed : int
+        Seed of the samples and of stochastic methods.
     tolerance : float or None
-        Relative change at which it ends.
+        Relative change at which the search ends; None for the default of the method.
     gradients : str or None
-        "differences" or "exact"; None for exact ones where an identification has them, else differences.
+        Kind of derivatives, "differences" or "exact"; None for exact derivatives in an identification if available,
+        else differences.
     difference : float or None
-        Step of differences as a share of a parameter's range; None for one chosen against noise.
+        Step of finite differences as a fraction of a parameter's range; None for a step adapted to noise.
     """
 
     method: str | None = None
@@ -68,18 +71,19 @@ class Search:
 
 @dataclass(frozen=True)
 class DesignStudy(Study[R_co]):
-    """A mechanism, parameters within bounds, and the settings of their search.
+    """Search study: a mechanism, parameters within bounds, and the settings of the search.
 
     Attributes
     ----------
     base : SweepStudy
-        What is run; its only design is the start.
+        Sweep that defines the runs of a design; its only design is the start.
     search : Search
+        Settings of the search.
     """
 
     base: SweepStudy
     search: Search
-    # Whether residuals are made small, for which exact derivatives are worth their time.
+    # Whether the search is a least-squares problem, for which exact derivatives are worth their cost.
     least_squares: ClassVar[bool] = False
 
     @property
@@ -89,22 +93,22 @@ class DesignStudy(Study[R_co]):
 
     @property
     def setting(self) -> Setting:
-        """Common settings of all runs."""
+        """Settings common to all runs."""
         return self.base.setting
 
     @property
     def parameters(self) -> tuple[Varied, ...]:
-        """The parameters, each with its range."""
+        """Parameters with their ranges."""
         return self.base.parameters
 
     @property
     def start(self) -> tuple[float, ...]:
-        """The design the search starts from."""
+        """Design from which the search starts."""
         return tuple(self.base.designs[0].tolist())
 
     @property
     def runs(self) -> int:
-        """Runs of a design: paths times modes."""
+        """Number of runs of a design: paths times modes."""
         return self.base.runs
 
     @property
@@ -114,25 +118,25 @@ class DesignStudy(Study[R_co]):
 
     @abstractmethod
     def sought(self) -> dict[str, Any]:
-        """The objective or targets, in plain values."""
+        """Return the objective or the targets as plain values."""
 
     def design(self, unit: Array) -> tuple[float, ...]:
-        """Numbers of a point of the unit cube, which maps to the ranges, to logarithmic ones by the logarithm."""
+        """Map a point of the unit cube to parameter values, on a logarithmic scale for logarithmic parameters."""
         inside = np.clip(unit, 0.0, 1.0)
         return tuple(_rounded(p, float(p.spread(x))) for p, x in zip(self.parameters, inside, strict=True))
 
     def unit(self, design: Sequence[float]) -> Array:
-        """Place of a design in the unit cube."""
+        """Map a design to its point in the unit cube (parameters,)."""
         return np.array([_share(p, value) for p, value in zip(self.parameters, design, strict=True)])
 
     def per_unit(self, design: Sequence[float]) -> Array:
-        """Derivatives of the numbers by their place in the unit cube, (parameters,)."""
+        """Compute the derivatives of the parameter values by their unit-cube coordinates (parameters,)."""
         ranges = [(p.log, *p.ends) for p in self.parameters]
         sizes = zip(ranges, design, strict=True)
         return np.array([value * np.log(high / low) if log else high - low for (log, low, high), value in sizes])
 
     def content(self) -> dict[str, Any]:
-        """Everything that the results depend on, in plain values, without the limit of evaluations."""
+        """Return everything that the results depend on as plain values, without the limit of evaluations."""
         search = {name: value for name, value in vars(self.search).items() if name != "evaluations"}
         ranges = [[p.low, p.high, p.log] for p in self.parameters]
         sought = {"objective": None, "targets": []} | self.sought()
@@ -140,7 +144,10 @@ class DesignStudy(Study[R_co]):
 
 
 def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> SweepStudy:
-    """The sweep of a search, with the start as its one design, the metrics always kept, and further ones by field."""
+    """Build the sweep of a search, with the start as its only design.
+
+    Its metrics are those of the table and those of the objective or targets, given in `columns` by field of the file.
+    """
     for name, entry in table.vary.items():
         _check_range(f"vary.{name}", entry)
     for field, column in columns.items():
@@ -152,7 +159,7 @@ def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) 
         return make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
 
     base = study(list(dict.fromkeys([*table.metrics, *counting])) if table.metrics else [])
-    # Not every metric is kept unless it is named.
+    # The default metrics do not include all metrics.
     missing = [name for name in counting if name not in base.setting.metrics]
     base = study([*base.setting.metrics, *dict.fromkeys(missing)]) if missing else base
     for field, column in columns.items():
@@ -178,7 +185,7 @@ def _check_range(field: str, entry: ParameterTable) -> None:
 
 
 def _check_column(field: str, column: str, members: Members) -> None:
-    """None if a metric is one number of each run."""
+    """Check that a column is one scalar of each run; a metric per motor, drive or joint needs the name of one."""
     metric, known = metric_of(column), metric_of(column).columns(members)
     if metric.each and column not in known:
         raise InputError(
@@ -194,7 +201,7 @@ def _check_column(field: str, column: str, members: Members) -> None:
 
 
 def _nominal(setting: Setting, place: Place, field: str) -> float:
-    """The number at a place of the mechanism's file, or of the study's own [integration]."""
+    """Return the number at a place in the mechanism's file or in the study's own [integration]."""
     if place[0] != INTEGRATION:
         return number_at(setting.data, place)
     value = setting.integration.get(str(place[1]))
@@ -204,7 +211,7 @@ def _nominal(setting: Setting, place: Place, field: str) -> float:
 
 
 def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given: float | None) -> float:
-    """Start of a parameter: that of the study, else that of the mechanism's file."""
+    """Return the start of a parameter: that given in the study, else the value in the mechanism's file."""
     field = f"vary.{parameter.name}.start"
     found = {_nominal(setting, place, field) for place in places} if given is None else {given}
     if len(found) > 1:
@@ -231,13 +238,13 @@ def _share(parameter: Varied, value: float) -> float:
 
 
 def _rounded(parameter: Varied, value: float) -> float:
-    """A value to twelve digits, within the bounds, so that equal designs do not differ by rounding."""
+    """Round a value to twelve digits, within the bounds, so that equal designs do not differ by rounding."""
     low, high = parameter.ends
     return min(max(float(f"{value:.12g}"), low), high)
 
 
 def read_search(table: SearchTable) -> Search:
-    """Settings of a search in a file."""
+    """Read the settings of a search from the table of its file."""
     for name in ("evaluations", "difference", "tolerance"):
         value = getattr(table, name)
         if value is not None and not value > 0:

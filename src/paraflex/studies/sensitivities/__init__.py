@@ -1,1 +1,1 @@
-"""Sensitivities: derivatives of metrics by any numbers of the mechanism's file."""
+"""Sensitivity studies: derivatives of metrics with respect to numbers of the mechanism's file."""

@@ -1,4 +1,4 @@
-"""Sensitivities of a study: every metric of every run, differentiated by every parameter."""
+"""Sensitivity study: every metric of every run, differentiated with respect to every parameter."""
 
 from __future__ import annotations
 
@@ -39,32 +39,36 @@ TABLE, LINES, FIGURES = "sensitivity.csv", "sensitivity.parquet", "figures"
 
 @dataclass(frozen=True)
 class Sensitivities(Result):
-    """Metrics of runs and their derivatives by parameters.
+    """Metrics of runs and their derivatives with respect to parameters.
 
     Attributes
     ----------
     name, mechanism : str
+        Names of the study and of the mechanism.
     rows : tuple of (path, mode)
+        Path and mode of each run.
     parameters : tuple of str
+        Names of the parameters.
     nominal : (parameters,) array
-        Where derivatives are taken.
+        Parameter values at which the derivatives are taken.
     fields : tuple of tuples of str
-        Of the mechanism's file that each parameter sets.
+        Fields of the mechanism's file that each parameter sets.
     metrics : tuple of str
-        Columns; those per motor are called NAME.MOTOR.
+        Columns of the metrics; a metric per motor is named NAME.MOTOR.
     units : tuple of str
-        Of the metrics.
+        Units of the metrics.
     values : (rows, metrics) array
+        Values of the metrics.
     derivatives : (rows, metrics, parameters) array
-        In the units of a metric over those of a parameter's field.
+        Derivatives, in the unit of the metric per unit of the parameter's field.
     errors : (rows, metrics, parameters) array
-        Estimates of what differences left in them: see docs/sensitivities.md.
+        Estimated errors of the derivatives due to finite differences; see docs/sensitivities.md.
     residual : (rows,) array
-        What the equations of a stage are solved to, as a part of the accelerations.
+        Residual to which the stage equations are solved, relative to the accelerations.
     content : str
-        Digest of all that they depend on.
+        Digest of everything that the results depend on.
     verdict : Verdict
-        What is doubtful about the design that the file describes.
+        Doubts about the design that the file describes.
     """
 
     kept_as = SENSITIVITY
@@ -86,12 +90,12 @@ class Sensitivities(Result):
 
     @property
     def complete(self) -> bool:
-        """Always True: a missing derivative is an error."""
+        """Whether the results are complete: always True, because a missing derivative is an error."""
         return True
 
     @property
     def data(self) -> xr.Dataset:
-        """Values (run, metric), and derivatives, elasticities and errors (run, metric, parameter)."""
+        """Dataset of values (run, metric), and of derivatives, elasticities and errors (run, metric, parameter)."""
         of_run, of_metric = ("run", "metric"), ("run", "metric", "parameter")
         path, mode = zip(*self.rows, strict=True)
         return xr.Dataset(
@@ -115,20 +119,20 @@ class Sensitivities(Result):
 
     @property
     def relative(self) -> Array:
-        """Elasticities (rows, metrics, parameters): change of a metric in per cent per per cent of a parameter.
+        """Elasticities (rows, metrics, parameters): relative change of a metric per relative change of a parameter.
 
-        NaN where the metric is zero.
+        They are NaN where the metric is zero.
         """
         values = np.where(self.values == 0.0, np.nan, self.values)[:, :, None]
         return self.nominal * self.derivatives / values
 
     def to_frame(self) -> pd.DataFrame:
-        """One line for each row, metric and parameter."""
+        """Return a data frame with one line for each row, metric and parameter."""
         dims = ["run", "metric", "parameter"]
         return self.data.drop_vars("residual").to_dataframe(dims).reset_index().reindex(columns=list(_COLUMNS))
 
     def to_dict(self) -> dict[str, Any]:
-        """All results as plain values; None for NaN and infinity."""
+        """Return all results as plain values, with None for NaN and infinity."""
         parameters = zip(self.parameters, self.nominal, self.fields, strict=True)
         return {
             "content": self.content,
@@ -149,7 +153,7 @@ class Sensitivities(Result):
         }
 
     def write_files(self, folder: Path) -> None:
-        """Write `sensitivity.json`, and its lines as `sensitivity.csv` and `sensitivity.parquet`; see `Result.save`."""
+        """Write `sensitivity.json`, and the data frame as CSV and Parquet files; see `Result.save`."""
         import pyarrow as pa
 
         super().write_files(folder)
@@ -170,25 +174,27 @@ class Sensitivities(Result):
 
 @dataclass(frozen=True)
 class SensitivityStudy(WholeStudy[Sensitivities]):
-    """The runs, metrics and parameters of a sensitivity study.
+    """Sensitivity study: runs, metrics and parameters.
 
-    One path is differentiated after the other: workers have no part in it.
+    The paths are processed one after the other; workers are not accepted.
 
     Attributes
     ----------
     name : str
+        Name of the study.
     setting : Setting
-        Of its metrics those that have derivatives.
+        Settings of the runs, with metrics that have derivatives.
     parameters : tuple of Varied
+        Parameters to differentiate with respect to.
     at : mapping of str to float
-        Values of parameters, where they are not to be those of the mechanism's file.
+        Parameter values that replace those of the mechanism's file.
 
     Raises
     ------
     InputError
-        From `run`: an unknown parameter, or one without a derivative; a method without.
+        Unknown parameter, or parameter or integration method without derivatives; raised by `run`.
     NumericalError
-        From `run`: a run that cannot be made.
+        Failed run; raised by `run`.
     """
 
     gives: ClassVar[type[Result]] = Sensitivities
@@ -198,7 +204,7 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
     at: Mapping[str, float] = field(default_factory=dict)
 
     def content(self) -> str:
-        """A digest of everything that the results depend on."""
+        """Return a digest of everything that the results depend on."""
         setting = self.setting
         places = [[list(place) for place in places] for places in setting.places]
         asked = [setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics]
@@ -224,19 +230,19 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
 
 @checked_arguments()
 def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> SensitivityStudy:
-    """Read a study file: that of a sweep, in which parameters need no values and nothing is sampled.
+    """Read a sensitivity study from the file of a sweep, in which parameters need no values; sampling is ignored.
 
     Parameters
     ----------
     file : str or Path
-        TOML; see docs/sensitivities.md.
+        Study file, TOML; see docs/sensitivities.md.
     metrics : sequence of str
-        Instead of the file's.
+        Metrics that replace those of the file.
 
     Raises
     ------
     InputError
-        Anything in it that does not fit the file or the mechanism: it names file, field, value and remedy.
+        Invalid entry, or one that does not fit the mechanism. The error names file, field, value and remedy.
     """
     with study_table(SweepTable, file) as (table, folder):
         chosen = list(metrics) or table.metrics
@@ -256,13 +262,14 @@ def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> Sensiti
 
 @checked_arguments()
 def sensitivities(study: SensitivityStudy | str | Path, *, at: Mapping[str, float] | None = None) -> Sensitivities:
-    """Derivatives of the metrics of a study's runs, or of its file's, by its parameters: `study.run()` in one call.
+    """Compute the derivatives of the metrics of a study's runs with respect to its parameters.
 
     Parameters
     ----------
-    study : SensitivityStudy, or str or Path of its file
+    study : SensitivityStudy, str or Path
+        Study, or its file.
     at : mapping of str to float, optional
-        Values of parameters, where they are not to be those of the mechanism's file.
+        Parameter values that replace those of the mechanism's file.
     """
     if not isinstance(study, SensitivityStudy):
         study = load_sensitivities(study)
@@ -287,7 +294,7 @@ def _values(setting: Setting, at: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def _size(parameter: Varied, value: float) -> float | None:
-    """Size for the steps of a parameter whose value is zero: its range, if it has one."""
+    """Return the size from which the step of a parameter with value zero is chosen: its range, or None."""
     if value != 0.0 or parameter.low is None or parameter.high is None:
         return None
     return parameter.high - parameter.low

@@ -1,1 +1,1 @@
-"""Sweeps: thousands of runs of a mechanism whose numbers vary, as one table."""
+"""Sweeps: thousands of runs of a mechanism with varied parameters, collected in one table."""

@@ -1,4 +1,4 @@
-"""The report of a study's folder: its rows, and its best runs repeated for the animation."""
+"""Report of the folder of a study: its rows, and its best runs, which are repeated for the animation."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ from paraflex.results.metrics import VALIDITY
 from paraflex.writing import read_json
 
 _SEARCH_RESULT = "result.json"
-# Relative difference of a metric from its row above which the report warns: other machines round differently.
+# Relative difference between a repeated metric and its row above which the report warns; machines round differently.
 _ROW_DIFFERENCE = 1e-6
 
 
 def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = None) -> Page:
-    """The report of the study in a folder, finished or not.
+    """Build the report of the study in a folder, finished or not.
 
-    The best runs are made once more, in threads.
+    The best runs are repeated, in threads, except in studies of statics.
 
     Parameters
     ----------
     folder : str or Path
-        That `sweep`, `optimise` or `identify` wrote.
+        Folder written by `sweep`, `optimise` or `identify`.
     on_progress : callable, optional
-        Called with what is done now, in a few words.
+        Function called with a short description of the current activity.
 
     Raises
     ------
     InputError
-        It holds no study of ours, or has no rows yet.
+        Folder that holds no study of paraflex, or a study without rows.
     """
     study = open_study(folder)
     files = tables_of(study.folder)
@@ -87,7 +87,7 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
 def _again(
     study: StudyFolder, designs: DesignTable, picked: Sequence[Picked]
 ) -> tuple[dict[int, xr.Dataset], dict[int, str], list[int]]:
-    """The picked runs, reasons why some failed, and those whose results differ from their rows."""
+    """Repeat the picked runs; return their datasets, the reasons of failures, and the rows with different results."""
     if not picked:
         return {}, {}, []
     compile_kernels_for(model_from(dict(study.setting.data), study.setting.source).mechanism)
@@ -161,7 +161,7 @@ def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> l
 
 
 def _found(file: Path) -> Mapping[str, Any]:
-    """Result of a search; empty for a sweep."""
+    """Return the result of a search from its file; an empty mapping for a sweep."""
     if not file.is_file():
         return {}
     found = read_json(file)
@@ -170,7 +170,10 @@ def _found(file: Path) -> Mapping[str, Any]:
 
 
 def _searched(designs: DesignTable, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:
-    """Runs of the best design of a search and of its start; of an optimisation also the best by single metrics."""
+    """Return the runs of a search to show: those of its best design and its start.
+
+    For an optimisation, the best runs by single metrics are added.
+    """
     out: dict[int, list[str]] = {}
     identified = found.get("kind") == IDENTIFICATION
     for key, why in (("values", "found" if identified else "objective"), ("start", "the start")):
