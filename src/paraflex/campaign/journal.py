@@ -18,7 +18,8 @@ from paraflex.interrupts import uninterrupted
 from paraflex.writing import GO_ON, whole_file
 
 JOURNAL = "journal.sqlite"
-# Rows are committed when this number is pending, or this time [s] has passed since the last commit; a crash loses no more.
+# Rows are committed when this number is pending or this time [s] has passed since the last commit. A crash loses no
+# others.
 _ROWS, _SECONDS = 2048, 2.0
 # Time that a commit waits for readers, and readers for a commit [s].
 _PATIENCE = 60.0
@@ -146,7 +147,7 @@ class Journal:
             raise sqlite3.DatabaseError("it does not say how many rows there are") from error
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Add rows, replacing those of the same runs; they are committed together at the next call after two seconds."""
+        """Add rows, replacing those of the same runs; they are committed in groups, about every two seconds."""
         self._waiting += rows
         if len(self._waiting) >= _ROWS or time.monotonic() - self._written > _SECONDS:
             self.commit()
@@ -159,7 +160,7 @@ class Journal:
             contents = {key: json.dumps(row, default=_plain) for key, row in waiting.items()}
             with uninterrupted(), self._connection:
                 self._write([(*key, content, _digest(*key, content)) for key, content in contents.items()])
-            # The list is cleared after the transaction only, so that rows of an interrupted commit are written at the end.
+            # The list is cleared after the transaction, so that rows of an interrupted commit are written at the end.
             self._waiting = []
         self._written = time.monotonic()
 

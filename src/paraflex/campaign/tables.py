@@ -44,8 +44,8 @@ def table_name(*, finished: bool) -> str:
 def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
     """Write the rows of a journal as one table: `results.parquet`, or `unfinished.parquet` while runs are missing.
 
-    A finished table is written as `results.csv` as well. The files depend on the rows only. One group of rows is held in
-    memory at a time.
+    A finished table is written as `results.csv` as well. The files depend on the rows only. Memory holds one group of
+    rows at a time.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
 
 
 def tables_of(folder: Path) -> list[Path]:
-    """Return the files with the rows of a folder's runs: the table, else the journal, else those of an earlier release."""
+    """Return the files with the rows of a folder: the table, else the journal, else those of an earlier release."""
     found = [folder / name for name in (RESULTS, JOURNAL, UNFINISHED) if (folder / name).is_file()]
     # Parts beside a finished table or a journal were left by a killed process, and their rows are in the table.
     return found[:1] if found and found[0].name != UNFINISHED else [*found, *sorted(folder.glob(EARLIER))]

@@ -98,7 +98,7 @@ class Threads(Engine):
         sys.setswitchinterval(_SWITCH)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Submit a function call; see `Engine`. A callable to report the time reached is passed as the last argument."""
+        """Submit a function call; see `Engine`. Its last argument is a callable that takes the time reached [s]."""
         return super().submit(function, *arguments, self._watch)
 
     def close(self, *, abandon: bool = False) -> None:
@@ -146,7 +146,7 @@ class Processes(Engine):
         # Processes are spawned, not forked, because threads of this process may hold locks.
         context = multiprocessing.get_context("spawn")
         with starting_processes():
-            # The constructor starts a process that tracks semaphores.
+            # The constructor starts a process that tracks locks.
             return ProcessPoolExecutor(self.workers, mp_context=context, initializer=end_with_parent)
 
 
@@ -194,7 +194,7 @@ class Dask(Engine):
         return self._workers
 
     def restart(self) -> None:
-        """Raise `LostCluster`, because a cluster restarts its workers itself."""
+        """Raise `LostCluster`: broken or cancelled calls mean that the cluster no longer answers."""
         raise LostCluster(_GONE)
 
     def close(self, *, abandon: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Folders of results: a manifest lists the files that belong together, and a change is applied completely or not at all.
+"""Folders of results: a manifest lists the files that belong together, and changes of a folder are atomic.
 
 If the writer is killed, the next process that opens the folder completes the change.
 """
