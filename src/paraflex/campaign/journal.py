@@ -18,8 +18,8 @@ from paraflex.interrupts import uninterrupted
 from paraflex.writing import GO_ON, whole_file
 
 JOURNAL = "journal.sqlite"
-# Rows are committed when this number is pending or this time [s] has passed since the last commit. A crash loses no
-# others.
+# Rows are committed when this number is pending or this time [s] has passed since the last commit. A crash loses
+# these rows at most.
 _ROWS, _SECONDS = 2048, 2.0
 # Time that a commit waits for readers, and readers for a commit [s].
 _PATIENCE = 60.0
@@ -185,7 +185,9 @@ def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
         Journal without intact rows, or disk that is full or cannot be written for another reason.
     """
     file, how = folder / JOURNAL, f"mode=rwc&nolock={int(not locks)}"
-    if file.is_file() and not file.is_symlink() and file.stat().st_nlink > 1:  # a copy by hard links stays as it is
+    if (
+        file.is_file() and not file.is_symlink() and file.stat().st_nlink > 1
+    ):  # a copy made by hard links must not change
         with whole_file(file, remedy=GO_ON) as own:
             shutil.copyfile(file, own)
     reason = _reason_to_mend(file, how)

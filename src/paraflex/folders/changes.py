@@ -18,7 +18,7 @@ from paraflex.writing import ELSEWHERE, read_values, unwritable
 
 MANIFEST = "manifest.json"
 NEW, READY, REMOVED = ".new", ".ready", "removed.json"
-_NO_NAME = re.compile("[\0\ud800-\udfff]")  # no file's name holds an end of text or half of a letter
+_NO_NAME = re.compile("[\0\ud800-\udfff]")  # file names contain no null character and no surrogate
 
 
 def finish_moves(folder: Path) -> None:
@@ -90,7 +90,7 @@ def _put(ready: Path, folder: Path) -> None:
             file.replace(place)
         for name in removed:
             (folder / name).unlink(missing_ok=True)
-            with suppress(OSError):  # it holds other files, or is gone
+            with suppress(OSError):  # the folder holds other files, or does not exist
                 (folder / name).parent.rmdir()
         # The manifest is moved last, because until then `.ready` shows what is left to do.
         (ready / MANIFEST).replace(folder / MANIFEST)
