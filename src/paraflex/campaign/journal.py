@@ -185,9 +185,8 @@ def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
         Journal without intact rows, or disk that is full or cannot be written for another reason.
     """
     file, how = folder / JOURNAL, f"mode=rwc&nolock={int(not locks)}"
-    if (
-        file.is_file() and not file.is_symlink() and file.stat().st_nlink > 1
-    ):  # a copy made by hard links must not change
+    # A copy of the folder made by hard links must not change.
+    if file.is_file() and not file.is_symlink() and file.stat().st_nlink > 1:
         with whole_file(file, remedy=GO_ON) as own:
             shutil.copyfile(file, own)
     reason = _reason_to_mend(file, how)
