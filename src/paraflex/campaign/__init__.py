@@ -1,4 +1,4 @@
-"""What every study is; and of many runs the workers that compute them, the journal that keeps them, their tables."""
+"""Base classes of studies and results, and for studies of many runs the workers, the journal and the tables."""
 
 from paraflex.campaign.folder import (
     STUDY as STUDY,

@@ -1,4 +1,4 @@
-"""The folder of a study: whose results it holds, its journal, and the table that is made of it."""
+"""Folder of a study of many runs, with the description of the study, its journal and its table."""
 
 from __future__ import annotations
 
@@ -28,13 +28,14 @@ TRAJECTORIES = "trajectories"
 
 @dataclass(frozen=True)
 class Campaign:
-    """A folder that a study of many runs writes to.
+    """Folder to which a study of many runs writes.
 
     Attributes
     ----------
     folder : ResultsFolder
+        Folder, locked for writing.
     journal : Journal
-        Rows that are added to it stay, whatever happens.
+        Journal of the rows; rows added to it are kept however the study ends.
     """
 
     folder: ResultsFolder
@@ -42,7 +43,7 @@ class Campaign:
 
     @contextmanager
     def published(self, *, finished: bool) -> Iterator[Path]:
-        """A folder with the table of all rows, to write more results to; they take the place of what was found before.
+        """Yield a temporary folder with the table of all rows, for further results; they replace the previous results.
 
         Parameters
         ----------
@@ -52,7 +53,7 @@ class Campaign:
         Raises
         ------
         OutputError
-            The disk is full, or cannot be written for another reason.
+            Disk that is full, or cannot be written for another reason.
         """
         with self.folder.replaced(but=(STUDY, f"{JOURNAL}*", f"{TRAJECTORIES}/*")) as new:
             write_table(new, self.journal, finished=finished)
@@ -63,27 +64,31 @@ class Campaign:
 def open_campaign(
     folder: Path, study: Mapping[str, Any], schema: pa.Schema, belongs: Callable[[Row], bool] = lambda _: True
 ) -> Iterator[Campaign]:
-    """A folder, made that of a study or seen to be; rows that are added to its journal stay, whatever happens.
+    """Open the folder of a study for writing, or create it; rows added to its journal are kept however the study ends.
 
     Parameters
     ----------
     folder : Path
+        Folder of the study.
     study : mapping
-        What `study.json` says: `content`, a digest of all that results depend on, `versions` of packages, and more.
+        Content of `study.json`: `content`, a digest of everything that results depend on, `versions` of packages, and
+        further entries.
     schema : pyarrow.Schema
         Columns of the table.
     belongs : callable
-        Whether a row is the study's, by its identity: asked of rows in tables of an earlier release.
+        Function that checks by its identity whether a row belongs to the study; applied to rows in tables that are
+        taken over into a new journal.
 
     Raises
     ------
     InputError
-        It holds results of another study, of other versions, or something else; or another process writes to it.
+        Folder with results of another study, of other versions, or with other files, or to which another process
+        writes.
     OutputError
-        It cannot be written, or is damaged.
+        Folder that cannot be written, or is damaged.
     """
     with hold_folder(folder, STUDY_OF_RUNS, field="--output", remedy=GO_ON) as held:
-        # All that an earlier release left where it was killed at its very first write.
+        # This is the only file that an earlier release left if it was killed at its first write.
         (folder / f"{STUDY}.part").unlink(missing_ok=True)
         _check_ours(folder)
         for left in [*folder.glob("*.part"), *folder.glob(f"{TRAJECTORIES}/*.part")]:
@@ -106,12 +111,12 @@ def open_campaign(
 
 
 def read_study(file: Path) -> dict[str, Any]:
-    """What a `study.json` says.
+    """Read the content of a `study.json`.
 
     Raises
     ------
     InputError
-        It is damaged, cannot be read, or is none of ours.
+        File that is damaged, cannot be read, or is not that of a study of paraflex.
     """
     remedy = "delete it and run the same command again: it is written again"
     found = read_values(file, remedy)
@@ -122,7 +127,7 @@ def read_study(file: Path) -> dict[str, Any]:
 
 
 def _check_ours(folder: Path) -> None:
-    """Refuse a folder that holds files and no study."""
+    """Check that a folder holds a study or is empty."""
     if not any((folder / name).is_file() for name in (STUDY, JOURNAL)):
         names = [*files_of(folder), *foreign_files(folder)]
         if names:
@@ -131,7 +136,7 @@ def _check_ours(folder: Path) -> None:
 
 
 def _noted(study: bytes) -> Any:
-    """The description of a study in a journal; None if it is not JSON."""
+    """Return the description of a study stored in a journal; None if it is not JSON."""
     with suppress(ValueError, RecursionError):
         return json.loads(study)
 
@@ -151,7 +156,7 @@ def _check_same(folder: Path, found: Any, study: Mapping[str, Any]) -> None:
 
 
 def _take_over(folder: Path, journal: Journal, schema: pa.Schema, belongs: Callable[[Row], bool]) -> None:
-    """Give a new journal the rows of tables beside it: of an earlier release, or of a journal that was deleted."""
+    """Add the rows of existing tables to a new journal, from an earlier release or after the journal was deleted."""
     files = [folder / name for name in (RESULTS, UNFINISHED) if (folder / name).is_file()]
     for file in [*files, *sorted(folder.glob(EARLIER))]:
         rows = _typed(file, schema).to_pylist()
@@ -165,7 +170,7 @@ def _take_over(folder: Path, journal: Journal, schema: pa.Schema, belongs: Calla
 
 
 def _typed(file: Path, schema: pa.Schema) -> pa.Table:
-    """A table, whose columns are of the kinds that the study's are."""
+    """Read a table, and check that its columns have the types of the study's columns."""
     found = read_parquet(file)
     if not {"run", "id", "status"} <= set(found.column_names):
         raise damaged(file, "not a table of runs", "delete it and run the same command again")

@@ -1,4 +1,4 @@
-"""A journal of runs: rows in one SQLite file, each with a digest of its own, written by one process at a time."""
+"""Journal of runs: an SQLite file of rows, each with its own digest, written by one process at a time."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ from paraflex.interrupts import uninterrupted
 from paraflex.writing import GO_ON, whole_file
 
 JOURNAL = "journal.sqlite"
-# Rows are committed when so many wait, or the first has waited so long [s]: what a crash can cost.
+# Rows are committed when this number is pending or this time [s] has passed since the last commit. A crash loses
+# these rows at most.
 _ROWS, _SECONDS = 2048, 2.0
-# How long a commit waits for those who read, and they for a commit [s].
+# Time that a commit waits for readers, and readers for a commit [s].
 _PATIENCE = 60.0
 _PAGE = 4096
-# Not a write-ahead log: its index is shared memory, which machines on one network file system do not share. A rollback
-# journal is there during a commit only, so that the folder may be copied as it stands; FULL: a commit is on the disk.
+# No write-ahead log is used, because its index is shared memory, which machines on a network file system do not share.
+# A rollback journal exists during a commit only, so that the folder can be copied at any time. With FULL, a commit
+# returns when the data are on the disk.
 _SETTINGS = f"""
 PRAGMA page_size = {_PAGE};
 PRAGMA journal_mode = DELETE;
@@ -38,14 +40,14 @@ CREATE TABLE IF NOT EXISTS runs (
 );
 COMMIT;
 """
-# The first bytes of any journal's file, by these settings.
+# First bytes of the file of any journal with these settings.
 _HEAD = b"SQLite format 3\0\x10\0\x01\x01\0\x40\x20\x20"
-# Last bytes of a rollback journal that names a file of several databases.
+# Last bytes of a rollback journal that names another file, as in transactions on several databases.
 _NAMES_ANOTHER = bytes.fromhex("d9d505f920a163d7")
 _ALL = "SELECT run, id, content, digest FROM runs"
-# The note that says how many rows there are, and the sum of their digests.
+# Name of the note with the number of rows and the sum of their digests.
 _TALLY = "rows"
-# Of SQLite where the file is not to blame.
+# Error codes of SQLite that do not indicate a damaged file.
 _UNWRITABLE = {
     sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_LOCKED,
     sqlite3.SQLITE_PERM, sqlite3.SQLITE_PROTOCOL, sqlite3.SQLITE_READONLY,
@@ -57,7 +59,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class _Tally:
-    """How many rows there are, and the sum of their digests: which rows a damaged index or page leaves out."""
+    """Number of rows and sum of their digests, by which rows lost through a damaged index or page are detected."""
 
     count: int = 0
     total: int = 0
@@ -67,12 +69,12 @@ class _Tally:
 
 
 class Journal:
-    """Rows of runs by what they are of: `run`, the place in the table, and `id`, the identity; and notes on the study.
+    """Journal of rows of runs, keyed by `run`, the place in the table, and `id`, the identity, with notes on the study.
 
     Parameters
     ----------
     connection : sqlite3.Connection
-        To a file with the tables of a journal.
+        Connection to a file with the tables of a journal.
     """
 
     def __init__(self, connection: sqlite3.Connection) -> None:
@@ -81,7 +83,7 @@ class Journal:
         self._written = time.monotonic()
 
     def note(self, name: str, value: bytes) -> None:
-        """Keep something about the study."""
+        """Store a note on the study under a name."""
         with uninterrupted(), self._connection:
             self._note(name, value)
 
@@ -90,12 +92,12 @@ class Journal:
         self._connection.execute("INSERT OR REPLACE INTO notes VALUES (?, ?, ?)", entry)
 
     def noted(self, name: str) -> bytes | None:
-        """What was kept under a name.
+        """Return the note stored under a name; None if there is none.
 
         Raises
         ------
         sqlite3.DatabaseError
-            It is damaged.
+            Damaged note.
         """
         found = self._connection.execute("SELECT value, digest FROM notes WHERE name = ?", (name,)).fetchone()
         if found is None:
@@ -105,23 +107,23 @@ class Journal:
         return found[0]
 
     def runs(self) -> Iterator[int]:
-        """The runs of all rows, in order."""
+        """Return an iterator over the run numbers of all rows, in order."""
         self.commit()
         return (run for (run,) in self._connection.execute("SELECT run FROM runs ORDER BY run"))
 
     def rows(self) -> Iterator[Row]:
-        """All rows, in the order of runs.
+        """Return an iterator over all rows, in the order of runs.
 
         Raises
         ------
         sqlite3.DatabaseError
-            The file, or a row, is damaged.
+            Damaged file or row.
         """
         self.commit()
         return (_row(content) for content in self._contents())
 
     def check(self) -> None:
-        """See that notes and rows are as they were written; see `rows` for the errors."""
+        """Check that notes and rows are as they were written; see `rows` for the errors."""
         for (name,) in self._connection.execute("SELECT name FROM notes").fetchall():
             self.noted(name)
         for _ in self._contents():
@@ -145,20 +147,20 @@ class Journal:
             raise sqlite3.DatabaseError("it does not say how many rows there are") from error
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Keep rows, in place of those of the same runs; they are written together, within two seconds."""
+        """Add rows, replacing those of the same runs; they are committed in groups, about every two seconds."""
         self._waiting += rows
         if len(self._waiting) >= _ROWS or time.monotonic() - self._written > _SECONDS:
             self.commit()
 
     def commit(self) -> None:
-        """Write what waits, all of it or nothing."""
+        """Write all pending rows in one transaction."""
         if self._waiting:
-            # Of two rows of a run the later one.
+            # If a run has two rows, the later one is kept.
             waiting = {(int(row["run"]), row["id"]): row for row in self._waiting}
             contents = {key: json.dumps(row, default=_plain) for key, row in waiting.items()}
             with uninterrupted(), self._connection:
                 self._write([(*key, content, _digest(*key, content)) for key, content in contents.items()])
-            # Not before: what Ctrl-C met half written is written at the end.
+            # The list is cleared after the transaction, so that rows of an interrupted commit are written at the end.
             self._waiting = []
         self._written = time.monotonic()
 
@@ -173,17 +175,18 @@ class Journal:
 
 @contextmanager
 def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
-    """The journal of a folder that this process holds; what was added is on the disk at the end, whatever ends it.
+    """Open the journal of a folder held by this process; rows that were added are on the disk when the context ends.
 
-    Of one that is damaged what is whole is kept, with a warning.
+    If the journal is damaged, its intact rows and notes are kept, and a warning is issued.
 
     Raises
     ------
     OutputError
-        Nothing in it is whole, or the disk is full or cannot be written for another reason.
+        Journal without intact rows, or disk that is full or cannot be written for another reason.
     """
     file, how = folder / JOURNAL, f"mode=rwc&nolock={int(not locks)}"
-    if file.is_file() and not file.is_symlink() and file.stat().st_nlink > 1:  # a copy by hard links stays as it is
+    # A copy of the folder made by hard links must not change.
+    if file.is_file() and not file.is_symlink() and file.stat().st_nlink > 1:
         with whole_file(file, remedy=GO_ON) as own:
             shutil.copyfile(file, own)
     reason = _reason_to_mend(file, how)
@@ -200,21 +203,21 @@ def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
 
 @contextmanager
 def read_journal(file: Path) -> Iterator[Journal]:
-    """A journal as it stands, to read, also while another process writes it.
+    """Open a journal for reading, even while another process writes to it.
 
     Raises
     ------
     OutputError
-        It is damaged.
+        Damaged journal.
     """
-    # Not mode=ro: what a killed process left half written is undone first.
+    # The mode is not ro, because an unfinished transaction of a killed process must be rolled back first.
     with _errors(file), _connected(file, "mode=rw") as connection:
         connection.execute("BEGIN")
         yield Journal(connection)
 
 
 def _reason_to_mend(file: Path, how: str) -> str:
-    """What is wrong with a journal; empty where it is whole, or is not there."""
+    """Return the reason why a journal is damaged; empty if it is intact or does not exist."""
     if not file.exists():
         return ""
     with _errors(file):
@@ -231,12 +234,12 @@ def _reason_to_mend(file: Path, how: str) -> str:
 
 
 def _mend(file: Path, how: str, reason: str) -> None:
-    """Write a journal anew, of what is whole in it.
+    """Rewrite a damaged journal from its intact rows and notes.
 
     Raises
     ------
     OutputError
-        Nothing is.
+        Journal without intact rows.
     """
     copy = file.with_name(f"{file.name}.copy.part")
     try:
@@ -247,7 +250,7 @@ def _mend(file: Path, how: str, reason: str) -> None:
                 kept = _keep_whole(copy, Journal(connection))
             if not kept:
                 raise _damaged(file, reason)
-            # It is of pages of the damaged file.
+            # The rollback journal refers to pages of the damaged file.
             file.with_name(f"{file.name}-journal").unlink(missing_ok=True)
     finally:
         copy.unlink(missing_ok=True)
@@ -256,21 +259,21 @@ def _mend(file: Path, how: str, reason: str) -> None:
 
 
 def _restore_first_page(file: Path, empty: bytes) -> None:
-    """Give a journal the first page of an empty one, which has the same tables at the same places."""
+    """Replace the first page of a journal by that of an empty one, which has the same tables at the same places."""
     pages = file.stat().st_size // _PAGE
     with file.open("rb+") as stream:
         stream.write(empty[:28] + pages.to_bytes(4, "big") + bytes(8) + empty[40:_PAGE])
 
 
 def _keep_whole(damaged: Path, journal: Journal) -> int:
-    """Notes and rows of a damaged file that are as they were written; how many rows."""
+    """Copy the intact notes and rows of a damaged file to a journal, and return the number of rows."""
     found: set[tuple[int, str]] = set()
     with suppress(sqlite3.DatabaseError), _connected(damaged, "mode=rw") as connection:
         with suppress(sqlite3.DatabaseError, MemoryError):
             for name, value, digest in connection.execute("SELECT name, value, digest FROM notes").fetchall():
                 if name != _TALLY and isinstance(value, bytes) and digest == _digest(name, value.hex()):
                     journal.note(name, value)
-        # From both ends, without the index: to the page that cannot be read.
+        # Read from both ends, without the index, up to the page that cannot be read.
         for order in ("rowid", "rowid DESC"):
             with suppress(sqlite3.DatabaseError, MemoryError):
                 for run, identity, content, digest in connection.execute(f"{_ALL} NOT INDEXED ORDER BY {order}"):
@@ -284,17 +287,17 @@ def _keep_whole(damaged: Path, journal: Journal) -> int:
 
 @contextmanager
 def _connected(file: Path, how: str) -> Iterator[sqlite3.Connection]:
-    """A connection to a journal, with its tables where the file is new."""
+    """Open a connection to a journal, and create its tables if the file is new."""
     _check_files(file)
     with closing(sqlite3.connect(f"{file.absolute().as_uri()}?{how}", timeout=_PATIENCE, uri=True)) as connection:
-        # A damaged text is a matter of its digest.
+        # Damaged text must not raise here, because the digest detects it.
         connection.text_factory = lambda text: text.decode(errors="replace")
-        # What a killed process left half written is undone by the first question.
+        # The first query rolls back an unfinished transaction of a killed process.
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
         connection.executescript(_SETTINGS)
         if not file.stat().st_size:
             connection.executescript(_TABLES)
-        # Triggers and views would act on what is read and written; whoever sends a folder may have put them in.
+        # Triggers and views could alter what is read and written, and a folder from others may contain them.
         found = connection.execute("SELECT type, name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'").fetchall()
         if sorted(found) != [("table", "notes"), ("table", "runs")]:
             raise sqlite3.DatabaseError("it holds other things than the tables of a journal")
@@ -302,9 +305,9 @@ def _connected(file: Path, how: str) -> Iterator[sqlite3.Connection]:
 
 
 def _check_files(file: Path) -> None:
-    """Check that SQLite touches no other files than a journal and those beside it, whoever made them.
+    """Check that SQLite will access no files except a journal and those beside it, even if others created them.
 
-    It rolls back into what a link leads to, and deletes the file that a rollback journal names.
+    SQLite rolls back into the target of a link, and deletes the file named in a rollback journal.
     """
     beside = [file.with_name(file.name + end) for end in ("", "-journal", "-wal", "-shm")]
     if any(each.is_symlink() or (each.exists() and not each.is_file()) for each in beside):
@@ -317,7 +320,7 @@ def _check_files(file: Path) -> None:
 
 @contextmanager
 def _errors(file: Path) -> Iterator[None]:
-    """Errors of SQLite, which are to name the file and say what to do."""
+    """Convert errors of SQLite inside the context to errors that name the file and a remedy."""
     try:
         yield
     except sqlite3.DatabaseError as error:
@@ -337,7 +340,7 @@ def _damaged(
 
 
 def _code(error: Exception) -> int:
-    """Of SQLite; that of damage where it has none."""
+    """Return the SQLite code of an error; that of a damaged file if it has none."""
     return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
 
 
@@ -346,7 +349,7 @@ def _digest(*parts: object) -> str:
 
 
 def _row(content: str) -> Row:
-    """The row of a run from its JSON; its digest alone does not show that it is one."""
+    """Parse the row of a run from JSON, and check that it is a row, which its digest alone does not show."""
     with suppress(ValueError, RecursionError):
         found = json.loads(content)
         if isinstance(found, dict) and {"run", "id"} <= found.keys():
@@ -355,5 +358,5 @@ def _row(content: str) -> Row:
 
 
 def _plain(number: Any) -> int | float:
-    """A number of NumPy's as one of Python's."""
+    """Convert a NumPy number to a Python number."""
     return number.item()

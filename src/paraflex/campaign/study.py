@@ -1,4 +1,4 @@
-"""What every study is, how far it is while it runs, and what every result offers."""
+"""Base classes of studies and their results, and the progress of a study."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from paraflex.writing import GO_ON, write_json
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a study is, in what it counts: runs, designs, seconds of a motion.
+    """Progress of a study, in the units that it counts: runs, designs, or simulated seconds.
 
     Attributes
     ----------
     done, total : float
-        Of all, those of earlier sessions among the done ones.
+        Number of units done, including those of earlier sessions, and total number of units.
     fresh : float
-        Of this session.
+        Number of units done in this session.
     seconds : float
-        Since it began.
+        Wall time since the start of the session [s].
     doing : str
-        What is being done now; empty where many things are.
+        Description of the current activity; empty if there are several.
     best : float or None
-        Of a search the least objective, or root mean square residual, until now.
+        Least objective or RMS residual of a search so far; None for other studies.
     """
 
     done: float
@@ -50,12 +50,12 @@ class Progress:
 
     @property
     def rate(self) -> float:
-        """How many a second in this session."""
+        """Number of units per second in this session [1/s]."""
         return self.fresh / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
     def left(self) -> float | None:
-        """Time left [s]; None before it can be told."""
+        """Estimated time left [s]; None before it can be estimated."""
         return (self.total - self.done) / self.rate if self.rate > 0.0 else None
 
 
@@ -64,16 +64,16 @@ OnProgress = Callable[[Progress], None]
 
 @dataclass(frozen=True)
 class Workers(CheckedFields):
-    """Who computes; results do not depend on it, to the last bit.
+    """Workers that compute the runs of a study; results do not depend on them, to the last bit.
 
     Attributes
     ----------
     engine : str or Engine
-        "threads" of this process, "processes", or "dask".
+        Kind of workers: "threads" of this process, "processes", or "dask"; or an engine.
     number : int or None
-        As many as there are processors where None.
+        Number of workers; None for the number of processors.
     cluster : str or None
-        Address of a Dask scheduler.
+        Address of a Dask scheduler; None for a cluster on this machine.
     """
 
     engine: str | Engine = THREADS
@@ -82,19 +82,19 @@ class Workers(CheckedFields):
 
     @classmethod
     def of(cls, given: Workers | int | None) -> Workers:
-        """Workers as they are given; of a number so many threads."""
+        """Return the given workers, or that number of threads."""
         return given if isinstance(given, Workers) else cls(number=given)
 
     def open(self) -> Engine:
-        """The workers, started; see `open_engine` for the errors."""
+        """Start the workers; see `open_engine` for the errors."""
         return open_engine(self.engine, self.number, self.cluster)
 
 
 class Result(Shown, ABC):
-    """What a study gives."""
+    """Base class of the results of studies."""
 
-    # The kind of results that a folder holds, and files that `save` writes: of the data, empty where the plain values
-    # tell all, and of the plain values.
+    # Kind of results of a folder, and the files that `save` writes: that of the data, empty if the plain values are
+    # complete, and that of the plain values.
     kept_as: ClassVar[str]
     data_file: ClassVar[str] = ""
     values_file: ClassVar[str]
@@ -102,38 +102,38 @@ class Result(Shown, ABC):
     @property
     @abstractmethod
     def data(self) -> xr.Dataset | None:
-        """All numbers by name, with units and coordinates; None where there are none."""
+        """Dataset of all numbers, with units and coordinates; None if there are none."""
 
     @property
     @abstractmethod
     def complete(self) -> bool:
-        """Whether all that the study asks for is there."""
+        """Whether the results contain everything that the study asks for."""
 
     @property
     def begun(self) -> bool:
-        """Whether there is anything that could be written."""
+        """Whether there are any results that could be written."""
         return True
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """What was found in plain values, ready for JSON."""
+        """Return the results as plain values, ready for JSON."""
 
     def save(self, folder: str | Path) -> Path:
-        """Write data and plain values into a folder, in place of the results of this kind that it held; the folder.
+        """Write data and plain values into a folder, replacing results of the same kind, and return its path.
 
         Raises
         ------
         InputError
-            It holds results of another kind, or another process writes to it.
+            Folder that holds results of another kind, or to which another process writes.
         OutputError
-            It cannot be written; what it held is all there.
+            Folder that cannot be written; its content is unchanged.
         """
         with hold_folder(Path(folder), self.kept_as) as held:
             self.save_in(held)
         return Path(folder)
 
     def save_in(self, folder: ResultsFolder) -> None:
-        """Write what `save` writes into a folder that is held already."""
+        """Write the results into a folder that is already held."""
         with folder.replaced() as new:
             self.write_files(new)
 
@@ -146,19 +146,19 @@ class Result(Shown, ABC):
 
 
 class KeptResult(Result):
-    """What a study of many runs gives: it stands in a folder, with the table of all runs."""
+    """Base class of the results of studies of many runs, which are kept in a folder with the table of all runs."""
 
     kept_as = STUDY_OF_RUNS
     folder: Path
 
     @property
     def table(self) -> Path:
-        """The one table, or that of the runs done while some are missing."""
+        """Path of the table of all runs, or of the runs done so far while some are missing."""
         return self.folder / table_name(finished=self.complete)
 
     @property
     def data(self) -> xr.Dataset:
-        """All runs, along the dimension `run`: parameters, metrics with their units, how each ended."""
+        """Dataset of all runs along the dimension `run`: parameters, metrics with units, and status."""
         return read_data(self.table)
 
     def save(self, folder: str | Path) -> Path:
@@ -167,12 +167,12 @@ class KeptResult(Result):
 
     @contextmanager
     def added(self) -> Iterator[Path]:
-        """A folder to write more files to, which become part of the study's results.
+        """Yield a temporary folder for further files, which become part of the study's results.
 
         Raises
         ------
         OutputError
-            They cannot be written.
+            Files that cannot be written.
         """
         with hold_folder(self.folder, self.kept_as, remedy=GO_ON) as held, held.amended() as new:
             yield new
@@ -188,7 +188,7 @@ R_co = TypeVar("R_co", bound=Result, covariant=True)
 
 
 class Study(ABC, Generic[R_co]):
-    """What can be run, read from a file or built in Python."""
+    """Base class of studies, which are read from a file or built in Python."""
 
     @abstractmethod
     def run(
@@ -198,36 +198,37 @@ class Study(ABC, Generic[R_co]):
         workers: Workers | None = None,
         on_progress: OnProgress | None = None,
     ) -> R_co:
-        """Do the study, or what an earlier session left of it.
+        """Run the study, or the part of it that an earlier session left undone.
 
         Parameters
         ----------
         folder : str or Path, optional
-            For the results. A study of many runs needs one: its journal keeps every run there, and a folder that
-            another session left is gone on with.
+            Folder of the results. A study of many runs requires one: its journal records every run, and a study left
+            unfinished by an earlier session is continued.
         workers : Workers, optional
-            As many threads as there are processors by default.
+            Workers that compute the runs; by default one thread per processor.
         on_progress : callable, optional
-            Called with how far it is, from whichever thread.
+            Function called with the `Progress` of the study, from any thread.
 
         Returns
         -------
         Result
-            A KeyboardInterrupt ends the session with what is there, marked so.
+            Results of the study. A KeyboardInterrupt ends the session with the partial results, marked as interrupted.
 
         Raises
         ------
         InputError
-            The study cannot be, the folder is another's, or the workers cannot be had.
+            Invalid study, folder of another study, or workers that are not available.
         OutputError
-            The folder cannot be written any more; what was written stays, and the same call goes on from there.
+            Folder that can no longer be written. Results written before are kept, and the same call continues from
+            them.
         """
 
 
 class WholeStudy(Study[R_co]):
-    """A study whose result is written as one, as far as it came."""
+    """Base class of studies whose results are written at the end, complete or partial."""
 
-    # The class of its result.
+    # Class of the results.
     gives: ClassVar[type[Result]]
 
     def run(
@@ -237,7 +238,7 @@ class WholeStudy(Study[R_co]):
         workers: Workers | None = None,
         on_progress: OnProgress | None = None,
     ) -> R_co:
-        """Do the study, and write what came of it into the folder, if one is given; see `Study.run`."""
+        """Run the study, and write the results into the folder, if one is given; see `Study.run`."""
         do = self._ready(workers)
         with nullcontext() if folder is None else hold_folder(Path(folder), self.gives.kept_as) as held:
             result = do(on_progress)
@@ -247,28 +248,28 @@ class WholeStudy(Study[R_co]):
 
     @abstractmethod
     def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], R_co]:
-        """Function that does the study, after all checks that need no run."""
+        """Check everything that needs no run, and return the function that runs the study."""
 
 
 def no_workers(workers: Workers | None, why: str) -> None:
-    """None where no workers are given to a study that has no work for them.
+    """Check that no workers are given to a study that does not use them.
 
     Raises
     ------
     InputError
-        They are.
+        Workers given, with the reason why they are not used.
     """
     if workers is not None:
         raise InputError(why, field="workers", remedy="leave it out")
 
 
 def kept_in(folder: str | Path | None) -> Path:
-    """The folder of a study of many runs.
+    """Return the path of the folder of a study of many runs.
 
     Raises
     ------
     InputError
-        None is given.
+        No folder given.
     """
     if folder is None:
         raise InputError("many runs are kept in a folder", field="folder", remedy='name one: run("out")')

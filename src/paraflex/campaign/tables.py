@@ -1,4 +1,4 @@
-"""Tables of runs in Parquet files, made of a journal; read again from any file that has rows."""
+"""Tables of runs: writing as Parquet and CSV files from a journal, and reading from any file with rows."""
 
 from __future__ import annotations
 
@@ -23,33 +23,34 @@ if TYPE_CHECKING:
 
 RESULTS = "results.parquet"
 UNFINISHED = "unfinished.parquet"
-# The same rows for programs that read no Parquet, once all are there.
+# File with the same rows for programs that cannot read Parquet, written when all runs are done.
 CSV = "results.csv"
-# What a folder of an earlier release has in place of a journal while its study is unfinished.
+# Files in place of a journal in the folder of an unfinished study of an earlier release.
 EARLIER = "parts/part-*.parquet"
-# Rows of a group in the file, and those that are held as rows at once.
+# Number of rows of a group in the file, and number of rows converted at once.
 _GROUP, _HELD = 16_384, 1024
-# Under which name a journal keeps the columns of its table.
+# Name of the note in which a journal stores the columns of its table.
 SCHEMA_KEY = "schema"
-# Columns that say which run a row is of, and what the metadata of columns are called in datasets.
+# Columns that identify the run of a row, and names of the metadata of columns in datasets.
 _KEYS = ("run", "id", "design", "path", "mode")
 _ATTRIBUTES = {"unit": "units", "meaning": "comment"}
 
 
 def table_name(*, finished: bool) -> str:
-    """The file of the one table, or of the runs done while some are missing."""
+    """Return the file name of the table of all runs, or of that of the runs done so far."""
     return RESULTS if finished else UNFINISHED
 
 
 def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
-    """Write a journal's rows as one table, `results.parquet` or, while more are to come, `unfinished.parquet`.
+    """Write the rows of a journal as one table: `results.parquet`, or `unfinished.parquet` while runs are missing.
 
-    A finished one is written as `results.csv` too. Files depend on nothing but the rows; memory holds a group of them.
+    A finished table is written as `results.csv` as well. The files depend on the rows only. Memory holds one group of
+    rows at a time.
 
     Raises
     ------
     OutputError
-        The disk is full, or cannot be written for another reason; or the journal is damaged.
+        Disk that is full, or cannot be written for another reason, or damaged journal.
     """
     import pyarrow as pa
 
@@ -66,19 +67,19 @@ def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
 
 
 def tables_of(folder: Path) -> list[Path]:
-    """Files with the rows of a folder's runs: the table, else the journal, else those of an earlier release."""
+    """Return the files with the rows of a folder: the table, else the journal, else those of an earlier release."""
     found = [folder / name for name in (RESULTS, JOURNAL, UNFINISHED) if (folder / name).is_file()]
-    # Parts beside a finished table or a journal are what a killed process left of rows that are in it.
+    # Parts beside a finished table or a journal were left by a killed process, and their rows are in the table.
     return found[:1] if found and found[0].name != UNFINISHED else [*found, *sorted(folder.glob(EARLIER))]
 
 
 def read_tables(files: Sequence[Path]) -> pa.Table:
-    """The rows of all files that `tables_of` names, each run once.
+    """Read the rows of all files returned by `tables_of`, each run once.
 
     Raises
     ------
     InputError
-        A file is damaged, or has rows of another study.
+        File that is damaged, or has rows of another study.
     """
     import pyarrow as pa
 
@@ -94,7 +95,7 @@ def read_tables(files: Sequence[Path]) -> pa.Table:
 
 
 def _new_rows(file: Path, table: pa.Table, known: dict[int, str]) -> pa.Table:
-    """Rows of runs that are not known yet; they are afterwards."""
+    """Return the rows of runs that are not in `known`, and add these runs to it."""
     import pyarrow as pa
 
     if not {"run", "id"} <= set(table.column_names):
@@ -115,12 +116,12 @@ def _of_two_studies(file: Path, why: str) -> InputError:
 
 
 def read_table(file: Path) -> pa.Table:
-    """The rows of a file that `tables_of` names; where it is damaged those of a journal beside it.
+    """Read the rows of a file returned by `tables_of`; if it is damaged, those of the journal beside it.
 
     Raises
     ------
     InputError
-        It is damaged.
+        Damaged file without a journal beside it.
     """
     if file.name == JOURNAL:
         return _journal_table(file)
@@ -144,7 +145,10 @@ def _journal_table(file: Path) -> pa.Table:
 
 
 def read_data(file: Path) -> xr.Dataset:
-    """The rows of a file that `tables_of` names, a variable a column over the dimension `run`; see `read_table`."""
+    """Read a file returned by `tables_of` as a dataset over the dimension `run`, one variable per column.
+
+    See `read_table` for the errors.
+    """
     table = read_table(file)
     columns = {
         field.name: ("run", column.to_numpy(), _attributes(field))

@@ -1,6 +1,6 @@
-"""Who computes: threads of this process, other processes, or the workers of a Dask cluster.
+"""Workers: threads of this process, other processes, or the workers of a Dask cluster.
 
-Each runs any function of a task, and what comes back does not depend on which of them it was.
+All of them run any function of a task, and the results do not depend on the kind of workers.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ THREADS = "threads"
 PROCESSES = "processes"
 DASK = "dask"
 WORKER_ENGINES = (THREADS, PROCESSES, DASK)
-# Tasks given out for each worker: one it works on and one that waits, so that memory does not grow with the sweep.
+# Tasks submitted per worker, one running and one waiting, so that memory does not grow with the number of tasks.
 _AHEAD = 2
-# Workers that may die of a task that has one to itself before it is given up.
+# Number of workers that a task, run alone, may kill before it is given up.
 _DEATHS = 2
-# Seconds in which a scheduler must answer, and between two counts of a cluster's workers.
+# Time limit for the answer of a scheduler, and interval between two counts of a cluster's workers [s].
 _REACHED_WITHIN, _RECOUNT = 10.0, 5.0
 _GONE = "the cluster no longer answers; run the same command again: it goes on from there"
-# How long a thread waits for another's Python before it asks for its turn [s]: runs leave Python and come back often.
+# Switch interval of Python's threads [s], short because runs release the GIL and request it again often.
 _SWITCH = 2e-4
 
 T = TypeVar("T")
@@ -46,17 +46,17 @@ R = TypeVar("R")
 
 
 class LostWorker(ParaflexError):
-    """Every worker that took a task died."""
+    """Error of a task whose workers all died."""
 
 
 class LostCluster(ParaflexError):
-    """The cluster went away; what is written stays."""
+    """Error raised if the cluster no longer answers; results written before are kept."""
 
 
 class Engine:
-    """Takes calls and gives futures for them; itself from a pool of this machine.
+    """Executor of function calls, which returns futures; base class for pools of this machine and for clusters.
 
-    As a context it is closed at the end, and its workers do not finish what they have if that was an error or Ctrl-C.
+    As a context manager it is closed at the end. After an error or Ctrl-C, the workers do not finish their tasks.
     """
 
     _pool: Any
@@ -72,23 +72,23 @@ class Engine:
 
     @property
     def workers(self) -> int:
-        """How many tasks run at once."""
+        """Number of tasks that run at once."""
         return self._workers
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Call a function with arguments elsewhere."""
+        """Submit a function call to the workers, and return its future."""
         return self._pool.submit(function, *arguments)
 
     def restart(self) -> None:
-        """Be ready again after a worker died and took the others with it."""
+        """Restart the pool after the death of a worker has broken it."""
 
     def close(self, *, abandon: bool = False) -> None:
-        """Let go of the workers; abandon tells them not to finish what they have."""
+        """Shut down the workers; if `abandon` is True, they do not finish their tasks."""
         self._pool.shutdown(cancel_futures=True)
 
 
 class Threads(Engine):
-    """Threads of this process: the kernels release the GIL."""
+    """Threads of this process, which run in parallel because the kernels release the GIL."""
 
     def __init__(self, workers: int) -> None:
         super().__init__(workers)
@@ -98,11 +98,11 @@ class Threads(Engine):
         sys.setswitchinterval(_SWITCH)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """See `Engine`; the function is given what it tells the time reached, too."""
+        """Submit a function call; see `Engine`. Its last argument is a callable that takes the time reached [s]."""
         return super().submit(function, *arguments, self._watch)
 
     def close(self, *, abandon: bool = False) -> None:
-        """See `Engine`."""
+        """Shut down the workers; see `Engine`."""
         if abandon:
             self._stop.set()
         with uninterrupted():
@@ -123,35 +123,35 @@ class Processes(Engine):
         self._pool = self._start()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """See `Engine`; processes are started here."""
+        """Submit a function call; see `Engine`. Processes are started at the first calls."""
         with starting_processes():
             return super().submit(function, *arguments)
 
     def restart(self) -> None:
-        """See `Engine`."""
+        """Restart the pool; see `Engine`."""
         self._pool.shutdown(wait=False, cancel_futures=True)
         self._pool = self._start()
 
     def close(self, *, abandon: bool = False) -> None:
-        """See `Engine`."""
+        """Shut down the workers; see `Engine`."""
         if not abandon:
             super().close()
             return
         for process in list((self._pool._processes or {}).values()):
             process.kill()
-        # Threads of the pool may wait for ever for workers that are gone.
+        # The shutdown does not wait, because threads of the pool may wait forever for workers that were killed.
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def _start(self) -> ProcessPoolExecutor:
-        # Not forked: threads of this process may hold locks.
+        # Processes are spawned, not forked, because threads of this process may hold locks.
         context = multiprocessing.get_context("spawn")
         with starting_processes():
-            # It starts one that keeps count of locks.
+            # The constructor starts a process that tracks locks.
             return ProcessPoolExecutor(self.workers, mp_context=context, initializer=end_with_parent)
 
 
 class Dask(Engine):
-    """Workers of a Dask cluster, which gives the tasks of one that died to others."""
+    """Workers of a Dask cluster, which reassigns the tasks of a worker that died."""
 
     def __init__(self, workers: int, address: str | None) -> None:
         super().__init__(1)
@@ -162,7 +162,7 @@ class Dask(Engine):
             raise InputError("Dask is not installed", field="--engine", value=DASK, remedy=remedy) from None
         self._cluster = None
         if address is None:
-            # Only this process has the keys, and no port shows what runs.
+            # Only this process has the TLS keys, and no dashboard port is open.
             alone = {"security": distributed.Security.temporary(), "protocol": "tls://", "host": "127.0.0.1",
                      "dashboard_address": "127.0.0.1:0", "worker_dashboard_address": None,
                      "scheduler_kwargs": {"dashboard": False}, "silence_logs": logging.CRITICAL}  # fmt: skip
@@ -173,7 +173,7 @@ class Dask(Engine):
                 )
         try:
             if address is not None:
-                _apart(lambda: _reach(address))  # a notebook has a loop of its own
+                _apart(lambda: _reach(address))  # in a thread, because a notebook has an event loop of its own
             self._client = distributed.Client(address or self._cluster, timeout=_REACHED_WITHIN, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             reason = str(error).partition("\n")[0] or type(error).__name__
@@ -184,7 +184,7 @@ class Dask(Engine):
 
     @property
     def workers(self) -> int:
-        """See `Engine`; workers may come and go."""
+        """Number of tasks that run at once, counted anew at intervals because workers may come and go."""
         now = time.monotonic()
         if now - self._counted > _RECOUNT:
             try:
@@ -194,13 +194,13 @@ class Dask(Engine):
         return self._workers
 
     def restart(self) -> None:
-        """See `Engine`."""
+        """Raise `LostCluster`: broken or cancelled calls mean that the cluster no longer answers."""
         raise LostCluster(_GONE)
 
     def close(self, *, abandon: bool = False) -> None:
-        """See `Engine`; workers of our own that are told to stop need seconds for it, which nobody waits for."""
+        """Shut down the workers; see `Engine`. An abandoned local cluster takes seconds and is closed in a thread."""
         if abandon and self._cluster is not None:
-            # Its end takes back that its logs are silent, while connections still break off.
+            # Closing the cluster re-enables its logs while connections are still being broken off.
             logging.getLogger("distributed").setLevel(logging.CRITICAL)
             threading.Thread(target=self._let_go, args=[True], daemon=True).start()
         else:
@@ -214,7 +214,7 @@ class Dask(Engine):
 
 
 def _reach(address: str) -> None:
-    """Connect to a scheduler: a client that cannot would wait long for its own end, and complain."""
+    """Check that a scheduler can be reached; a client that cannot connect closes slowly and logs errors."""
     import asyncio
 
     from distributed import Security
@@ -228,21 +228,22 @@ def _reach(address: str) -> None:
 
 
 def open_engine(engine: str | Engine, workers: int | None = None, cluster: str | None = None) -> Engine:
-    """An engine by name.
+    """Start an engine by name.
 
     Parameters
     ----------
     engine : str or Engine
-        "threads", "processes" or "dask"; an engine is given back.
+        Name of the engine: "threads", "processes" or "dask". An Engine is returned unchanged.
     workers : int, optional
-        As many as there are processors by default.
+        Number of workers; by default the number of processors available to this process.
     cluster : str, optional
-        Address of a Dask scheduler, "tcp://host:8786"; a cluster on this machine by default.
+        Address of a Dask scheduler, "tcp://host:8786"; by default a cluster is started on this machine.
 
     Raises
     ------
     InputError
-        Unknown name, no workers, a cluster that does not answer, or a package that is missing.
+        Unknown name, number of workers below one, incompatible arguments, cluster that does not answer, or missing
+        package.
     """
     if isinstance(engine, Engine):
         return engine
@@ -256,7 +257,7 @@ def open_engine(engine: str | Engine, workers: int | None = None, cluster: str |
         raise InputError("the cluster has workers of its own", field="--workers", value=workers, remedy=remedy)
     if workers is not None and workers < 1:
         raise InputError("must be positive", field="--workers", value=workers, remedy="say 2")
-    # Those this process may use, not all the machine has: batch systems give out a part.
+    # Count the processors that this process may use, because batch systems assign only a part of the machine.
     own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     count = workers or own or 1
     if engine == THREADS:
@@ -265,20 +266,21 @@ def open_engine(engine: str | Engine, workers: int | None = None, cluster: str |
 
 
 def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> Iterator[tuple[T, R | LostWorker]]:
-    """Results of a function for all tasks, as they come; no more tasks are given out than workers can soon take.
+    """Yield the results of a function for all tasks in order of completion.
 
     Parameters
     ----------
     engine : Engine
+        Workers.
     function : callable
-        Of a task; from threads, of a task and of what is told the time reached.
+        Function of a task. In threads it receives a second argument, a callable to report the time reached.
     tasks : iterable
-        Taken from as workers become free.
+        Tasks; they are drawn from the iterable as workers become free.
 
     Yields
     ------
     task, result
-        The result is a LostWorker where every worker that took the task died.
+        Task and its result, which is a LostWorker if every worker that ran the task died.
     """
     waiting, running, calls = iter(tasks), {}, Calls()
     while True:
@@ -288,7 +290,7 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
             return
         done = calls.done()
         suspects = []
-        # In the order they were given out, which a set has not.
+        # Futures are processed in the order of submission, which the set `done` does not keep.
         for future in [each for each in running if each in done]:
             task = running.pop(future)
             try:
@@ -297,7 +299,7 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
                 suspects.append(task)
                 continue
             except Exception as error:
-                # Dask gives a task up because its workers died.
+                # Dask gives up a task after several of its workers have died.
                 if type(error).__name__ != "KilledWorker":
                     raise
                 result = LostWorker(f"every worker that took it died: {error}")
@@ -310,7 +312,7 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
 
 
 def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> Iterator[tuple[T, R | LostWorker]]:
-    """Results of tasks of which one killed a worker: each alone, so that only that one is given up."""
+    """Run tasks one at a time after one of them killed a worker, so that only that task is given up."""
     calls = Calls()
     for task in tasks:
         result: R | LostWorker = LostWorker(f"{_DEATHS + 1} workers died of it: out of memory, or killed")
@@ -327,7 +329,7 @@ def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> I
 
 
 def _apart(start: Callable[[], T]) -> T:
-    """What a function gives that starts processes for seconds: in a thread, which Ctrl-C does not wait for."""
+    """Call a function that starts processes in a thread, so that Ctrl-C need not wait for it, and return its result."""
     started: Future[T] = Future()
 
     def run() -> None:

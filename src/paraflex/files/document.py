@@ -53,7 +53,7 @@ def _written(data: Mapping[str, Any], text: str, anew: Collection[str] = ()) -> 
 def _update(container: Any, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
     """Update a table of a document from old to new data, in place."""
     if isinstance(container, OutOfOrderTableProxy) and list(old) != list(new):
-        return  # its parts stand in several places, and only what they hold can be changed
+        return  # the table is split over several places, where only existing members can be changed
     for key in old:
         if key not in new:
             _take_out(container, key)

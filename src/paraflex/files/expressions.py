@@ -264,7 +264,7 @@ def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
             return _value(number, value_of)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
             value = _BINARY[type(op)](_value(left, value_of), _value(right, value_of))
-            if isinstance(value, complex):  # a negative number to a broken power
+            if isinstance(value, complex):  # a negative number to a fractional power
                 raise ExpressionError("not a finite number", "check the parameters")
             return value
         case ast.UnaryOp(op=op, operand=operand) if type(op) in _UNARY:

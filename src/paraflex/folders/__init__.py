@@ -1,6 +1,6 @@
-"""Folders of results: a manifest lists the files that belong together, and they are replaced whole or not at all.
+"""Folders of results: a manifest lists the files that belong together, and changes of a folder are atomic.
 
-Whoever opens a folder next moves what is left to move, should the writer be killed.
+If the writer is killed, the next process that opens the folder completes the change.
 """
 
 from paraflex.folders.changes import MANIFEST as MANIFEST, check_inside as check_inside

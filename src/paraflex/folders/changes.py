@@ -1,6 +1,6 @@
-"""Changes of a folder of results, made in one step: prepared in `.new`, then `.ready`, then moved to their places.
+"""Atomic changes of a folder of results, prepared in `.new`, renamed to `.ready`, then moved to their places.
 
-With a manifest of all that is to be there `.new` is renamed to `.ready`: from this moment on the new results hold.
+A change takes effect when `.new`, complete with its manifest, is renamed to `.ready`.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from paraflex.writing import ELSEWHERE, read_values, unwritable
 
 MANIFEST = "manifest.json"
 NEW, READY, REMOVED = ".new", ".ready", "removed.json"
-_NO_NAME = re.compile("[\0\ud800-\udfff]")  # no file's name holds an end of text or half of a letter
+_NO_NAME = re.compile("[\0\ud800-\udfff]")  # file names contain no null character and no surrogate
 
 
 def finish_moves(folder: Path) -> None:
-    """Put a change that is ready in its place; where it was broken off, the rest of it. Ctrl-C waits for its end.
+    """Apply a prepared change, or the rest of an interrupted one; Ctrl-C takes effect afterwards.
 
     Raises
     ------
     OutputError
-        It cannot be written, another user prepared it, or its files would come to lie outside the folder.
+        Folder that cannot be written, change prepared by another user, or files that would lie outside the folder.
     """
     ready = folder / READY
     if not ready.is_dir():
@@ -45,12 +45,12 @@ def finish_moves(folder: Path) -> None:
 
 
 def check_inside(folder: Path, name: Path | str) -> None:
-    """Check that a file of a folder lies in it, wherever links lead: none is written or removed elsewhere.
+    """Check that a file of a folder lies inside it after links are resolved, so that no other file is changed.
 
     Raises
     ------
     OutputError
-        A link leads to another place.
+        Link that leads out of the folder.
     """
     place = (folder / name).parent
     if not Path(os.path.realpath(place)).is_relative_to(os.path.realpath(folder)):
@@ -59,7 +59,13 @@ def check_inside(folder: Path, name: Path | str) -> None:
 
 
 def check_place(folder: Path, name: Path) -> None:
-    """Check that a file can be moved to its place in a folder, before any is."""
+    """Check that a file can be moved to its place in a folder, before any file is moved.
+
+    Raises
+    ------
+    OutputError
+        Link that leads out of the folder, or a folder or file in the way.
+    """
     check_inside(folder, name)
     inner = [folder / each for each in list(name.parents)[:-1]]
     if (folder / name).is_dir() or any(each.exists() and not each.is_dir() for each in inner):
@@ -84,19 +90,19 @@ def _put(ready: Path, folder: Path) -> None:
             file.replace(place)
         for name in removed:
             (folder / name).unlink(missing_ok=True)
-            with suppress(OSError):  # it holds other files, or is gone
+            with suppress(OSError):  # the folder holds other files, or does not exist
                 (folder / name).parent.rmdir()
-        # The last of all: until now it is known what is left to do.
+        # The manifest is moved last, because until then `.ready` shows what is left to do.
         (ready / MANIFEST).replace(folder / MANIFEST)
     shutil.rmtree(ready, ignore_errors=True)
 
 
 def is_inside(name: str) -> bool:
-    """Whether a name in a list is of a file within the folder: others are never touched, whoever wrote the list."""
-    path = PureWindowsPath(name)  # which takes both slashes for what they are
+    """Check whether a listed name is that of a file inside the folder; other files are never changed."""
+    path = PureWindowsPath(name)  # it treats both kinds of slashes as separators
     return not path.anchor and ".." not in path.parts and not _NO_NAME.search(name)
 
 
 def files_in(folder: Path) -> list[Path]:
-    """All files in a folder and those below, in the order of their names."""
+    """Return all files in a folder and its subfolders, sorted by name."""
     return sorted(file for file in folder.rglob("*") if file.is_file())

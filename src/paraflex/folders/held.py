@@ -1,4 +1,4 @@
-"""A folder of results held for writing: its files are replaced whole or not at all, or some are added."""
+"""Folder of results locked for writing, whose files are replaced or extended atomically."""
 
 from __future__ import annotations
 
@@ -26,17 +26,18 @@ from paraflex.writing import ELSEWHERE, unwritable, write_json
 
 
 class ResultsFolder:
-    """A folder of results that this process alone writes to; `hold_folder` gives it.
+    """Folder of results to which only this process writes; created by `hold_folder`.
 
     Parameters
     ----------
     path : Path
+        Path of the folder.
     kind : str
-        Of the results to be written.
+        Kind of the results to be written.
     locks : bool
-        Whether its file system has locks.
+        Whether the file system of the folder has locks.
     remedy : str
-        Of the error where it cannot be written.
+        Remedy in the error raised if the folder cannot be written.
     """
 
     def __init__(self, path: Path, kind: str, *, locks: bool = True, remedy: str = ELSEWHERE) -> None:
@@ -47,26 +48,27 @@ class ResultsFolder:
 
     @contextmanager
     def replaced(self, *, but: Sequence[str] = ()) -> Iterator[Path]:
-        """A folder to write results to that take the place of all that paraflex wrote; other files stay.
+        """Yield a temporary folder for results that replace all files written by paraflex; other files are kept.
 
-        If the new results differ in wall times alone, nothing is removed: figures that were drawn later stay too.
+        If the new results differ from the old ones in wall times only, no file is removed, so that figures drawn
+        afterwards are kept.
 
         Parameters
         ----------
         but : sequence of str
-            Patterns of files that stay.
+            Patterns of files that are kept.
 
         Raises
         ------
         OutputError
-            It cannot be written; the results before are all there.
+            Folder that cannot be written; the previous results are unchanged.
         """
         with self._changed(lambda name: not any(fnmatch(name, pattern) for pattern in but)) as new:
             yield new
 
     @contextmanager
     def amended(self) -> Iterator[Path]:
-        """A folder to write files to that become part of the results."""
+        """Yield a temporary folder for files that are added to the results."""
         with self._changed(lambda name: False) as new:
             yield new
 
@@ -92,7 +94,7 @@ class ResultsFolder:
                 return Manifest.of(self.kind, kept | files, contents)
 
             if old is not None and listed(removed).identity == old.identity:
-                removed = set()  # figures are of these numbers
+                removed = set()  # figures in the folder show the same numbers
             manifest = listed(removed)
             write_json(new / MANIFEST, {"paraflex_version": version("paraflex")} | vars(manifest))
             write_json(new / REMOVED, sorted(removed))
@@ -114,29 +116,29 @@ class ResultsFolder:
 def hold_folder(
     path: Path, kind: str, *, force: bool | None = None, field: str = "folder", remedy: str = ELSEWHERE
 ) -> Iterator[ResultsFolder]:
-    """Keep others from writing to a folder while results are made for it.
+    """Lock a folder for writing while results are computed for it.
 
     Parameters
     ----------
     path : Path
-        Made if it is not there, and removed again where nothing comes of it.
+        Folder; created if necessary, and removed again if nothing is written to it.
     kind : str
-        Of KINDS.
+        Kind of the results, from KINDS.
     force : bool, optional
-        Whether results of another kind may be replaced; not to be asked for where None.
+        Whether results of another kind may be replaced; None if the caller offers no such option.
     field, remedy : str
-        What errors name, and the remedy where it cannot be written.
+        Field named in errors, and the remedy for a folder that cannot be written.
 
     Raises
     ------
     InputError
-        Another process writes to it, or it holds results of another kind.
+        Folder to which another process writes, or which holds results of another kind.
     OutputError
-        It cannot be made or written.
+        Folder that cannot be created or written.
     """
     made: list[Path] = []
     try:
-        with suppress(OSError):  # a name that is too long, which the lock tells
+        with suppress(OSError):  # name that is too long, reported when the folder is locked
             made += [each for each in (path, *path.parents) if not each.exists()]
         with lock_folder(path, field=field) as locks:
             there = kind_of_folder(path)
@@ -146,7 +148,7 @@ def hold_folder(
                     remedy=f"name another folder{'' if force is None else ', or say --force to replace them'}",
                 )  # fmt: skip
             try:
-                with uninterrupted():  # or one is left
+                with uninterrupted():  # otherwise an empty folder could remain
                     shutil.rmtree(path / NEW, ignore_errors=True)
                     (path / NEW).mkdir()
                     (path / NEW).rmdir()
@@ -154,7 +156,7 @@ def hold_folder(
                 raise unwritable(error, field, ELSEWHERE, str(path)) from error
             yield ResultsFolder(path, kind, locks=locks, remedy=remedy)
     finally:
-        # Folders that were made for results of which nothing came.
+        # Remove the folders that were created here if no results were written.
         with suppress(OSError):
             if path in made and {file.name for file in path.iterdir()} == {LOCK}:
                 (path / LOCK).unlink()
@@ -164,14 +166,14 @@ def hold_folder(
 
 @contextmanager
 def added_to(folder: Path) -> Iterator[Path]:
-    """A folder to write figures or a report to: where it lies in a folder of results, they become part of these.
+    """Yield a folder for figures or a report, which become part of the results if it lies in a folder of results.
 
-    What is drawn of a study while its runs go on is not: it is of results that will not stay.
+    Figures of a study that is still running do not become part of it, because its results will be replaced.
 
     Raises
     ------
     FolderInUseError
-        Another process is to replace the results.
+        Folder of results that another process is about to replace.
     """
     with ExitStack() as stack:
         for results in (folder, *folder.parents[:1]):

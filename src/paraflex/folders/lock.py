@@ -1,4 +1,4 @@
-"""The lock of a folder of results: one process at a time writes to it, and a killed one leaves none."""
+"""Lock of a folder of results: one process at a time writes to it, and a killed process leaves no lock."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from paraflex.folders.changes import READY, finish_moves
 from paraflex.writing import ELSEWHERE, unwritable
 
 LOCK = ".lock"
-# How long a reader waits for a writer that moves files [s], and how often it looks.
+# Time that a reader waits for a writer that moves files, and interval between its checks [s].
 _PATIENCE, _LOOK = 10.0, 0.05
 
 
 class FolderInUseError(InputError):
-    """Another process writes to a folder."""
+    """Error raised if another process writes to a folder."""
 
 
 @contextmanager
 def lock_folder(folder: Path, *, field: str = "--output") -> Iterator[bool]:
-    """Keep others from writing to a folder; the system lets go of it when this process ends, however it does.
+    """Lock a folder for writing; the operating system releases the lock when this process ends for any reason.
 
-    What a writer that was killed left to be moved is moved. Yields False on a file system without locks.
+    A change left unfinished by a killed process is completed. Yields False on a file system without locks.
 
     Raises
     ------
     InputError
-        Another process writes to it.
+        Folder to which another process writes.
     OutputError
-        It cannot be made.
+        Folder that cannot be created.
     """
     locks = True
     try:
@@ -44,7 +44,7 @@ def lock_folder(folder: Path, *, field: str = "--output") -> Iterator[bool]:
         raise unwritable(error, field, ELSEWHERE, str(folder)) from error
     with closing(lock):
         try:
-            # Nothing is written to this file, nor to a journal of it.
+            # With this setting nothing is written, neither to this file nor to a journal beside it.
             lock.executescript("PRAGMA journal_mode = MEMORY; BEGIN EXCLUSIVE")
         except sqlite3.OperationalError as error:
             code = error.sqlite_errorcode & 0xFF
@@ -61,14 +61,14 @@ def lock_folder(folder: Path, *, field: str = "--output") -> Iterator[bool]:
 
 
 def finish_change(folder: Path) -> None:
-    """Move what a writer that was killed left to be moved; wait for one that is about to.
+    """Complete a change left unfinished by a killed process, or wait for a process that is completing one.
 
     Raises
     ------
     InputError
-        It writes for too long.
+        Process that writes for too long.
     OutputError
-        The folder cannot be written.
+        Folder that cannot be written.
     """
     until = time.monotonic() + _PATIENCE
     while (folder / READY).is_dir():

@@ -1,4 +1,4 @@
-"""What belongs to a folder of results: its manifest, the kinds of results, files that are not of paraflex."""
+"""Content of a folder of results: its manifest, the kind of its results, and files not written by paraflex."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from paraflex.interrupts import uninterrupted
 from paraflex.seals import damaged
 from paraflex.writing import read_json
 
-# Kinds of results, and by which files a folder without a manifest, of an earlier release, is known to hold them.
+# Kinds of results, with the files by which the kind of a folder without a manifest, from an earlier release, is found.
 RUN = "run"
 VERIFICATION = "verification"
 COMPARISON = "comparison of methods"
@@ -41,31 +41,31 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     REDUCED_MODELS: ("reduced.json", "reduced.nc"),
     RUN: ("summary.json", "results.nc"),
 }
-# What else a study of many runs keeps, listed or not: they come and go while it runs.
+# Further files of a study of many runs, in the manifest or not, because they come and go while it runs.
 _OF_STUDY = (
     "journal.sqlite*", "parts/*", "trajectories/*", "unfinished.parquet", "results.csv", "result.json", "summary.json",
     "best.toml", "indices.*", "report.html",
 )  # fmt: skip
 _REPORT = "report.html"
-# Values of JSON and variables of netCDF that equal runs do not share.
+# Values of JSON and variables of netCDF that differ between equal runs.
 _CLOCK = {"wall_time", "full_wall_time"}
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """What belongs together in a folder.
+    """List of the files that belong together in a folder, with their digests.
 
     Attributes
     ----------
     kind : str
-        Of KINDS.
+        Kind of the results, from KINDS.
     identity : str
-        A digest of the results without figures, report and exports, and without wall times: the same of equal runs,
-        wherever they are copied to.
+        Digest of the results without figures, report and exports, and without wall times. It is the same for equal
+        runs, and independent of the folder.
     files : mapping of str to str
         Digests of the bytes of all files, by their names within the folder ("figures/desired_path.png").
     contents : mapping of str to str
-        Digests of the contents without wall times, of files that may hold them.
+        Digests of the contents without wall times, for files that may contain them.
     """
 
     kind: str
@@ -75,19 +75,19 @@ class Manifest:
 
     @classmethod
     def of(cls, kind: str, files: Mapping[str, str], contents: Mapping[str, str]) -> Manifest:
-        """The manifest of some files; `contents` may name others, which are left out."""
+        """Build the manifest of files from their digests; further files in `contents` are ignored."""
         contents = {name: contents[name] for name in sorted(files) if name in contents}
         numbers = [f"{name} {contents.get(name, files[name])}" for name in sorted(files) if not _is_derived(name)]
         return cls(kind, _hash("\n".join(numbers).encode()).hexdigest(), dict(sorted(files.items())), contents)
 
 
 def read_manifest(folder: Path) -> Manifest | None:
-    """The manifest of a folder; None where there is none.
+    """Read the manifest of a folder; return None if there is none.
 
     Raises
     ------
     InputError
-        It is damaged.
+        Damaged manifest.
     """
     file = folder / MANIFEST
     if not file.is_file():
@@ -105,13 +105,13 @@ def read_manifest(folder: Path) -> Manifest | None:
 
 
 def kind_of_folder(folder: Path) -> str:
-    """Which kind of results a folder holds; empty where none of ours."""
+    """Return the kind of results in a folder; empty if it holds no results of paraflex."""
     finish_change(folder)
     return _kind(folder, whole_manifest(folder))
 
 
 def whole_manifest(folder: Path) -> Manifest | None:
-    """The manifest of a folder; None where there is none, or it is damaged."""
+    """Read the manifest of a folder; return None if there is none or if it is damaged."""
     try:
         return read_manifest(folder)
     except InputError:
@@ -125,27 +125,28 @@ def _kind(folder: Path, manifest: Manifest | None) -> str:
 
 
 def check_listed(file: Path, remedy: str) -> None:
-    """Check that a file is the one that the manifest of its folder lists; nothing is checked without a manifest.
+    """Check that a file is the one listed in the manifest of its folder; without a manifest nothing is checked.
 
     Parameters
     ----------
     file : Path
+        File to check.
     remedy : str
-        Of the error.
+        Remedy given in the error.
 
     Raises
     ------
     InputError
-        It is damaged, or belongs to other results than the files beside it.
+        Damaged file, or file of other results than the files beside it.
     """
-    if _is_listed(file) or _is_listed(file):  # once more: another process may have replaced the results meanwhile
+    if _is_listed(file) or _is_listed(file):  # checked twice, as another process may just have replaced the results
         return
     why = "damaged, or of other results: not the file that the folder's manifest lists"
     raise InputError(why, field=str(file), remedy=remedy)
 
 
 def files_of(folder: Path) -> dict[str, str]:
-    """The files of a folder that paraflex wrote, with the digests of its manifest; empty where it lists none."""
+    """Return the files of a folder written by paraflex, with their digests from the manifest, or "" without one."""
     finish_change(folder)
     manifest = whole_manifest(folder)
     kind = _kind(folder, manifest)
@@ -158,7 +159,7 @@ def files_of(folder: Path) -> dict[str, str]:
 
 
 def foreign_files(folder: Path) -> list[str]:
-    """Files of a folder that paraflex did not write; what lies in folders of other results is theirs."""
+    """Return the files of a folder not written by paraflex, except those in subfolders that hold other results."""
     ours = files_of(folder)
     inner = {name.partition("/")[0] for name in ours if "/" in name}
     entries = [entry for entry in sorted(folder.iterdir()) if entry.name not in (MANIFEST, LOCK, NEW, READY)]
@@ -168,7 +169,7 @@ def foreign_files(folder: Path) -> list[str]:
 
 
 def digest_of(file: Path, *, sync: bool = False) -> str:
-    """The digest of a file's bytes, which are on the disk afterwards where that is asked for."""
+    """Compute the digest of a file's bytes; if `sync` is True, the file is flushed to the disk first."""
     with file.open("rb+") if sync else file.open("rb") as opened:
         if sync:
             os.fsync(opened.fileno())
@@ -176,7 +177,7 @@ def digest_of(file: Path, *, sync: bool = False) -> str:
 
 
 def contents_of(files: Mapping[str, Path]) -> dict[str, str]:
-    """Digests of what files hold but for wall times, by name; of those alone that may hold any."""
+    """Compute the digests of the contents of files without wall times, by name, for JSON and netCDF files only."""
     found = {}
     for name, file in files.items():
         if file.suffix in (".json", ".nc"):
@@ -212,12 +213,12 @@ def _is_listed(file: Path) -> bool:
 
 
 def _is_derived(name: str) -> bool:
-    """Whether a file is made of the files of numbers, and can be made again."""
+    """Check whether a file is derived from the numerical results and can be generated again."""
     return name == _REPORT or name.startswith(("figures/", "export/"))
 
 
 def _timeless(found: Any) -> Any:
-    """Values of JSON without wall times, and without the digest of all of them."""
+    """Return values of JSON without wall times and without digests."""
     if isinstance(found, dict):
         return {name: _timeless(each) for name, each in sorted(found.items()) if name not in {*_CLOCK, "digest"}}
     return [_timeless(each) for each in found] if isinstance(found, list) else found

@@ -126,7 +126,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
             tell()
             with workers.open() as engine:
                 for cell, row in outcomes(engine, self._cell, cells):
-                    assert not isinstance(row, LostWorker)  # threads are not lost
+                    assert not isinstance(row, LostWorker)  # only processes can be lost
                     found[cell] = row
                     tell()
         return LawComparison(self._dataset(modes, found), interrupted=len(found) < len(cells))

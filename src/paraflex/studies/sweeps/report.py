@@ -106,7 +106,7 @@ def _again(
     runs, failed, differ = {}, {}, []
     for row in (one.row for one in picked):
         outcome = found[row]
-        assert not isinstance(outcome, LostWorker)  # threads are not lost
+        assert not isinstance(outcome, LostWorker)  # only processes can be lost
         if isinstance(outcome, str):
             failed[row] = outcome
             continue
