@@ -295,7 +295,7 @@ def _connected(file: Path, how: str) -> Iterator[sqlite3.Connection]:
         if not file.stat().st_size:
             connection.executescript(_TABLES)
         # Triggers and views would act on what is read and written; whoever sends a folder may have put them in.
-        found = connection.execute("SELECT type, name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'").fetchall()
+        found = connection.execute("SELECT type, name FROM sqlite_master WHERE sql IS NOT NULL").fetchall()
         if sorted(found) != [("table", "notes"), ("table", "runs")]:
             raise sqlite3.DatabaseError("it holds other things than the tables of a journal")
         yield connection
@@ -349,7 +349,7 @@ def _row(content: str) -> Row:
     """The row of a run from its JSON; its digest alone does not show that it is one."""
     with suppress(ValueError, RecursionError):
         found = json.loads(content)
-        if isinstance(found, dict) and {"run", "id"} <= found.keys():
+        if isinstance(found, dict) and isinstance(found.get("run"), int) and isinstance(found.get("id"), str):
             return found
     raise sqlite3.DatabaseError("what a row holds is not of a run")
 

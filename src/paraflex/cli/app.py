@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import gc
+import io
 import os
 import sys
 from typing import Annotated, Any
@@ -68,7 +69,7 @@ def _options(
 
 def main() -> None:
     """Run the command line; every error that is ours becomes one line."""
-    _start_quickly()
+    _set_up()
     try:
         app()
     except InputError as error:
@@ -95,8 +96,12 @@ def main() -> None:
         sys.exit(exit_code())
 
 
-def _start_quickly() -> None:
-    """Settings of the process that commands start faster with; before NumPy is imported."""
+def _set_up() -> None:
+    """Settings of the process that commands start faster with, before NumPy is imported; and of its output."""
+    # What the terminal's encoding lacks, a line of a table or an accent, ends no command.
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     # Imports make a hundred thousand objects that stay: looking among them for garbage takes a tenth of the time.
     gc.set_threshold(100_000, 20, 100)
     # Dense matrices are small here, and threads on them wait for one another where cores are busy.
