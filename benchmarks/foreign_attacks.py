@@ -589,6 +589,13 @@ def _noted(connection: sqlite3.Connection, folder: Path, bait: Path, chance: Ran
 
 _JOURNALS: dict[str, Callable[[sqlite3.Connection, Path, Path, Random], None]] = {
     "trigger": _sql("CREATE TRIGGER t AFTER INSERT ON notes BEGIN DELETE FROM runs; END"),
+    # Names that a pattern with a wildcard takes for those of SQLite itself.
+    "trigger like its own": _sql("CREATE TRIGGER sqlitex AFTER INSERT ON notes BEGIN DELETE FROM runs; END"),
+    "trigger of its own name": _sql(
+        "CREATE TRIGGER t AFTER INSERT ON notes BEGIN DELETE FROM runs; END",
+        "PRAGMA writable_schema = 1",
+        "UPDATE sqlite_master SET name = 'sqlite_t' WHERE name = 't'",
+    ),
     "view": _sql("ALTER TABLE runs RENAME TO other",
                  "CREATE VIEW runs AS SELECT run + 1 AS run, id, content, digest FROM other"),
     "columns": _sql("DROP TABLE runs", "CREATE TABLE runs (run TEXT, id BLOB)"),

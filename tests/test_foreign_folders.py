@@ -1,33 +1,40 @@
 """Folders of somebody hostile: the short form of `benchmarks/foreign_folders.py`, and what it found."""
 
 import csv
+import json
 import os
 import signal
 import sqlite3
 import sys
 import warnings
 from pathlib import Path
+from xml.etree import ElementTree
 
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 
 import paraflex as pf
+from journals import tally
 from made_up import STUDY, made_up, write_study
 from paraflex.campaign.journal import JOURNAL, _digest, read_journal
 from paraflex.campaign.tables import read_table
 from paraflex.cli.collected import collecting
 from paraflex.designs.reopen import open_study
 from paraflex.errors import InputError, OutputError
+from paraflex.files import library_text
 from paraflex.folders import RUN, finish_change, hold_folder, read_manifest
+from paraflex.plots.labels import axis_label, plain
 from paraflex.plots.sources import open_source
+from paraflex.plots.svg import sketch
 from paraflex.report.text import NO_VALUE, number
-from paraflex.results.export import export, export_table
+from paraflex.results.export import _write_table, export, export_table
 from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.studies import load_sweep, sweep
 from paraflex.writing import read_json, write_json
-from processes import started
+from processes import run, started
 from shell import paraflex
 
 SWEEP = STUDY + '\n[sampling]\nkind = "sobol"\nnumber = 4\n'
@@ -117,16 +124,39 @@ def test_notes_of_a_journal_that_hold_their_digest_and_nothing_of_ours_are_damag
         read_table(whole.folder / JOURNAL)
 
 
-@pytest.mark.parametrize("content", ["[]", "null", "{", "[" * 100_000])
+@pytest.mark.parametrize(
+    "statements",
+    [
+        ["CREATE TRIGGER sqlitex AFTER INSERT ON notes BEGIN DELETE FROM runs; END"],
+        ["CREATE VIEW [sqlite.x] AS SELECT 1"],
+        [
+            "CREATE TRIGGER t AFTER INSERT ON notes BEGIN DELETE FROM runs; END",
+            "PRAGMA writable_schema = 1",
+            "UPDATE sqlite_master SET name = 'sqlite_t' WHERE name = 't'",
+        ],
+    ],
+)
+def test_triggers_and_views_of_any_name_are_damage(whole, statements):
+    connection = sqlite3.connect(whole.folder / JOURNAL)
+    with connection:
+        for statement in statements:
+            connection.execute(statement)
+    connection.close()
+    with pytest.raises(OutputError, match=r"it holds other things than the tables|malformed database schema"):
+        read_table(whole.folder / JOURNAL)
+
+
+@pytest.mark.parametrize(
+    "content", ["[]", "null", "{", "[" * 100_000, '{"run": "0", "id": "x"}', '{"run": 0, "id": 1}']
+)
 def test_rows_that_hold_their_digest_and_no_run_are_damage(whole, content):
     connection = sqlite3.connect(whole.folder / JOURNAL)
     with connection:
         run, identity = connection.execute("SELECT run, id FROM runs").fetchone()
         entry = (run, identity, content, _digest(run, identity, content))
         connection.execute("REPLACE INTO runs VALUES (?, ?, ?, ?)", entry)
-        digests = [int(each, 16) for (each,) in connection.execute("SELECT digest FROM runs")]
+        tally(connection)
     connection.close()
-    noted(whole.folder, "rows", f"{len(digests)} {sum(digests) % (1 << 128)}".encode())
     with pytest.raises(OutputError, match="what a row holds is not of a run"), read_journal(
         whole.folder / JOURNAL
     ) as journal:  # fmt: skip
@@ -262,3 +292,46 @@ def test_what_results_without_a_seal_lead_to_is_one_line(tmp_path):
         f"error: {tmp_path / 'turned.nc'}: holds something else than what paraflex writes (ValueError); "
         "run again what made it"
     ]
+
+
+def test_what_plain_numbers_without_a_digest_lead_to_is_one_line(tmp_path):
+    numbers = {"parameters": ["a"], "units": {}, "runs": [{"mode": [None]}]}
+    (tmp_path / "sensitivity.json").write_text(json.dumps(numbers))
+    done = paraflex("plot", str(tmp_path), "all")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"error: {tmp_path / 'sensitivity.json'}: holds something else than what paraflex")
+
+
+def test_control_characters_in_names_and_endless_names_leave_pictures_whole(tmp_path):
+    text = library_text("pendulum").replace('name = "', 'name = "a\\u0008b ', 1)
+    (tmp_path / "own.toml").write_text(text)
+    done = paraflex("draw", str(tmp_path / "own.toml"), "--no-open", "--output", str(tmp_path / "own.svg"))
+    assert done.returncode == 0, done.stderr
+    ElementTree.parse(tmp_path / "own.svg")
+    ElementTree.fromstring(sketch(pf.load(tmp_path / "own.toml").mechanism))
+    assert len(plain("x" * 10**6)) < 1000
+    assert len(axis_label("time", unit="s" * 10**6)) < 1000
+
+
+class Counted(dict):
+    copies = 0
+
+    def __deepcopy__(self, _):
+        Counted.copies += 1
+        return self
+
+
+def test_units_of_tables_are_not_copied_with_every_column(tmp_path):
+    """As pandas copies the attributes of a table whenever a column is looked at: thousands of them took minutes."""
+    table = pd.DataFrame({f"c{k}": [0.0] for k in range(50)})
+    table.attrs = {name: Counted.fromkeys(table.columns, "m") for name in ("units", "meanings")}
+    _write_table(table, tmp_path / "table.csv", "csv", {})
+    assert Counted.copies < 10
+    assert (tmp_path / "table.csv").read_text().startswith('"c0 [m]","c1 [m]"')
+
+
+def test_what_a_terminal_cannot_show_ends_no_command():
+    command = (sys.executable, "-m", "paraflex", "run", "pendulum", "--duration", "0.05", "--samples", "6")
+    done = run(*command, env={"PYTHONIOENCODING": "ascii"})
+    assert done.returncode == 0, done.stderr
+    assert "?" in done.stdout

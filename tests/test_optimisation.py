@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 import paraflex as pf
-from journals import rows_in
+from journals import forge, rows_in
 from made_up import STUDY, made_up, write_study
 from paraflex.campaign import open_engine
 from paraflex.campaign.journal import write_journal
@@ -367,6 +367,16 @@ def test_a_damaged_table_is_named(tmp_path):
     result.table.write_bytes(whole[:60])
     with pytest.raises(InputError, match=r"results.parquet: damaged.*; .*delete it and run"):
         optimise(study, tmp_path / "out", run=made_up(tracking_rms=bowl))
+
+
+def test_rows_of_a_journal_that_hold_texts_for_numbers_are_damage(tmp_path):
+    study = study_of(tmp_path, OBJECTIVE, evaluations=5)
+    optimise(study, tmp_path / "out", run=made_up(tracking_rms=bowl))
+    for file in ("results.parquet", "manifest.json"):
+        (tmp_path / "out" / file).unlink()
+    forge(tmp_path / "out", tracking_rms="x")
+    with pytest.raises(OutputError, match=r"journal\.sqlite: damaged: a row holds what its columns do not"):
+        optimise(study, tmp_path / "out", run=pytest.fail)
 
 
 def test_a_worker_that_died_is_a_design_that_failed(tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError, OutputError
-from paraflex.seals import check_regular, damaged, seal, unreadable
+from paraflex.seals import check_regular, damaged, seal, unreadable, unsealed
 
 ELSEWHERE = "choose another folder"
 # Key of a JSON file under which the digest of all other entries is stored.
@@ -166,8 +166,11 @@ def read_values(file: Path, remedy: str) -> Any:
         raise unreadable(error, file, remedy) from error
     except (ValueError, RecursionError, MemoryError) as error:
         raise damaged(file, "not JSON to its end", remedy) from error
-    if isinstance(found, dict) and _DIGEST in found and found.pop(_DIGEST) != _digest(found):
+    digested = isinstance(found, dict) and _DIGEST in found
+    if digested and found.pop(_DIGEST) != _digest(found):
         raise damaged(file, "not as it was written", remedy)
+    if not digested:
+        unsealed[:] = [file]
     return found
 
 

@@ -298,7 +298,7 @@ def _connected(file: Path, how: str) -> Iterator[sqlite3.Connection]:
         if not file.stat().st_size:
             connection.executescript(_TABLES)
         # Triggers and views could alter what is read and written, and a folder from others may contain them.
-        found = connection.execute("SELECT type, name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'").fetchall()
+        found = connection.execute("SELECT type, name FROM sqlite_master WHERE sql IS NOT NULL").fetchall()
         if sorted(found) != [("table", "notes"), ("table", "runs")]:
             raise sqlite3.DatabaseError("it holds other things than the tables of a journal")
         yield connection
@@ -352,7 +352,7 @@ def _row(content: str) -> Row:
     """Parse the row of a run from JSON, and check that it is a row, which its digest alone does not show."""
     with suppress(ValueError, RecursionError):
         found = json.loads(content)
-        if isinstance(found, dict) and {"run", "id"} <= found.keys():
+        if isinstance(found, dict) and isinstance(found.get("run"), int) and isinstance(found.get("id"), str):
             return found
     raise sqlite3.DatabaseError("what a row holds is not of a run")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -185,6 +186,11 @@ def _schema(journal: Journal) -> pa.Schema:
         return pa.schema([]) if noted is None else pa.ipc.read_schema(pa.py_buffer(noted))
     except (pa.ArrowException, OSError) as error:
         raise sqlite3.DatabaseError("its columns are not noted") from error
+
+
+def check_rows(journal: Journal) -> None:
+    """Check that all rows of a journal hold what its columns do; a `sqlite3.DatabaseError` if not."""
+    deque(_pieces(journal, _HELD), maxlen=0)
 
 
 def _pieces(journal: Journal, size: int) -> Iterator[pa.Table]:

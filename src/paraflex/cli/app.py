@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import gc
+import io
 import os
 import sys
 from typing import Annotated, Any
@@ -68,7 +69,7 @@ def _options(
 
 def main() -> None:
     """Run the command line; errors of paraflex and interrupts are printed as one line and set the exit code."""
-    _start_quickly()
+    _set_up()
     try:
         app()
     except InputError as error:
@@ -95,8 +96,12 @@ def main() -> None:
         sys.exit(exit_code())
 
 
-def _start_quickly() -> None:
-    """Set process options that make commands start faster; to be called before NumPy is imported."""
+def _set_up() -> None:
+    """Set process options that make commands start faster, before NumPy is imported, and those of the output."""
+    # A character that the encoding of the terminal lacks must not end a command.
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     # Imports create a hundred thousand persistent objects: collecting garbage among them takes a tenth of the time.
     gc.set_threshold(100_000, 20, 100)
     # Dense matrices are small here, and BLAS threads wait for one another if cores are busy.

@@ -20,6 +20,9 @@ _GREEK = {
 }  # fmt: skip
 
 
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
+# Longest name or unit that is shown whole.
+_LONGEST = 200
 # Values of a figure below this, in any unit, are rounding errors.
 ROUNDING = 1e-12
 
@@ -79,7 +82,7 @@ def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", s
     mark = described.symbol.replace("{}", direction)
     text = " ".join(part for part in ("" if short and mark else described.name, mark) if part)
     unit = described.unit if unit is None else unit
-    return text if unit == "1" else f"{text} [{unit}]"
+    return text if unit == "1" else f"{text} [{unit[:_LONGEST]}]"
 
 
 def metric_name(metric: str) -> str:
@@ -119,7 +122,7 @@ def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
 
 def display_units(unit: str) -> tuple[DisplayUnit, ...]:
     """Return all units in which a quantity of an SI unit may be shown, the largest first."""
-    return _PREFIXES.get(unit, (DisplayUnit(unit, 1.0),))
+    return _PREFIXES.get(unit, (DisplayUnit(unit[:_LONGEST], 1.0),))
 
 
 def peak(values: ArrayLike) -> float:
@@ -178,9 +181,14 @@ def _parted(name: str) -> tuple[str, str]:
     return (parts[1], parts[2]) if parts else ("", "")
 
 
+def printable(text: str) -> str:
+    """Return a text without control characters, which no SVG may hold, and cut if it is endless."""
+    return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", text if len(text) <= _LONGEST else f"{text[:_LONGEST]}...")
+
+
 def plain(name: str) -> str:
-    """Return a name with escaped dollar signs, so that Matplotlib does not parse it as mathematics."""
-    return name.replace("$", r"\$")
+    """Return a printable name that Matplotlib does not parse as mathematics."""
+    return printable(name).replace("$", r"\$")
 
 
 def is_signs(name: str) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from paraflex.mechanism import GROUND, Mechanism
 from paraflex.plots.drawing import Sketch
-from paraflex.plots.labels import three_digits
+from paraflex.plots.labels import printable, three_digits
 from paraflex.plots.layout import MM, TWO_COLUMNS, page_width
 from paraflex.plots.marks import moving_marks, still_marks
 from paraflex.plots.model_acting import Acting, acting_arrows, load_places
@@ -342,7 +342,14 @@ def _title(figure: Figure, posed: Posed, look: Theme) -> None:
     height = figure.get_figheight() / MM
     y = 1.0 - 4.0 / height
     figure.text(
-        0.012, y, posed.mechanism.name, color=look.ink, fontsize=9.0, fontweight="bold", va="center", parse_math=False
+        0.012,
+        y,
+        printable(posed.mechanism.name),
+        color=look.ink,
+        fontsize=9.0,
+        fontweight="bold",
+        va="center",
+        parse_math=False,
     )
     said = f"assembly {posed.assembly}" if posed.assembly else "as started"
     if posed.gaps:

@@ -80,7 +80,8 @@ def shade_rest(axes: Axes, data: xr.Dataset) -> None:
     """Extend the time axis to the whole run and shade the time after the desired motion."""
     time = data["time"].values
     end = float(data.attrs.get("motion_end", time[-1]))
-    axes.set_xlim(time[0], time[-1])
+    if time[0] < time[-1]:
+        axes.set_xlim(time[0], time[-1])
     if end < time[-1]:
         # In one column the longer text would force the legend to one entry per line.
         label = "after the motion" if is_narrow(figure_width(axes)) else "after the end of the desired motion"

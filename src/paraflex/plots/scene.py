@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
-from paraflex.plots.labels import display_unit
+from paraflex.plots.labels import display_unit, printable
 from paraflex.plots.selection import names_of, point_number, select_run
 from paraflex.results.acting import sized
 from paraflex.results.kinds import kind_of
@@ -281,7 +281,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
     size = limits_of(reach).size
     reach = np.concatenate([reach, *(load.place - ARROW * size * load.force for load in loads)])
     return Scene(
-        mechanism=str(run.attrs["mechanism"]),
+        mechanism=printable(str(run.attrs["mechanism"])),
         mode=str(run["mode"].item()) if "mode" in run.coords else "",
         time=times,
         magnified=magnify,

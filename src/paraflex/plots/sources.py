@@ -94,8 +94,8 @@ def _format(file: Path) -> str:
 
 def _json(file: Path) -> Source:
     remedy = "make these results again"
-    found = read_values(file, remedy)
     check_listed(file, remedy)
+    found = read_values(file, remedy)
     kind = kind_of_numbers(found)
     if kind:
         searched = kind in ("optimisation", "identification", "indices")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.mechanism import Mechanism
+from paraflex.plots.labels import printable
 from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
 from paraflex.plots.scene import Limits, Scene, figure_of, is_plate, scene
 from paraflex.plots.themes import PAGE, Theme
@@ -66,7 +67,8 @@ def sketch(mechanism: Mechanism) -> str:
     parts = [_mark(mark, pen) for mark in still_marks(shown, limits)] + moving_elements(shown, limits, pen)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
-        f'viewBox="0 0 {width:.1f} {height:.1f}" role="img" aria-label="{escape(mechanism.name)} as assembled" '
+        f'viewBox="0 0 {width:.1f} {height:.1f}" role="img" '
+        f'aria-label="{escape(printable(mechanism.name))} as assembled" '
         f'style="color: inherit; max-width: 100%">{"".join(parts)}</svg>'
     )
 
@@ -147,7 +149,7 @@ def _trail(places: Array, pen: Pen) -> str:
 
 
 def _title(name: str) -> str:
-    return f"<title>{escape(name)}</title>" if name else ""
+    return f"<title>{escape(printable(name))}</title>" if name else ""
 
 
 def _wide(width: float, pen: Pen) -> str:

@@ -193,6 +193,9 @@ def _write_table(table: pd.DataFrame, file: Path, to: str, about: Mapping[str, s
     import pyarrow as pa
 
     units, meanings = table.attrs["units"], table.attrs["meanings"]
+    # Attributes are copied with every column that is looked at.
+    table = table.copy(deep=False)
+    table.attrs = {}
     found = pa.Table.from_pandas(table, preserve_index=False)
     if to == "csv":
         _write_csv(found, units, file)
