@@ -14,6 +14,7 @@ from paraflex.cli.commands.options import FilesChoice
 from paraflex.cli.ending import say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.findings import Finding
+from paraflex.folders import RESULT_KINDS
 
 
 @dataclass(frozen=True)
@@ -23,9 +24,7 @@ class DatasetCommand:
     Attributes
     ----------
     kind : str
-        Kind of the results folder: see `paraflex.folders.KINDS`.
-    files : (str, str)
-        Names of the data file and of the summary file.
+        Kind of the dataset, one of `paraflex.folders.RESULT_KINDS`.
     summary : callable
         Function that returns the dataset as plain numbers.
     show : callable
@@ -35,7 +34,6 @@ class DatasetCommand:
     """
 
     kind: str
-    files: tuple[str, str]
     summary: Callable[[xr.Dataset], dict[str, Any]]
     show: Callable[[Console, xr.Dataset], None]
     doubts: Iterable[Finding] | None = None
@@ -45,11 +43,12 @@ class DatasetCommand:
         began = time.perf_counter()
         if chosen.out is None:
             return self._tell(chosen, make())
-        with hold_results(chosen.out, self.kind, force=chosen.force) as folder:
+        kind = RESULT_KINDS[self.kind]
+        with hold_results(chosen.out, kind.folder, force=chosen.force) as folder:
             data = self._tell(chosen, make())
             from paraflex.cli.writing import write_drawn, write_numbers
 
-            write_numbers(data, self.summary(data), folder, self.files)
+            write_numbers(data, self.summary(data), folder, (kind.data, kind.files[0]))
             write_drawn(data, folder, chosen.drawn)
         if not chosen.json:
             say_where(began, "numbers", folder.path, chosen.drawn)

@@ -10,7 +10,6 @@ from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, moments_along
 from paraflex.cli.linearise_tables import print_linear
-from paraflex.folders import LINEAR_MODELS
 from paraflex.results.linear_data import linear_dataset
 from paraflex.results.linear_summary import linear_summary
 
@@ -28,4 +27,4 @@ def _data(found: AskedModels, request: LineariseRequest) -> xr.Dataset:
         return linear_dataset(found.models, along=along, parameters=found.parameters)
 
 
-_COMMAND = DatasetCommand(LINEAR_MODELS, ("linear.nc", "linear.json"), linear_summary, print_linear, doubts=())
+_COMMAND = DatasetCommand("linear", linear_summary, print_linear, doubts=())

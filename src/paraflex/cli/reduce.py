@@ -11,7 +11,6 @@ from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.linear_models import AskedModels, asked_models, pose_asked
 from paraflex.cli.reduce_tables import print_reduction
 from paraflex.errors import InputError, renamed
-from paraflex.folders import REDUCED_MODELS
 from paraflex.linear import PosesAlong, poses_along
 from paraflex.linear.reduced import ReductionMethod
 from paraflex.results.reduction_data import reduction_dataset, reduction_summary
@@ -50,4 +49,4 @@ def _along(found: AskedModels, request: ReduceRequest) -> list[PosesAlong]:
                 for motion, mode in zip(found.motions, found.modes, strict=True)]  # fmt: skip
 
 
-_COMMAND = DatasetCommand(REDUCED_MODELS, ("reduced.nc", "reduced.json"), reduction_summary, print_reduction, doubts=())
+_COMMAND = DatasetCommand("reduction", reduction_summary, print_reduction, doubts=())

@@ -12,7 +12,7 @@ from paraflex.cli.tables import few, plain_console
 from paraflex.errors import InputError
 from paraflex.folders import (
     COMPARISON,
-    KINDS,
+    FOLDER_FILES,
     MANIFEST,
     SENSITIVITY,
     STUDY_OF_RUNS,
@@ -36,7 +36,7 @@ def hold_results(out: str | Path, kind: str, *, force: bool, field: str = "--out
     out : str or Path
         Results folder.
     kind : str
-        Kind of the results: see `paraflex.folders.KINDS`.
+        Kind of the results: see `paraflex.folders.FOLDER_FILES`.
     force : bool
         Whether results of another kind may be replaced.
     field : str
@@ -76,10 +76,10 @@ def say_replaced(folder: Path) -> None:
 
 
 def _described(folder: Path, kind: str) -> str:
-    file = next(folder / name for name in (*KINDS[kind], MANIFEST) if (folder / name).is_file())
+    file = next(folder / name for name in (*FOLDER_FILES[kind], MANIFEST) if (folder / name).is_file())
     when = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime))
     try:
-        text = _what(folder, kind, read_json(folder / KINDS[kind][0]))
+        text = _what(folder, kind, read_json(folder / FOLDER_FILES[kind][0]))
     except (InputError, KeyError, TypeError, AttributeError):
         # A file that is missing, damaged or of another version is replaced all the same.
         text = f"a {kind}"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 from rich.console import Console
@@ -11,23 +11,10 @@ from rich.console import Console
 from paraflex.cli.commands.results import ReportRequest
 from paraflex.cli.tables import plain_console
 from paraflex.errors import InputError
-from paraflex.folders import check_listed
-from paraflex.report import (
-    Page,
-    linear_page,
-    motion_page,
-    reduction_page,
-    save_page,
-    statics_page,
-    tracking_page,
-    verification_page,
-)
+from paraflex.folders import RESULT_KINDS
+from paraflex.report import Page, save_page
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
-from paraflex.writing import read_json
-
-# Page functions of the kinds of results that need nothing but their dataset.
-_PAGES = {"motion": motion_page, "linear": linear_page, "statics": statics_page, "reduction": reduction_page}
 
 
 def report_command(request: ReportRequest) -> None:
@@ -63,27 +50,9 @@ def save_study_report(folder: Path, console: Console, target: Path | None = None
 
 
 def page_of(data: xr.Dataset, folder: Path) -> Page:
-    """Return the report of a dataset and of the files in its folder."""
-    kind = kind_of(data)
-    if kind == "verification":
-        return verification_page(data, _beside(folder / "verify.json"))
-    if kind in _PAGES:
-        return _PAGES[kind](data)
-    if kind == "laws":
-        raise InputError(
-            "a comparison of control laws has no report", field=str(folder),
-            remedy="laws.csv has its table, and paraflex plot draws law_comparison",
-        )  # fmt: skip
-    summary = folder / "summary.json"
-    modes = _beside(summary)["modes"] if summary.is_file() else {}
-    # Modes that could not start are in the summary only.
-    failed = {name: mode.get("message", "") for name, mode in modes.items() if name not in data["mode"].values}
-    return tracking_page(data, failed)
-
-
-def _beside(file: Path) -> dict[str, Any]:
-    numbers = read_json(file)
-    check_listed(file, "run the command again")
-    if not isinstance(numbers.get("modes"), dict):
-        raise InputError("is no summary that paraflex wrote", field=str(file), remedy="run the command again")
-    return numbers
+    """Return the report of a dataset and of the summary in its folder."""
+    kind = RESULT_KINDS[kind_of(data)]
+    kind.refuse("page", str(folder))
+    module, _, function = kind.page.partition(".")
+    page = getattr(import_module(f"paraflex.report.{module}"), function)
+    return page(data, folder) if kind.with_folder else page(data)

@@ -18,7 +18,6 @@ from paraflex.equilibria.given import coordinate_named
 from paraflex.errors import AssemblyError, EquilibriumError, InputError, renamed
 from paraflex.files import Model
 from paraflex.files.fields import number_in
-from paraflex.folders import EQUILIBRIA
 from paraflex.results.statics_data import statics_dataset, statics_summary
 
 _NONE = "none"
@@ -31,7 +30,7 @@ def statics_command(request: StaticsRequest) -> int:
     return COMPLETE if data["status"].item() == "complete" else TROUBLE
 
 
-_COMMAND = DatasetCommand(EQUILIBRIA, ("statics.nc", "statics.json"), statics_summary, print_statics)
+_COMMAND = DatasetCommand("statics", statics_summary, print_statics)
 
 
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:

@@ -5,6 +5,22 @@ If the writer is killed, the next process that opens the folder completes the ch
 
 from paraflex.folders.changes import MANIFEST as MANIFEST, check_inside as check_inside
 from paraflex.folders.held import ResultsFolder as ResultsFolder, added_to as added_to, hold_folder as hold_folder
+from paraflex.folders.kinds import (
+    COMPARISON as COMPARISON,
+    DATA_FILES as DATA_FILES,
+    EQUILIBRIA as EQUILIBRIA,
+    FOLDER_FILES as FOLDER_FILES,
+    LAW_COMPARISON as LAW_COMPARISON,
+    LINEAR_MODELS as LINEAR_MODELS,
+    REDUCED_MODELS as REDUCED_MODELS,
+    RESULT_KINDS as RESULT_KINDS,
+    RUN as RUN,
+    RUN_COMPARISON as RUN_COMPARISON,
+    SENSITIVITY as SENSITIVITY,
+    STUDY_OF_RUNS as STUDY_OF_RUNS,
+    VERIFICATION as VERIFICATION,
+    ResultKind as ResultKind,
+)
 from paraflex.folders.lock import (
     LOCK as LOCK,
     FolderInUseError as FolderInUseError,
@@ -12,17 +28,6 @@ from paraflex.folders.lock import (
     lock_folder as lock_folder,
 )
 from paraflex.folders.manifest import (
-    COMPARISON as COMPARISON,
-    EQUILIBRIA as EQUILIBRIA,
-    KINDS as KINDS,
-    LAW_COMPARISON as LAW_COMPARISON,
-    LINEAR_MODELS as LINEAR_MODELS,
-    REDUCED_MODELS as REDUCED_MODELS,
-    RUN as RUN,
-    RUN_COMPARISON as RUN_COMPARISON,
-    SENSITIVITY as SENSITIVITY,
-    STUDY_OF_RUNS as STUDY_OF_RUNS,
-    VERIFICATION as VERIFICATION,
     Manifest as Manifest,
     check_listed as check_listed,
     files_of as files_of,

@@ -123,7 +123,7 @@ def hold_folder(
     path : Path
         Folder; created if necessary, and removed again if nothing is written to it.
     kind : str
-        Kind of the results, from KINDS.
+        Kind of the results, from FOLDER_FILES.
     force : bool, optional
         Whether results of another kind may be replaced; None if the caller offers no such option.
     field, remedy : str

@@ -13,34 +13,12 @@ from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.folders.changes import MANIFEST, NEW, READY, files_in, is_inside
+from paraflex.folders.kinds import FOLDER_FILES, STUDY_OF_RUNS
 from paraflex.folders.lock import LOCK, finish_change
 from paraflex.interrupts import uninterrupted
 from paraflex.seals import damaged
 from paraflex.writing import read_json
 
-# Kinds of results, with the files by which the kind of a folder without a manifest, from an earlier release, is found.
-RUN = "run"
-VERIFICATION = "verification"
-COMPARISON = "comparison of methods"
-LAW_COMPARISON = "comparison of control laws"
-SENSITIVITY = "sensitivity"
-RUN_COMPARISON = "comparison of runs"
-STUDY_OF_RUNS = "study of many runs"
-LINEAR_MODELS = "study of linear models"
-EQUILIBRIA = "study of equilibria"
-REDUCED_MODELS = "study of reduced models"
-KINDS: Mapping[str, tuple[str, ...]] = {
-    STUDY_OF_RUNS: ("study.json", "journal.sqlite", "results.parquet"),
-    VERIFICATION: ("verify.json", "verify.nc"),
-    COMPARISON: ("compare-methods.json",),
-    LAW_COMPARISON: ("laws.json", "laws.nc", "laws.csv"),
-    RUN_COMPARISON: ("compare.json",),
-    SENSITIVITY: ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
-    LINEAR_MODELS: ("linear.json", "linear.nc"),
-    EQUILIBRIA: ("statics.json", "statics.nc"),
-    REDUCED_MODELS: ("reduced.json", "reduced.nc"),
-    RUN: ("summary.json", "results.nc"),
-}
 # Further files of a study of many runs, in the manifest or not, because they come and go while it runs.
 _OF_STUDY = (
     "journal.sqlite*", "parts/*", "trajectories/*", "unfinished.parquet", "results.csv", "result.json", "summary.json",
@@ -96,7 +74,7 @@ def read_manifest(folder: Path) -> Manifest | None:
     found = read_json(file, remedy)
     try:
         manifest = Manifest.of(found["kind"], found["files"], found.get("contents", {}))
-        whole = manifest.identity == found["identity"] and manifest.kind in KINDS
+        whole = manifest.identity == found["identity"] and manifest.kind in FOLDER_FILES
         if whole and all(map(is_inside, manifest.files)):
             return manifest
     except (KeyError, TypeError, ValueError, AttributeError):
@@ -121,7 +99,7 @@ def whole_manifest(folder: Path) -> Manifest | None:
 def _kind(folder: Path, manifest: Manifest | None) -> str:
     if manifest is not None:
         return manifest.kind
-    return next((kind for kind, names in KINDS.items() if any((folder / name).is_file() for name in names)), "")
+    return next((kind for kind, names in FOLDER_FILES.items() if any((folder / name).is_file() for name in names)), "")
 
 
 def check_listed(file: Path, remedy: str) -> None:
@@ -150,7 +128,8 @@ def files_of(folder: Path) -> dict[str, str]:
     finish_change(folder)
     manifest = whole_manifest(folder)
     kind = _kind(folder, manifest)
-    found = {} if manifest is not None else dict.fromkeys((*KINDS.get(kind, ()), *([_REPORT] if kind else ())), "")
+    usual = (*FOLDER_FILES[kind], _REPORT) if kind and manifest is None else ()
+    found = dict.fromkeys(usual, "")
     if kind == STUDY_OF_RUNS:
         each = (file.relative_to(folder).as_posix() for pattern in _OF_STUDY for file in folder.glob(pattern))
         found |= dict.fromkeys(each, "")

@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
+from paraflex.folders import RESULT_KINDS
 from paraflex.plots.labels import display_unit, printable
 from paraflex.plots.selection import names_of, point_number, select_run
 from paraflex.results.acting import sized
@@ -39,16 +40,6 @@ _STILL_POINT = 1e-6
 # size, and does not magnify them if the largest magnification leaves them below the second share.
 MAGNIFICATIONS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 _SHOWN_BENDING, _UNSEEN_BENDING = 0.08, 0.005
-# Kinds of results without motion: problem and remedy of the error.
-_MOTIONLESS = {
-    "linear": ("these are linear models, not a run",
-               "their report.html shows mode shapes in motion, paraflex plot draws mode_shapes"),
-    **dict.fromkeys(("statics", "reduction"), (
-        "these are no run, and nothing moves in them",
-        "paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models")),
-    "laws": ("a comparison of control laws keeps no motions",
-             "paraflex plot draws law_comparison; paraflex run --controller NAME keeps the motion of one law"),
-}  # fmt: skip
 # Percentiles of all positions between which a run lies that does not diverge.
 _RUN_SHARES = (0.2, 99.8)
 
@@ -201,9 +192,7 @@ def run_times(data: xr.Dataset) -> tuple[float, float]:
 
 def check_shapes(data: xr.Dataset) -> None:
     """Check that results have the shapes that drawings need; raise InputError otherwise."""
-    if kind_of(data) in _MOTIONLESS:
-        problem, remedy = _MOTIONLESS[kind_of(data)]
-        raise InputError(problem, field="results", remedy=remedy)
+    RESULT_KINDS[kind_of(data)].refuse("motion", "results")
     if "shape" not in data:
         raise InputError(
             "these results hold no shapes of links: they are of an earlier version", field="results",

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from paraflex.campaign import tables_of
 from paraflex.errors import InputError
-from paraflex.folders import check_listed
+from paraflex.folders import DATA_FILES, RESULT_KINDS, STUDY_OF_RUNS, check_listed
 from paraflex.plots.designs import DesignTable, read_designs
 from paraflex.seals import NETCDF, PARQUET, check_regular, unreadable
 from paraflex.writing import read_values
 
 _OURS = "name a folder or file that paraflex wrote"
-# Files of results that determine the kind of a folder.
-_RESULT_FILES = (
-    "results.nc", "verify.nc", "linear.nc", "statics.nc", "reduced.nc", "laws.nc", "compare-methods.json",
-    "sensitivity.json", "indices.json", "result.json",
-)  # fmt: skip
 _BEGINNINGS = {NETCDF: "netcdf", b"CDF\x01": "netcdf", b"CDF\x02": "netcdf", PARQUET: "parquet"}
 
 
@@ -67,7 +61,7 @@ def open_source(path: str | Path) -> Source:
 
 
 def _folder(folder: Path) -> Source:
-    found = [folder / name for name in _RESULT_FILES if (folder / name).is_file()]
+    found = [folder / name for name in DATA_FILES if (folder / name).is_file()]
     if len(found) > 1:
         names = ", ".join(each.name for each in found)
         raise InputError(f"holds several results ({names})", field=str(folder), remedy="name one of the files")
@@ -98,16 +92,16 @@ def _json(file: Path) -> Source:
     found = read_values(file, remedy)
     kind = kind_of_numbers(found)
     if kind:
-        searched = kind in ("optimisation", "identification", "indices")
+        searched = RESULT_KINDS[kind].folder == STUDY_OF_RUNS
         return Source(kind, found, file.parent, _designs(file.parent) if searched else None)
-    beside = [name for name in _RESULT_FILES if (file.parent / name).is_file() and name != file.name]
+    beside = [name for name in DATA_FILES if (file.parent / name).is_file() and name != file.name]
     remedy = f"name {beside[0]} beside it" if beside else _OURS
     raise InputError("no figures are drawn from this file", field=str(file), remedy=remedy)
 
 
 def kind_of_numbers(found: Any) -> str:
     """Return the kind of results with these plain numbers; empty if no figures can be drawn of them."""
-    return next((kind for kind, is_it in _JSON.items() if is_it(found)), "")
+    return next((kind.name for kind in RESULT_KINDS.values() if kind.recognises(found)), "")
 
 
 def _designs(folder: Path) -> DesignTable | None:
@@ -115,21 +109,3 @@ def _designs(folder: Path) -> DesignTable | None:
     files = tables_of(folder)
     table = read_designs(files) if files else None
     return table if table is not None and table.complete.size else None
-
-
-def _has(*keys: str) -> Callable[[Any], bool]:
-    return lambda found: isinstance(found, Mapping) and all(key in found for key in keys)
-
-
-def _named(kind: str) -> Callable[[Any], bool]:
-    return lambda found: isinstance(found, Mapping) and found.get("kind") == kind
-
-
-_JSON: Mapping[str, Callable[[Any], bool]] = {
-    "optimisation": _named("optimisation"),
-    "identification": _named("identification"),
-    "indices": _named("indices"),
-    "methods": _has("methods", "reference", "fastest"),
-    "sensitivity": _has("parameters", "units", "runs"),
-    "modes": lambda found: isinstance(found, list) and bool(found) and all(map(_has("mode", "motors"), found)),
-}

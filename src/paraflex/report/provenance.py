@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from paraflex.errors import InputError
 from paraflex.files import library_names
+from paraflex.folders import check_listed
 from paraflex.results.doubts import FINDINGS, finished, verdict_of
+from paraflex.writing import read_json
 
 # Flags and fields of a request that the command line repeats.
 _RUN_FLAGS = ("rigid", "ked", "balanced")
@@ -136,3 +140,18 @@ def model_words(run: dict[str, Any]) -> list[str]:
 def repeated(flag: str, values: Iterable[str] | None) -> list[str]:
     """Return the words of an option that is repeated for each value."""
     return [word for value in values or () for word in (flag, value)]
+
+
+def summary_beside(file: Path) -> dict[str, Any]:
+    """Read the summary that a command wrote beside its data, as the manifest of the folder lists it.
+
+    Raises
+    ------
+    InputError
+        It is missing, damaged, or not of paraflex.
+    """
+    numbers = read_json(file)
+    check_listed(file, "run the command again")
+    if not isinstance(numbers.get("modes"), dict):
+        raise InputError("is no summary that paraflex wrote", field=str(file), remedy="run the command again")
+    return numbers

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -36,7 +37,7 @@ from paraflex.report.curves import (
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
+from paraflex.report.provenance import asked, common_facts, run_command_line, summary_beside, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.controllers import controller_names
@@ -46,6 +47,15 @@ from paraflex.results.formulas import during_motion
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
+
+
+def report_of_folder(data: xr.Dataset, folder: Path) -> Page:
+    """Return the report of a tracking study; modes that could not start are in the summary of its folder only."""
+    summary = folder / "summary.json"
+    modes = summary_beside(summary)["modes"] if summary.is_file() else {}
+    return tracking_page(
+        data, {name: mode.get("message", "") for name, mode in modes.items() if name not in data["mode"].values}
+    )
 
 
 @checked_arguments()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from paraflex.plots.workspace import round_magnification
 from paraflex.report.curves import TIPS, errors, labelled, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
-from paraflex.report.provenance import asked, common_facts, verdict_word, verify_command_line
+from paraflex.report.provenance import asked, common_facts, summary_beside, verdict_word, verify_command_line
 from paraflex.report.text import NO_VALUE, common_unit, count, number, quantity, table
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
@@ -69,6 +70,11 @@ class _Runs:
             for k, model in enumerate(self.models)
         ]
         return replace(chart, y=labelled(chart.y, shown.name), curves=curves)
+
+
+def report_of_folder(data: xr.Dataset, folder: Path) -> Page:
+    """Return the report of a verification with the summary in its folder."""
+    return verification_page(data, summary_beside(folder / "verify.json"))
 
 
 @checked_arguments()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
-from paraflex.folders import added_to
+from paraflex.folders import RESULT_KINDS, added_to
 from paraflex.results.controllers import SAMPLE, controller_names, controller_variables, dimension
 from paraflex.results.kinds import kind_of
 from paraflex.results.parquet import read_parquet, write_parquet
@@ -35,8 +35,6 @@ TIME_SERIES, FIGURES_TABLE, SHAPES, SECTIONS = "time_series", "figures", "shapes
 LAWS = "laws"
 # Dimensions of the rows of tables, outermost first; the independent variable is the innermost.
 _ROW_DIMENSIONS = ("model", "law", "mode")
-# Independent variable of a kind of results, and name of its table; time for other kinds.
-_ALONG = {"statics": ("step", "steps"), "reduction": ("frequency", "frequencies")}
 # Longest name of a variable or field in MATLAB.
 _LONGEST_NAME = 63
 
@@ -68,16 +66,13 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     InputError
         The results are linear models, which are not tables.
     """
-    if kind_of(data) == "linear":
-        raise InputError(
-            "linear models are matrices, not a table", field="to",
-            remedy='export them as "mat" or "netcdf"; linear.json has poles and zeros',
-        )  # fmt: skip
-    if kind_of(data) == LAWS:
-        return {LAWS: _table(data, list(data.data_vars), _ROW_DIMENSIONS)}
+    kind = RESULT_KINDS[kind_of(data)]
+    kind.refuse("table", "to")
+    if kind.along is None:
+        return {kind.name: _table(data, list(data.data_vars), _ROW_DIMENSIONS)}
     drawn = [name for name in data.data_vars if "station" in data[name].dims]
     forces = [name for name in data.data_vars if SECTION in data[name].dims]
-    dim, first = _ALONG.get(kind_of(data), ("time", TIME_SERIES))
+    dim, first = kind.along
     rows = (*_ROW_DIMENSIONS, dim)
     along = [name for name in data.data_vars if dim in data[name].dims and name not in (*drawn, *forces)]
     controlled = {name: controller_variables(name) for name in controller_names(data)}
@@ -225,7 +220,7 @@ def matlab_struct(data: xr.Dataset) -> dict[str, Any]:
     """
     struct: dict[str, Any] = {"units": {}, "dims": {}, "meaning": {}}
     samples = [dimension(SAMPLE, name) for name in controller_names(data)]
-    along = ("time", *(dim for dim, _ in _ALONG.values()), *samples)
+    along = (*(kind.along[0] for kind in RESULT_KINDS.values() if kind.along), *samples)
     for name in (*data.coords, *data.data_vars):
         array, field = data[name], matlab_name(str(name))
         first = [dim for dim in array.dims if dim in along]

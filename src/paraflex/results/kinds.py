@@ -8,21 +8,11 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError
+from paraflex.folders import RESULT_KINDS
 
 given_as("a dataset of results", "a dataset: what tracking_dataset or open_results returns, or the data of a study")(
     xr.Dataset
 )
-
-# Functions that make the datasets of each kind.
-_MADE_BY = {
-    "tracking": "tracking_dataset or run_study",
-    "motion": "motion_dataset",
-    "verification": "Verification.dataset",
-    "linear": "linear_dataset",
-    "statics": "statics_dataset",
-    "reduction": "reduction_dataset",
-    "laws": "compare_laws",
-}
 
 
 @checked_arguments()
@@ -31,7 +21,7 @@ def kind_of(data: xr.Dataset) -> str:
     if "model" in data.dims:
         return "verification"
     kind = str(data.attrs.get("kind"))
-    return kind if kind in _MADE_BY else "tracking"
+    return kind if kind in RESULT_KINDS and RESULT_KINDS[kind].made_by else "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:
@@ -52,7 +42,7 @@ def check_kind(data: xr.Dataset, *kinds: str) -> None:
 def wrong_kind(kind: str, kinds: Iterable[str], field: str = "data") -> InputError:
     """Return the error for results of a wrong kind."""
     wanted = list(kinds)
-    makers = [_MADE_BY[each] for each in wanted if each in _MADE_BY]
+    makers = [kind.made_by for kind in (RESULT_KINDS.get(each) for each in wanted) if kind and kind.made_by]
     remedy = "give those of the kind " + " or ".join(f'"{each}"' for each in wanted)
     remedy += f", as {' or '.join(makers)} makes them" if len(makers) == len(wanted) else ""
     return InputError(f'these are results of the kind "{kind}"', field=field, remedy=remedy)

@@ -13,7 +13,7 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
-from paraflex.folders import check_listed
+from paraflex.folders import DATA_FILES, check_listed
 from paraflex.interrupts import uninterrupted
 from paraflex.results.following import metric_variables
 from paraflex.seals import NETCDF, PARQUET, check_regular, check_seal, damaged, unreadable
@@ -25,7 +25,7 @@ from paraflex.writing import sealed_file
 SCHEMA = 3
 _FOLLOWING = 3
 # Names of the file that commands write into their folder, and folder of the runs of a sweep.
-FILES = ("results.nc", "verify.nc", "linear.nc", "statics.nc", "reduced.nc", "laws.nc")
+FILES = tuple(name for name in DATA_FILES if name.endswith(".nc"))
 _TRAJECTORIES = "trajectories"
 _MOST_NAMED = 3
 # Smaller arrays are not compressed: the description of the compression takes more space than it saves [bytes].

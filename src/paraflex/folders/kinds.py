@@ -1,0 +1,130 @@
+"""Kinds of results: one record for each, read by folders, storage, exports, figures, reports and commands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from paraflex.errors import InputError
+
+# Kinds of folders, as their manifests name them.
+RUN = "run"
+VERIFICATION = "verification"
+COMPARISON = "comparison of methods"
+LAW_COMPARISON = "comparison of control laws"
+SENSITIVITY = "sensitivity"
+RUN_COMPARISON = "comparison of runs"
+STUDY_OF_RUNS = "study of many runs"
+LINEAR_MODELS = "study of linear models"
+EQUILIBRIA = "study of equilibria"
+REDUCED_MODELS = "study of reduced models"
+
+
+@dataclass(frozen=True)
+class ResultKind:
+    """Kind of results: the files that hold them, and the functions and words that apply to them.
+
+    Attributes
+    ----------
+    name : str
+        Name of the kind in datasets, in plain numbers and in the catalogue of figures.
+    folder : str
+        Kind of the folder that holds the results, as its manifest names it; empty if they have no folder.
+    files : tuple of str
+        Files by which the folder is recognised without a manifest, the summary first.
+    data : str
+        File with the data of figures and reports; empty for a table of many runs.
+    made_by : str
+        Functions that make the dataset, in words; empty for results that are plain numbers.
+    along : (str, str) or None
+        Dimension along which the results go, and the name of the exported table over it; None without such a table.
+    page : str
+        Function of `paraflex.report` for the report of a dataset, "module.function"; empty if there is none.
+    with_folder : bool
+        Whether that function also takes the folder, for the summary in it.
+    refusals : mapping of str to (str, str)
+        Problem and remedy for what the results do not offer: "motion" (nothing moves), "page", "table".
+    marks : mapping of str to Any
+        Entries by which plain numbers of this kind are recognised: a value, or ... for any; empty for datasets.
+    listed : bool
+        Whether the plain numbers are a list of mappings with these entries.
+    """
+
+    name: str
+    folder: str
+    files: tuple[str, ...] = ()
+    data: str = ""
+    made_by: str = ""
+    along: tuple[str, str] | None = ("time", "time_series")
+    page: str = ""
+    with_folder: bool = False
+    refusals: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    marks: Mapping[str, Any] = field(default_factory=dict)
+    listed: bool = False
+
+    def refuse(self, offer: str, field: str) -> None:
+        """Check that the results offer something: "motion", "page" or "table".
+
+        Raises
+        ------
+        InputError
+            They do not; it names the field and has the remedy.
+        """
+        if offer in self.refusals:
+            problem, remedy = self.refusals[offer]
+            raise InputError(problem, field=field, remedy=remedy)
+
+    def recognises(self, found: Any) -> bool:
+        """Return whether plain numbers are of this kind."""
+        rows = [found] if not self.listed else found if isinstance(found, list) else []
+        return bool(self.marks and rows) and all(isinstance(row, Mapping) and self._marks(row) for row in rows)
+
+    def _marks(self, row: Mapping[str, Any]) -> bool:
+        return all(key in row and value in (..., row[key]) for key, value in self.marks.items())
+
+
+_NOTHING_MOVES = (
+    "these are no run, and nothing moves in them",
+    "paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
+)
+_STUDY = ("study.json", "journal.sqlite", "results.parquet")
+RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
+    ResultKind("sweep", STUDY_OF_RUNS, _STUDY),
+    ResultKind("optimisation", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "optimisation"}),
+    ResultKind("identification", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "identification"}),
+    ResultKind("indices", STUDY_OF_RUNS, _STUDY, "indices.json", marks={"kind": "indices"}),
+    ResultKind("verification", VERIFICATION, ("verify.json", "verify.nc"), "verify.nc", "Verification.dataset",
+               page="verification.report_of_folder", with_folder=True),
+    ResultKind("methods", COMPARISON, ("compare-methods.json",), "compare-methods.json",
+               marks={"methods": ..., "reference": ..., "fastest": ...}),
+    ResultKind("laws", LAW_COMPARISON, ("laws.json", "laws.nc", "laws.csv"), "laws.nc", "compare_laws", None, refusals={
+        "motion": ("a comparison of control laws keeps no motions",
+                   "paraflex plot draws law_comparison; paraflex run --controller NAME keeps the motion of one law"),
+        "page": ("a comparison of control laws has no report",
+                 "laws.csv has its table, and paraflex plot draws law_comparison"),
+    }),
+    ResultKind("runs", RUN_COMPARISON, ("compare.json",)),
+    ResultKind("sensitivity", SENSITIVITY, ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
+               "sensitivity.json", marks={"parameters": ..., "units": ..., "runs": ...}),
+    ResultKind("linear", LINEAR_MODELS, ("linear.json", "linear.nc"), "linear.nc", "linear_dataset", None,
+               "linear.linear_page", refusals={
+        "motion": ("these are linear models, not a run",
+                   "their report.html shows mode shapes in motion, paraflex plot draws mode_shapes"),
+        "table": ("linear models are matrices, not a table",
+                  'export them as "mat" or "netcdf"; linear.json has poles and zeros'),
+    }),
+    ResultKind("statics", EQUILIBRIA, ("statics.json", "statics.nc"), "statics.nc", "statics_dataset",
+               ("step", "steps"), "statics.statics_page", refusals={"motion": _NOTHING_MOVES}),
+    ResultKind("reduction", REDUCED_MODELS, ("reduced.json", "reduced.nc"), "reduced.nc", "reduction_dataset",
+               ("frequency", "frequencies"), "reduction.reduction_page", refusals={"motion": _NOTHING_MOVES}),
+    ResultKind("motion", RUN, ("summary.json", "results.nc"), "results.nc", "motion_dataset",
+               page="motion.motion_page"),
+    ResultKind("tracking", RUN, ("summary.json", "results.nc"), "results.nc", "tracking_dataset or run_study",
+               page="tracking.report_of_folder", with_folder=True),
+    ResultKind("modes", "", marks={"mode": ..., "motors": ...}, listed=True),
+)}  # fmt: skip
+# Files by which a folder without a manifest, from an earlier release, is recognised, by the kind of the folder.
+FOLDER_FILES: dict[str, tuple[str, ...]] = {kind.folder: kind.files for kind in RESULT_KINDS.values() if kind.folder}
+# Files of data that figures and reports are drawn of, those of runs first.
+DATA_FILES: tuple[str, ...] = tuple(dict.fromkeys(kind.data for kind in reversed(RESULT_KINDS.values()) if kind.data))

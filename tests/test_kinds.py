@@ -1,0 +1,45 @@
+"""Kinds of results: one record has all that folders, figures, exports and reports ask of a kind."""
+
+import pytest
+
+import paraflex.report
+from paraflex.folders import DATA_FILES, FOLDER_FILES, RESULT_KINDS
+from paraflex.plots.catalogue import CATALOGUE
+from paraflex.plots.sources import kind_of_numbers
+
+
+def test_every_kind_with_data_has_figures_and_a_report_or_says_why_not():
+    drawn = {name for name, kind in RESULT_KINDS.items() if kind.data or kind.marks or name == "sweep"}
+    assert set(CATALOGUE) == drawn
+    for kind in RESULT_KINDS.values():
+        if kind.made_by:
+            assert bool(kind.page) != ("page" in kind.refusals), kind.name
+            assert kind.data in kind.files
+        if kind.page:
+            module, _, function = kind.page.partition(".")
+            assert callable(getattr(getattr(paraflex.report, module), function))
+
+
+def test_folders_are_told_apart_by_their_files():
+    """The summary of a study of many runs is one of its further files: it is looked for before runs are."""
+    names = [name for files in FOLDER_FILES.values() for name in files]
+    assert len(names) == len(set(names))
+    assert list(FOLDER_FILES).index("study of many runs") < list(FOLDER_FILES).index("run")
+    assert DATA_FILES[0] == "results.nc"
+
+
+@pytest.mark.parametrize(
+    ("found", "kind"),
+    [
+        ({"kind": "indices"}, "indices"),
+        ({"kind": "sweep"}, ""),
+        ({"parameters": [], "units": {}, "runs": []}, "sensitivity"),
+        ([{"mode": "++", "motors": []}], "modes"),
+        ({"mode": "++", "motors": []}, ""),
+        ([{"kind": "indices"}], ""),
+        ([], ""),
+        (3, ""),
+    ],
+)
+def test_plain_numbers_are_recognised_by_their_entries(found, kind):
+    assert kind_of_numbers(found) == kind
