@@ -186,6 +186,51 @@ def test_every_field_of_a_model_file_stands_on_the_page():
 
 
 @pytest.mark.usefixtures("hooks")
+def test_every_table_of_a_model_file_has_a_section_with_an_example():
+    from file_format import file_format_page
+    from paraflex.files import model_schema
+
+    text = (DOCS / "model-file-tables.md").read_text(encoding="utf-8")
+    sections = dict(re.findall(r"^## `\[([^]]+)\]`\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL))
+    top_level = {"name", "description", "geometry", "reference", "curvature", "gravity"}
+    assert {name.removesuffix(".NAME") for name in sections} == set(model_schema()["properties"]) - top_level
+    assert all("```toml\n" in section for section in sections.values())
+    asked = set(re.findall(r"\(\.\./model-file-tables\.md#([\w-]+)\)", file_format_page()))
+    assert asked <= {"top-level"} | {re.sub(r"[^\w-]", "", name.lower()) for name in sections}
+    assert len(asked) > 15
+
+
+def test_the_guide_to_the_model_file_shows_the_file_of_the_library():
+    from paraflex.files import library_text
+
+    blocks = [block for block in blocks_of(DOCS / "model-file.md") if block.language == "toml"]
+    assert len(blocks) >= 10
+    assert all(block.text in library_text("five_bar") for block in blocks)
+
+
+def test_examples_of_tables_fit_the_schema():
+    """Each block of whole tables, added to a file with the parameters that it names; others are parts of tables."""
+    import tomllib
+
+    from paraflex.files import load_data
+    from paraflex.files.read import validate
+    from paraflex.files.schema import ModelTable
+
+    base, checked = load_data("3prr")[0], 0
+    base["parameters"] |= {"a": 1.0, "w": 20.0}
+    for block in blocks_of(DOCS / "model-file-tables.md"):
+        if block.language == "toml" and "\n[" in f"\n{block.text}":
+            data = tomllib.loads(block.text)
+            for path in data.get("path", {}).values():
+                # The rows of a file stand in place of its name when a file is read.
+                path.update({"table": [[0.0, 0.0]] * 4} if "table" in path else {})
+            parameters = base["parameters"] | data.get("parameters", {})
+            validate(ModelTable, base | data | {"parameters": parameters}, "model-file-tables.md")
+            checked += 1
+    assert checked >= 30
+
+
+@pytest.mark.usefixtures("hooks")
 def test_every_public_name_stands_on_one_page():
     import paraflex
     from api import PACKAGES, _origin, on_files, public_names

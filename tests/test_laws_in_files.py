@@ -167,9 +167,9 @@ def test_what_files_cannot_say(old, new, said):
 
 
 def test_what_the_page_shows_is_read_and_runs(tmp_path):
-    """Every controller of the page on model files acts on RAParM-I."""
+    """Every controller of the page on the tables of model files acts on RAParM-I."""
     data = tomllib.loads(LIBRARY + GAUGES)
-    for block in blocks_of(Path(__file__).parents[1] / "docs" / "model-file.md"):
+    for block in blocks_of(Path(__file__).parents[1] / "docs" / "model-file-tables.md"):
         if block.language == "toml" and "[controller." in block.text:
             data.setdefault("controller", {}).update(tomllib.loads(block.text)["controller"])
     model = model_from(data, "robot.toml")

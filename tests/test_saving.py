@@ -358,13 +358,17 @@ def test_a_place_that_cannot_be_written(tmp_path):
         library("4rrr").save(tmp_path / "file" / "model.toml")
 
 
-def test_what_the_page_shows(tmp_path, monkeypatch):
+@pytest.mark.parametrize(("name", "count"), [("model-file.md", 2), ("model-file-tables.md", 2)])
+def test_what_the_pages_on_model_files_show_runs(name, count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    page = Path(__file__).parents[1] / "docs" / "model-file.md"
+    blocks = [block for block in blocks_of(Path(__file__).parents[1] / "docs" / name) if block.language == "python"]
+    assert len(blocks) == count
     shown = {}
-    for block in blocks_of(page):
-        if block.language == "python":
-            exec(block.text, shown)
+    for block in blocks:
+        exec(block.text, shown)
+    if name == "model-file-tables.md":
+        assert set(shown["results"]) == {"square", "line"}
+        return
     assert read("linear.toml").study.path == "line"
     assert len(read("chain.toml").mechanism.bodies) == 5
 

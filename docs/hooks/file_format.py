@@ -10,11 +10,13 @@ from mkdocs.structure.files import File, Files
 from paraflex.files import model_schema
 
 PAGE = "reference/model-file.md"
+EXPLAINED = "../model-file-tables.md"
 
 HEAD = """# The model file, field by field
 
 This page is made from the schema that files are checked by; `paraflex schema` prints the same as JSON Schema, for
-editors. [Your own mechanism](../model-file.md) explains the tables with examples.
+editors. [Tables of the model file](../model-file-tables.md) explains the tables with examples, limits and remarks;
+[Your own mechanism](../model-file.md) is a guide to writing a file.
 
 Plain numbers are in SI units and radians. Wherever a *number* may stand, so may one with a unit, `"80 mm"`, and an
 expression in quotes, `"l1 - 0.5 * l2"`: of numbers, names from `[parameters]`, `pi`, `+ - * / **`, brackets, and of one
@@ -36,11 +38,12 @@ def file_format_page() -> str:
     writer = _Writer(schema["$defs"])
     plain = {name: field for name, field in schema["properties"].items() if not writer.tables(field)}
     tables = {name: field for name, field in schema["properties"].items() if writer.tables(field)}
-    parts = [HEAD, "## Top level\n\n", writer.fields(plain, schema.get("required", []))]
+    parts = [HEAD, f"## Top level\n\n{_explained('top-level')}", writer.fields(plain, schema.get("required", []))]
     for name, field in tables.items():
         kinds = writer.tables(field)
         if len(kinds) > 1:
-            parts.append(f"## {name}\n\n{_sentence(field.get('description', ''))}")
+            where = _explained(_slug(_named(name, field)))
+            parts.append(f"## {name}\n\n{_sentence(field.get('description', ''))}{where}")
         parts += [writer.table(name, field, kind, "###" if len(kinds) > 1 else "##") for kind in kinds]
     return "".join(parts) + writer.nested()
 
@@ -61,10 +64,12 @@ class _Writer:
     def table(self, name: str, field: dict[str, Any], kind: str, level: str) -> str:
         """One kind of a table, under its heading."""
         definition = self.definitions[kind]
-        named = f"{name}.NAME" if "additionalProperties" in field else name
+        named = _named(name, field)
         tag = definition.get("properties", {}).get("type", {}).get("const")
         told = f', type = "{tag}"' if tag else ""
         head = f"{level} `[{named}]`{told}\n\n{_sentence(definition.get('description', ''))}"
+        if level == "##":
+            head += _explained(_slug(named))
         return head + self.fields(definition.get("properties", {}), definition.get("required", []), skip_type=bool(tag))
 
     def fields(self, properties: dict[str, Any], required: list[str], *, skip_type: bool = False) -> str:
@@ -126,6 +131,21 @@ def _references(field: Any) -> list[str]:
         return [field["$ref"].rsplit("/", 1)[-1]]
     options = [*field.get("anyOf", []), *field.get("oneOf", [])]
     return [name for option in options for name in _references(option)]
+
+
+def _named(name: str, field: dict[str, Any]) -> str:
+    """Return the name of a table as files write it."""
+    return f"{name}.NAME" if "additionalProperties" in field else name
+
+
+def _slug(named: str) -> str:
+    """Return the anchor of the heading of a table on the page `EXPLAINED`."""
+    return re.sub(r"[^\w-]", "", named.lower())
+
+
+def _explained(anchor: str) -> str:
+    """Return the link to the section with an example and remarks."""
+    return f"[Example and remarks]({EXPLAINED}#{anchor})\n\n"
 
 
 def _title(name: str) -> str:
