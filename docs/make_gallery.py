@@ -180,14 +180,13 @@ def gallery_page() -> str:
 
 def section(kind: str) -> str:
     """Return the part of the page about one kind of results."""
-    made = command_line(COMMANDS[kind], kind)
-    results = "modes.json" if kind == "modes" else kind
-    text = (
-        f"## {TITLES[kind]}\n\nThe command `{made}` makes the results. "
-        f"`paraflex plot {results} FIGURE` draws {'these figures' if len(first_shown(kind)) > 1 else 'this figure'}:\n"
-    )
-    text += f'\n<div class="gallery" markdown>\n\n{"".join(map(entry, first_shown(kind)))}</div>\n'
-    if again := [figure.name for figure in shown(kind) if figure not in first_shown(kind)]:
+    made, results = command_line(COMMANDS[kind], kind), "modes.json" if kind == "modes" else kind
+    figures = first_shown(kind)
+    draws = "these figures" if len(figures) > 1 else "this figure"
+    text = f"## {TITLES[kind]}\n\nThe following command makes the results:\n\n```sh\n{made}\n```\n"
+    text += f"\n`paraflex plot {results} FIGURE` draws {draws}:\n"
+    text += f'\n<div class="gallery" markdown>\n\n{"".join(map(entry, figures))}</div>\n'
+    if again := [figure.name for figure in shown(kind) if figure not in figures]:
         links = [f"[`{name}`](#{name})" for name in again]
         text += (
             f"\nThese results also have the figures {', '.join(links[:-1])} and {links[-1]}, which are shown above.\n"
