@@ -1,9 +1,11 @@
-"""Every figure of the catalogue for the gallery of the documentation.
+"""Pictures of the gallery of the documentation, one for each figure of the catalogue, and the page that shows them.
 
-    python docs/make_gallery.py            # makes results in results/gallery, the figures, and docs/gallery.md
-    python docs/make_gallery.py --results DIR
+    python docs/make_gallery.py                  # makes results in results/gallery, the pictures, and docs/gallery.md
+    python docs/make_gallery.py --results DIR    # uses and completes the results in another folder
+    python docs/make_gallery.py --only sweep     # makes the pictures of one kind of results, and docs/gallery.md
+    python docs/make_gallery.py --page           # writes docs/gallery.md from the pictures that exist
 
-Results that are there already are taken as they are.
+Existing results are used as they are.
 """
 
 from __future__ import annotations
@@ -63,17 +65,21 @@ STUDIES = {
     "sensitivity": METRICS + SHARED + FINE + VARIED,
 }
 METHODS = ("tr-bdf2", "esdirk3", "esdirk4", "esdirk5", "newmark", "generalised-alpha")
-# What each kind of results is made by; {} is its folder.
+# Command that makes each kind of results; {} stands for their folder.
 COMMANDS = {
-    "tracking": ["run", "--mechanism", "raparm_i", "--geometry", "second-order", "--out", "{}"],
-    "motion": ["run", "--mechanism", "four_bar", "--out", "{}"],
-    "verification": ["verify", "--mechanism", "five_bar", "--out", "{}"],
+    "tracking": ["run", "raparm_i", "--geometry", "second-order", "--out", "{}"],
+    "motion": ["run", "four_bar", "--out", "{}"],
+    "verification": ["verify", "five_bar", "--out", "{}"],
     "linear": [
         "linearise", "raparm_i", "--mode", "+-+-", "--mode", "-+-+", "--mode", "++++", "--at", "0", "--along", "101",
         "--out", "{}",
     ],
+    "reduction": [
+        "reduce", "raparm_i", "--mode", "+-+-", "--mode", "++++", "--along", "21", "--out", "{}",
+    ],
+    "statics": ["statics", "leaf_spring_guide", "--load", "stage.T.x=10.5 N", "--out", "{}"],
     "methods": [
-        "compare-methods", "--mechanism", "five_bar", "--out", "{}", "--tol", "1e-3", "--tol", "1e-4", "--tol", "1e-5",
+        "compare-methods", "five_bar", "--out", "{}", "--tol", "1e-3", "--tol", "1e-4", "--tol", "1e-5",
         "--limit", "10", *(part for name in METHODS for part in ("--method", name)),
     ],
     "laws": ["control", "compare", "examples/laws.toml", "--output", "{}"],
@@ -84,15 +90,26 @@ COMMANDS = {
     "sensitivity": ["sensitivity", "{}.toml", "--output", "{}"],
     "modes": ["modes", "raparm_i", "--json"],
 }  # fmt: skip
-# Figures of what the models here do not have.
-NOT_SHOWN = ("sensors",)
+# Figures of sensors and controllers, which the models of the gallery do not have.
+NOT_SHOWN = ("sensors", "controllers")
+# Arguments of a plotting function, by what it takes.
+ARGUMENTS = {
+    "results": "data",
+    "mode": "data, mode",
+    "models": "data, mode, models",
+    "run": "data, run",
+    "designs": "data",
+    "nothing": "",
+}
 TITLES = {
     "tracking": "Runs along a path",
     "motion": "Runs without a path",
-    "verification": "Models and engines compared",
+    "verification": "Comparison of models and engines",
     "linear": "Linear models",
-    "methods": "Methods of integration compared",
-    "laws": "Control laws compared",
+    "reduction": "Reduced models",
+    "statics": "Equilibria",
+    "methods": "Comparison of integration methods",
+    "laws": "Comparison of control laws",
     "sweep": "Sweeps",
     "optimisation": "Optimisations",
     "identification": "Identifications",
@@ -100,27 +117,30 @@ TITLES = {
     "sensitivity": "Sensitivities",
     "modes": "Actuation modes",
 }
-INTRODUCTION = """# Gallery
+INTRODUCTION = """# Gallery of figures
 
-This page has the figures that paraflex draws, by kind of results, but that of `sensors`, which these models
-have none of. To draw one for print:
+This page shows the figures that paraflex draws, sorted by kind of results. The figures `sensors` and `controllers`
+are not shown, because the models of this page have neither. Select a picture to enlarge it. The name of the figure
+and the function that draws it are below each picture.
+
+The command `paraflex plot` draws figures for print:
 
 ```sh
 paraflex plot RESULTS FIGURE... --style single --format pdf,svg,png
 ```
 
-`RESULTS` is the folder that a command wrote, or one of its files. Without a figure, or with `--list`, the command lists
-the figures of these results; `all` draws all of them. Figures that show one actuation mode are drawn for each `--mode`;
-the others show the modes named, or all. Figures of many designs take `--metric`;
-those of the end-effector's motion, trails and points `--point link1.B1`.
+`RESULTS` is the folder that a command wrote, or one of its files. Without a figure, or with `--list`, the command
+lists the figures of these results; `all` draws all of them. Figures that show one actuation mode are drawn for each
+`--mode`; the others show the selected modes, or all. Figures of many designs accept `--metric`. Figures of the
+end-effector's motion, of trails and of points accept `--point link1.B1`.
 
-`--style single` makes them 84 mm wide, one column of most journals, and `--style double` 174 mm, two columns; panels
-that do not fit side by side are placed below one another. Text is 8 pt, numbers on axes 7 pt; fonts are embedded in PDF
-as TrueType. Colours are those of Okabe and Ito, and lines also differ in their dashes, for prints in grey and
-colour-blind readers. Files go to `figures/` in the folder of the results, or to `--output`; existing files are replaced
-only with `--force`.
+The option `--style single` makes figures 84 mm wide, one column of most journals, and `--style double` 174 mm, two
+columns. Panels that do not fit side by side are placed below one another. Text is 8 pt, numbers on axes are 7 pt;
+fonts are embedded in PDF as TrueType. Colours are those of Okabe and Ito, and lines also differ in their dashes, for
+prints in grey and for colour-blind readers. Files are written to `figures/` in the folder of the results, or to
+`--output`. Existing files are replaced only with `--force`.
 
-In Python each figure is a function of `paraflex.plots` that takes results or their folder:
+In Python, each figure is a function of `paraflex.plots` that takes results or their folder:
 
 ```python
 import paraflex as pf
@@ -130,32 +150,76 @@ pf.plots.tracking_errors(data).savefig("errors.pdf")
 pf.plots.link_motions(data, "++++").savefig("links.pdf")
 ```
 
-`python docs/make_gallery.py` makes the figures here from small studies.
+The script `python docs/make_gallery.py` makes the figures of this page from small studies, and writes the page.
+References such as "Fig. 11" name the figure of the paper that has the same content.
 """
 
 
 def main() -> None:
-    """Make what is missing, draw everything, write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Make missing results, draw their figures, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path("results/gallery"), help="folder for results")
-    folder = parser.parse_args().results
-    folder.mkdir(parents=True, exist_ok=True)
-    drawn: set[str] = set()
-    page = [INTRODUCTION]
-    for kind, command in COMMANDS.items():
-        source = results_of(kind, command, folder)
-        if source.kind != kind:
-            raise SystemExit(f"{source.folder} holds results of kind {source.kind}, not {kind}")
-        page.append(f"\n## {TITLES[kind]}\n\n`{command_line(command, kind)}`\n")
-        for figure in (each for each in CATALOGUE[kind] if each.name not in NOT_SHOWN):
-            again = figure.name in drawn
-            page.append(entry(figure, source, again=again))
-            drawn.add(figure.name)
-    (DOCS / "gallery.md").write_text("\n".join(page), encoding="utf-8")
+    parser.add_argument("--only", choices=tuple(COMMANDS), help="kind of results to draw; by default all")
+    parser.add_argument("--page", action="store_true", help="draw nothing, only write the page")
+    given = parser.parse_args()
+    if not given.page:
+        given.results.mkdir(parents=True, exist_ok=True)
+        for kind in [given.only] if given.only else COMMANDS:
+            source = results_of(kind, COMMANDS[kind], given.results)
+            if source.kind != kind:
+                raise SystemExit(f"{source.folder} holds results of kind {source.kind}, not {kind}")
+            for figure in first_shown(kind):
+                draw(figure, source)
+    (DOCS / "gallery.md").write_text(gallery_page(), encoding="utf-8")
+
+
+def gallery_page() -> str:
+    """Return the text of the page: a grid of pictures for each kind of results."""
+    return "\n".join([INTRODUCTION, *map(section, COMMANDS)])
+
+
+def section(kind: str) -> str:
+    """Return the part of the page about one kind of results."""
+    made, results = command_line(COMMANDS[kind], kind), "modes.json" if kind == "modes" else kind
+    figures = first_shown(kind)
+    draws = "these figures" if len(figures) > 1 else "this figure"
+    text = f"## {TITLES[kind]}\n\nThe following command makes the results:\n\n```sh\n{made}\n```\n"
+    text += f"\n`paraflex plot {results} FIGURE` draws {draws}:\n"
+    text += f'\n<div class="gallery" markdown>\n\n{"".join(map(entry, figures))}</div>\n'
+    if again := [figure.name for figure in shown(kind) if figure not in figures]:
+        links = [f"[`{name}`](#{name})" for name in again]
+        text += (
+            f"\nThese results also have the figures {', '.join(links[:-1])} and {links[-1]}, which are shown above.\n"
+        )
+    return text
+
+
+def shown(kind: str) -> list[CatalogueFigure]:
+    """Return the figures of a kind of results, without those that the gallery cannot show."""
+    return [figure for figure in CATALOGUE[kind] if figure.name not in NOT_SHOWN]
+
+
+def first_shown(kind: str) -> list[CatalogueFigure]:
+    """Return the figures of a kind of results that no kind before it has."""
+    kinds = list(COMMANDS)
+    before = {figure.name for earlier in kinds[: kinds.index(kind)] for figure in shown(earlier)}
+    return [figure for figure in shown(kind) if figure.name not in before]
+
+
+def entry(figure: CatalogueFigure) -> str:
+    """Return a picture of the grid with its name, its caption and the function that draws it."""
+    picture = f"images/gallery/{figure.name}.png"
+    caption = f"{figure.shows[0].upper()}{figure.shows[1:]}."
+    return (
+        f'<figure id="{figure.name}" markdown>\n'
+        f"[![{caption}]({picture})]({picture})\n\n"
+        f"<figcaption markdown>\n**{figure.name}**\n\n{caption}\n\n"
+        f"`pf.plots.{figure.name}({ARGUMENTS[figure.takes]})`\n</figcaption>\n</figure>\n\n"
+    )
 
 
 def results_of(kind: str, command: list[str], folder: Path) -> Source:
-    """Results of a kind; made by their command if they are not there."""
+    """Return results of a kind, made by their command if they do not exist."""
     place = folder / ("modes.json" if kind == "modes" else kind)
     if not place.exists():
         if kind in STUDIES:
@@ -170,27 +234,25 @@ def results_of(kind: str, command: list[str], folder: Path) -> Source:
 
 
 def command_line(command: list[str], kind: str) -> str:
-    """A command as one would type it."""
-    shown = command[: command.index("--tol")] if "--tol" in command else command
-    return "paraflex " + " ".join(part.format(kind) for part in shown) + (" > modes.json" if kind == "modes" else "")
+    """Return a command as typed in a shell."""
+    typed = command[: command.index("--tol")] if "--tol" in command else command
+    parts = [part.format(kind) for part in typed]
+    quoted = [f'"{part}"' if " " in part else part for part in parts]
+    return " ".join(["paraflex", *quoted]) + (" > modes.json" if kind == "modes" else "")
 
 
-def entry(figure: CatalogueFigure, source: Source, *, again: bool) -> str:
-    """A figure's part of the page; its file is written, unless it was with other results."""
+def draw(figure: CatalogueFigure, source: Source) -> None:
+    """Draw a figure and write its picture."""
     if figure not in figures_of(source):
         raise SystemExit(f"{figure.name} cannot be drawn of {source.folder}")
-    text = f"### {figure.name}\n\n{figure.shows[0].upper()}{figure.shows[1:]}"
-    if again:
-        return f"{text}; as above.\n"
     drawing = drawings(source, figure)[0]
     (file,) = write_figures([drawing], IMAGES, ["png"], dpi=110.0, force=True)
     shrink(file)
-    shown = file.rename(file.with_name(f"{figure.name}.png"))
-    return f"{text}.\n\n![{figure.name}](images/gallery/{shown.name})\n"
+    file.rename(file.with_name(f"{figure.name}.png"))
 
 
 def shrink(file: Path) -> None:
-    """A picture of at most 160 colours: line drawings need no more."""
+    """Reduce a picture to 160 colours, which line drawings do not exceed."""
     from PIL import Image
 
     with Image.open(file) as picture:

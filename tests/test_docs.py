@@ -152,6 +152,17 @@ def test_the_build_of_the_documentation_fails_on_a_warning(text, extra, tmp_path
     assert "WARNING" in done.stderr
 
 
+def test_the_gallery_shows_every_figure_of_the_catalogue(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    import make_gallery
+
+    assert (DOCS / "gallery.md").read_text(encoding="utf-8") == make_gallery.gallery_page()
+    assert set(make_gallery.COMMANDS) == set(make_gallery.CATALOGUE)
+    for kind in make_gallery.COMMANDS:
+        for figure in make_gallery.shown(kind):
+            assert (make_gallery.IMAGES / f"{figure.name}.png").is_file(), figure.name
+
+
 @pytest.fixture
 def hooks(monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS / "hooks"))

@@ -60,29 +60,31 @@ _RUN = (
     CatalogueFigure(
         "mechanism_drawing",
         "drawing",
-        "the mechanism half way, links as they bend",
+        "the mechanism with its deflected links half way through the run",
         "mode",
         variables=("shape",),
         points="point",
     ),
-    CatalogueFigure("energies", "energy", "kinetic and strain energy, work, and how far they balance", "mode"),
+    CatalogueFigure("energies", "energy", "kinetic and strain energy, work, and error of the energy balance", "mode"),
     CatalogueFigure(
-        "joint_forces", "time_series", "magnitude of the force in every joint", "mode", variables=("joint_force",)
+        "joint_forces",
+        "time_series",
+        "magnitude of the force in every joint over time",
+        "mode",
+        variables=("joint_force",),
     ),
-    CatalogueFigure(
-        "beam_stresses", "stress", "largest stress along every beam in time", "mode", variables=("stress",)
-    ),
+    CatalogueFigure("beam_stresses", "stress", "largest stress of every beam over time", "mode", variables=("stress",)),
     CatalogueFigure(
         "stress_envelope",
         "stress",
-        "largest stress over the run along every beam",
+        "largest stress of the run along every beam",
         "mode",
         variables=("section_moment",),
     ),
     CatalogueFigure(
         "joint_motions",
         "stress",
-        "angle or travel of every joint, and its rate",
+        "angle or travel of every joint, and its rate, over time",
         "mode",
         variables=("joint_coordinate",),
     ),
@@ -96,7 +98,7 @@ _RUN = (
     CatalogueFigure(
         "frame_loads",
         "stress",
-        "shaking force and moment: of the mechanism on the ground",
+        "shaking force and moment of the mechanism on the ground",
         "mode",
         variables=("frame_force",),
     ),
@@ -106,7 +108,7 @@ _RUN = (
     CatalogueFigure(
         "controllers",
         "controlled",
-        "torques of controllers, wanted and given, and their readings",
+        "torques of controllers before and after limits, and their readings",
         "mode",
         "controllers",
     ),
@@ -122,19 +124,21 @@ _RUN = (
     CatalogueFigure("link_phases", "phase", "angular velocity over angle of every body", "mode"),
 )
 _DESIGNS = (
-    CatalogueFigure("response_curves", "responses", "metrics over parameters", "designs"),
-    CatalogueFigure("response_map", "maps", "lines of equal metrics over two parameters", "designs"),
-    CatalogueFigure("parallel_coordinates", "parallel", "all numbers of every design, as lines", "designs"),
-    CatalogueFigure("pareto_front", "responses", "two metrics of every design, and the best compromises", "designs"),
+    CatalogueFigure("response_curves", "responses", "metrics against parameters", "designs"),
+    CatalogueFigure("response_map", "maps", "contours of metrics over two parameters", "designs"),
+    CatalogueFigure(
+        "parallel_coordinates", "parallel", "parameters and metrics of every design on parallel axes", "designs"
+    ),
+    CatalogueFigure("pareto_front", "responses", "two metrics of every design, and the Pareto front", "designs"),
 )
 _CONVERGENCE = CatalogueFigure(
-    "convergence", "optimisation", "how the search came down, design by design", written_as="convergence"
+    "convergence", "optimisation", "objective of every design, and the least up to it", written_as="convergence"
 )
 CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
     "tracking": (
         CatalogueFigure("desired_path", "workspace", "desired path and the mechanism at its start (Fig. 11)",
                         written_as="desired_path"),
-        CatalogueFigure("motor_torques", "modes", "torque of every motor in time, a panel a mode (Fig. 12)",
+        CatalogueFigure("motor_torques", "modes", "torque of every motor over time, one panel per mode (Fig. 12)",
                         written_as="motor_torques"),
         CatalogueFigure("tip_deflections", "time_series",
                         "axial and transverse displacement and slope of links' ends (Fig. 13)",
@@ -146,13 +150,13 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
                         "desired and actual path, deviation magnified (Fig. 15)", "mode",
                         "end_effector_path", points="point"),
         CatalogueFigure("end_effector_motion", "time_series",
-                        "the end-effector's motion, desired and actual (Fig. 16)", "mode",
+                        "motion of the end-effector, desired and actual (Fig. 16)", "mode",
                         "end_effector_motion", points="point"),
         CatalogueFigure("phase_diagrams", "phase", "phase diagrams of the end-effector (Fig. 17)", "mode",
                         "phase_diagrams", points="point"),
-        CatalogueFigure("tracking_errors", "modes", "tracking error in x and y in time, a panel a mode (Fig. 18)",
+        CatalogueFigure("tracking_errors", "modes", "tracking error in x and y over time, one panel per mode (Fig. 18)",
                         written_as="tracking_errors"),
-        CatalogueFigure("tracking_distance", "driving", "distance from the desired place in time, all modes"),
+        CatalogueFigure("tracking_distance", "driving", "distance from the desired position over time, all modes"),
         CatalogueFigure("mode_comparison", "driving", "tracking error, vibration and largest torque of every mode"),
         CatalogueFigure("actuation_condition", "driving",
                         "condition number of the actuation matrix along the path, all modes",
@@ -161,8 +165,8 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
     ),
     "motion": (
         CatalogueFigure("motion_overview", "free_motion", "angles, speeds and energies", written_as="motion_overview"),
-        CatalogueFigure("coordinates", "free_motion", "generalised coordinates, those of the bodies' modes included"),
-        CatalogueFigure("point_paths", "free_motion", "where named points go in the plane", points="points"),
+        CatalogueFigure("coordinates", "free_motion", "generalised coordinates, including modal coordinates of bodies"),
+        CatalogueFigure("point_paths", "free_motion", "paths of named points in the plane", points="points"),
         *_RUN,
     ),
     "verification": (
@@ -171,42 +175,43 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
         CatalogueFigure("compared_paths", "agreement", "path of the end-effector in two models (Fig. 23)", "models",
                         "compared_paths"),
         CatalogueFigure("model_distances", "agreement",
-                        "distances of all models from the desired place and the reference",
+                        "distances of all models from the desired position and from the reference",
                         written_as="model_distances"),
         CatalogueFigure("compared_deflections", "agreement", "transverse displacement of links' ends in all models",
                         "mode"),
     ),
     "linear": (
         CatalogueFigure("singular_values", "linear",
-                        "gains of motors to their encoders and to the end-effector over frequency, all modes",
+                        "gains from motors to their encoders and to the end-effector over frequency, all modes",
                         written_as="singular_values"),
-        CatalogueFigure("bode", "linear", "magnitude and phase of motors to their encoders and to the end-effector",
-                        "mode", "bode"),
+        CatalogueFigure("bode", "linear",
+                        "magnitude and phase from motors to their encoders and to the end-effector", "mode", "bode"),
         CatalogueFigure("pole_zero_map", "linear", "poles and zeros in the complex plane, all modes",
                         written_as="pole_zero_map"),
-        CatalogueFigure("mode_shapes", "mode_shapes", "the mechanism in its lowest modes, motors free and held", "mode",
+        CatalogueFigure("mode_shapes", "mode_shapes", "lowest mode shapes, with motors free and held", "mode",
                         "mode_shapes"),
         CatalogueFigure("poles_along_path", "linear", "frequencies and real parts of poles along the motion",
                         "mode", "poles_along_path", variables=("branch_real",)),
     ),
     "reduction": (
-        CatalogueFigure("reduced_responses", "reduction", "gains of reduced models over those of the full one", "mode",
-                        "reduced_responses"),
+        CatalogueFigure("reduced_responses", "reduction", "gains of reduced models and the full model over frequency",
+                        "mode", "reduced_responses"),
         CatalogueFigure("reduction_errors", "reduction", "errors of reduced models over frequency, all modes",
                         written_as="reduction_errors"),
-        CatalogueFigure("held_frequency_by_states", "reduction", "lowest frequency with motors held, by states",
-                        "mode", "held_frequency_by_states"),
-        CatalogueFigure("bases_along_path", "reduction", "errors along the path with bases of one pose and of several",
+        CatalogueFigure("held_frequency_by_states", "reduction",
+                        "lowest frequency with motors held against number of states", "mode",
+                        "held_frequency_by_states"),
+        CatalogueFigure("bases_along_path", "reduction", "errors along the path with bases of one and of several poses",
                         "mode", "bases_along_path", variables=("along_error",)),
     ),
     "statics": (
-        CatalogueFigure("force_travel", "equilibria", "force against travel of what is loaded and moved",
+        CatalogueFigure("force_travel", "equilibria", "force against travel of loaded and moved coordinates",
                         written_as="force_travel", variables=("given_travel",)),
         CatalogueFigure("stiffness_travel", "equilibria", "stiffness and lowest frequencies against travel",
                         written_as="stiffness_travel", variables=("given_travel",)),
-        CatalogueFigure("deformed_shapes", "equilibria", "the mechanism in all steps", written_as="deformed_shapes",
-                        variables=("given_travel",)),
-        CatalogueFigure("buckling_shapes", "equilibria", "how the mechanism buckles, as seen from the last step",
+        CatalogueFigure("deformed_shapes", "equilibria", "deformed mechanism in all steps",
+                        written_as="deformed_shapes", variables=("given_travel",)),
+        CatalogueFigure("buckling_shapes", "equilibria", "buckling shapes of the last stable step",
                         written_as="buckling_shapes", variables=("buckling_shape",)),
     ),
     "laws": (
@@ -214,9 +219,10 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
                         written_as="law_comparison"),
     ),
     "methods": (
-        CatalogueFigure("work_precision", "methods", "wall time and steps over error",
+        CatalogueFigure("work_precision", "methods", "wall time and number of steps against error",
                         written_as="work_precision"),
-        CatalogueFigure("numerical_damping", "spectra", "what each method does to a vibration", "nothing"),
+        CatalogueFigure("numerical_damping", "spectra", "damping ratio, period error and spectral radius of methods",
+                        "nothing"),
     ),
     "sweep": _DESIGNS,
     "optimisation": (_CONVERGENCE, *_DESIGNS),
@@ -231,7 +237,7 @@ CATALOGUE: Mapping[str, tuple[CatalogueFigure, ...]] = {
         *_DESIGNS,
     ),
     "sensitivity": (
-        CatalogueFigure("elasticities", "derivatives", "change of metrics by change of parameters", "run",
+        CatalogueFigure("elasticities", "derivatives", "elasticities: change of metrics in % per % of parameter", "run",
                         "elasticities"),
     ),
     "modes": (
