@@ -103,7 +103,7 @@ def test_every_assembly_closes_at_every_size(name, s):
         assert found.problem == ""
         np.testing.assert_allclose(found.state.q / places_of(system, s), expected.state.q, rtol=0, atol=1e-11)
         here, there = mobility(system, found.state), mobility(plain, expected.state)
-        assert (here.freedoms, here.lasting) == (there.freedoms, there.lasting)
+        assert (here.freedoms, here.nearby_freedoms) == (there.freedoms, there.nearby_freedoms)
 
 
 @pytest.mark.parametrize("name", NAMES[1:])

@@ -129,9 +129,9 @@ def test_flexible_links_are_not_stretched_to_fit():
 
 def test_a_third_parallel_rod_is_redundant_everywhere():
     _, _, free = seen(parallelogram(3))
-    assert (free.count, free.freedoms, free.lasting) == (0, 1, 1)
+    assert (free.count, free.freedoms, free.nearby_freedoms) == (0, 1, 1)
     assert not free.special
-    assert free.lasting_redundant == len(free.redundant) == 1
+    assert free.nearby_redundant == len(free.redundant) == 1
     assert set(free.redundant[0].among) == {"G0", "G1", "G2", "P0", "P1", "P2"}
     assert free.redundant[0].joint in free.redundant[0].among
 
@@ -139,22 +139,22 @@ def test_a_third_parallel_rod_is_redundant_everywhere():
 def test_a_flat_parallelogram_has_a_freedom_of_that_instant():
     for rods, redundant in ((2, 0), (3, 1)):
         _, _, free = seen(parallelogram(rods, angle=0.0))
-        assert (free.freedoms, free.lasting) == (2, 1)
+        assert (free.freedoms, free.nearby_freedoms) == (2, 1)
         assert free.special
-        assert (len(free.redundant), free.lasting_redundant) == (redundant + 1, redundant)
+        assert (len(free.redundant), free.nearby_redundant) == (redundant + 1, redundant)
 
 
 def test_bars_in_line_between_pins_have_a_freedom_they_cannot_follow():
     _, start, free = seen(stretched())
     assert start.closes
-    assert (free.count, free.freedoms, free.lasting) == (0, 1, 0)
+    assert (free.count, free.freedoms, free.nearby_freedoms) == (0, 1, 0)
     assert free.special
 
 
 def test_a_triangle_is_a_structure():
     mechanism = replace(stretched((0.8, 0.6)), assemblies=(Assembly("up", {"a": 0.6, "b": -0.9}),))
     _, _, free = seen(mechanism)
-    assert (free.count, free.freedoms, free.lasting, free.redundant) == (0, 0, 0, ())
+    assert (free.count, free.freedoms, free.nearby_freedoms, free.redundant) == (0, 0, 0, ())
 
 
 def test_many_bodies_give_the_same_by_sparse_matrices(monkeypatch):
@@ -164,7 +164,11 @@ def test_many_bodies_give_the_same_by_sparse_matrices(monkeypatch):
     monkeypatch.setattr("paraflex.dynamics.rank.DENSE_ROWS", 10)
     monkeypatch.setattr("paraflex.dynamics.projection.DENSE_ROWS", 10)
     sparse = seen(doubled)[2]
-    assert (sparse.count, sparse.freedoms, sparse.lasting) == (dense.count, dense.freedoms, dense.lasting) == (-1, 1, 1)
+    assert (
+        (sparse.count, sparse.freedoms, sparse.nearby_freedoms)
+        == (dense.count, dense.freedoms, dense.nearby_freedoms)
+        == (-1, 1, 1)
+    )
     for free in (dense, sparse):
         assert len(free.redundant) == 2
         assert all(set(one.among) == {"A3", "again"} for one in free.redundant)

@@ -124,7 +124,8 @@ def _mobility(free: Mobility, drives: Reach) -> Iterator[Finding]:
         yield Finding(
             "special-pose", "assembly",
             f"a special pose: {free.freedoms} degrees of freedom at this instant, "
-            + (f"{free.lasting} a little further along" if free.lasting else "but no way on from it was found"),
+            + (f"{free.nearby_freedoms} a little further along" if free.nearby_freedoms else
+               "but no way on from it was found"),
             "which way the mechanism goes on from there is left to rounding: start elsewhere",
         )  # fmt: skip
     for name, reached in drives.modes.items():

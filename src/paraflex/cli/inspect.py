@@ -205,7 +205,7 @@ def _mobility_facts(free: Mobility) -> dict[str, Any]:
     return {
         "rank": free.rank,
         "degrees_of_freedom": free.freedoms,
-        "lasting_degrees_of_freedom": free.lasting,
+        "lasting_degrees_of_freedom": free.nearby_freedoms,
         "special_pose": free.special,
         "redundant_constraints": [one.row for one in free.redundant],
         "redundancies": [

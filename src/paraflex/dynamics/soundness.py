@@ -122,18 +122,28 @@ class Redundancy:
 
 @dataclass(frozen=True)
 class Mobility:
-    """1> Degrees of freedom left by the constraints.
-    + bodies: Number of bodies. + constraints: Number of constraint rows of joints, gears and prescribed motions. +
-    rank: Rank of the constraint Jacobian at the pose. + redundant: Redundant constraints, as many as constraints less
-    rank. + lasting: Degrees of freedom at nearby poses: fewer than at a special (singular) pose, none if no nearby pose
-    is found. None if the pose is redundant and has no degree of freedom, so that its neighbours cannot be examined.
+    """Degrees of freedom left by the constraints.
+
+    Attributes
+    ----------
+    bodies : int
+        Number of bodies.
+    constraints : int
+        Number of constraint rows of joints, gears and prescribed motions.
+    rank : int
+        Rank of the constraint Jacobian at the pose.
+    redundant : tuple of Redundancy
+        Redundant constraints, as many as constraints less rank.
+    nearby_freedoms : int or None
+        Degrees of freedom at nearby poses: fewer than at a special (singular) pose, none if no nearby pose is found.
+        None if the pose is redundant and has no degree of freedom, so that its neighbours cannot be examined.
     """
 
     bodies: int
     constraints: int
     rank: int
     redundant: tuple[Redundancy, ...]
-    lasting: int | None
+    nearby_freedoms: int | None
 
     @property
     def count(self) -> int:
@@ -146,14 +156,14 @@ class Mobility:
         return 3 * self.bodies - self.rank
 
     @property
-    def lasting_redundant(self) -> int:
+    def nearby_redundant(self) -> int:
         """Number of redundant constraints, without those that are redundant at a special pose only."""
-        return len(self.redundant) - (self.freedoms - self.lasting if self.special and self.lasting is not None else 0)
+        return len(self.redundant) - (self.freedoms - (self.nearby_freedoms or 0) if self.special else 0)
 
     @property
     def special(self) -> bool:
         """Whether some of the degrees of freedom exist at this pose only."""
-        return self.lasting is not None and self.lasting < self.freedoms
+        return self.nearby_freedoms is not None and self.nearby_freedoms < self.freedoms
 
 
 @solvable("degrees of freedom")
@@ -173,13 +183,13 @@ def mobility(system: System, state: State) -> Mobility:
     here = dependence(system, state.q)
     redundant = tuple(_redundancies(system, here))
     # If no constraint is redundant here, the rank cannot be larger elsewhere.
-    lasting: int | None = system.n - here.rank
-    if redundant and lasting:
+    nearby: int | None = system.n - here.rank
+    if redundant and nearby:
         ranks = [dependence(system, q, _DEPENDENT).rank for q in _poses_nearby(system, state)]
-        lasting = system.n - max(here.rank, *ranks) if ranks else 0
+        nearby = system.n - max(here.rank, *ranks) if ranks else 0
     elif redundant:
-        lasting = None
-    return Mobility(len(system.bodies), system.n_constraints, here.rank, redundant, lasting)
+        nearby = None
+    return Mobility(len(system.bodies), system.n_constraints, here.rank, redundant, nearby)
 
 
 def _redundancies(system: System, found: Dependence) -> Iterator[Redundancy]:

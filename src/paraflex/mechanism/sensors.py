@@ -204,7 +204,7 @@ class Sensor(CheckedFields, ABC):
         Raises
         ------
         InputError
-            It does not; the message begins with `field`.
+            The mechanism lacks it; the message begins with `field`.
         """
 
     def unit(self, slides: bool) -> str:

@@ -148,7 +148,7 @@ def summary_beside(file: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        It is missing, damaged, or not of paraflex.
+        The file is missing, damaged, or not of paraflex.
     """
     numbers = read_json(file)
     check_listed(file, "run the command again")
