@@ -237,9 +237,9 @@ def manifest(folder: Path, bait: Path, chance: Random) -> str:
                 found |= vars(Manifest.of(found["kind"], found["files"], found["contents"]))
             detail = str(names)[:80]
         case "kind":
-            from paraflex.folders import KINDS
+            from paraflex.folders import FOLDER_FILES
 
-            detail = found["kind"] = chance.choice([*KINDS])
+            detail = found["kind"] = chance.choice([*FOLDER_FILES])
         case "contents":
             one = chance.choice(_WRONG)
             contents: Any = dict.fromkeys(found["files"], one)

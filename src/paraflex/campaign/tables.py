@@ -189,7 +189,7 @@ def _schema(journal: Journal) -> pa.Schema:
 
 
 def check_rows(journal: Journal) -> None:
-    """Check that all rows of a journal hold what its columns do; a `sqlite3.DatabaseError` if not."""
+    """Check that the rows of a journal have the types of its columns; raise `sqlite3.DatabaseError` if not."""
     deque(_pieces(journal, _HELD), maxlen=0)
 
 

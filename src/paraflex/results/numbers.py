@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,8 +25,8 @@ def largest(values: Array) -> float | None:
     return float(known.max()) if known.size else None
 
 
-def single(values: Array) -> Array:
-    """Numbers in single precision, or as they are where one of them would overflow."""
+def single(values: Array) -> Numbers:
+    """Return numbers in single precision, or unchanged if one of them would overflow."""
     return values if (largest(values) or 0.0) > float(np.finfo(np.float32).max) else values.astype(np.float32)
 
 
