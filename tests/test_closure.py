@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import scipy.optimize
 
+import paraflex as pf
 import twins
 from conftest import SQUARE
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
-from paraflex.kinematics import Circle, Line, Polygon, TrapezoidalLaw, follow_path
+from paraflex.kinematics import Circle, Line, Polygon, TrapezoidalLaw, follow_path, pose_at
 from paraflex.mechanism import (
     Assembly,
     EndEffector,
@@ -379,3 +380,12 @@ def test_what_is_held_twice_is_counted_once(coordinates, says):
     start = (0.1 * np.cos(1.0), 0.1 * np.sin(1.0))
     with pytest.raises(InputError, match=says):
         follow_path(mechanism, Line(start, (0.06, start[1]), 1.0), [0.0, 0.1])
+
+
+def test_a_pose_at_a_position_is_that_at_the_start_of_a_path():
+    model = pf.load("five_bar")
+    place = tuple(model.path().evaluate(np.array([0.0])).position[0])
+    pose = pose_at(model.mechanism, place)
+    assert pose == pytest.approx(follow_path(model.mechanism, model.path(), [0.0]).q[0], abs=1e-9)
+    with pytest.raises(UnreachablePathError, match="out of reach"):
+        pose_at(model.mechanism, (5.0, 0.0))

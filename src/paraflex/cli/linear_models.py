@@ -20,7 +20,7 @@ from paraflex.dynamics import State, build_system, pose_at_rest, standing_system
 from paraflex.errors import ActuationError, AssemblyError, InputError
 from paraflex.files import Model, library_names
 from paraflex.files.fields import number_in
-from paraflex.kinematics import Line, follow_path
+from paraflex.kinematics import pose_at
 from paraflex.linear import LinearModel, linearise
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.motion import UNBALANCED, MotionRun, simulate_motion
@@ -193,15 +193,14 @@ def _at_place(model: Model, text: str, flag: str) -> State:
         x, y = (number_in(part, "m") for part in parts)
     except (InputError, ValueError) as error:
         raise InputError("not a place", field=flag, value=text, remedy='say 0.05,0.314 or "50 mm, 314 mm"') from error
-    path = Line((x, y), (x, y + 1e-3), max_acceleration=1.0)
     try:
-        motion = follow_path(model.mechanism, path, [0.0], assembly=model.study.assembly)
+        q = pose_at(model.mechanism, (x, y), assembly=model.study.assembly)
     except AssemblyError as error:
         raise InputError(
             "the end-effector does not get there", field=flag, value=text, remedy="choose a place within its reach"
         ) from error
     system, rigid = build_system(model.mechanism), build_system(model.mechanism.rigid())
-    return undeformed(system, rigid, State(0.0, motion.q[0], np.zeros(rigid.n)))
+    return undeformed(system, rigid, State(0.0, q, np.zeros(rigid.n)))
 
 
 def _at_rest(model: Model, pose: State, mode: ActuationMode, balanced: bool, ports: dict[str, Any]) -> LinearModel:

@@ -5,6 +5,7 @@ from paraflex.kinematics.closure import (
     RigidMotion as RigidMotion,
     follow_path as follow_path,
     path_follower as path_follower,
+    pose_at as pose_at,
     reach_shortfall as reach_shortfall,
 )
 from paraflex.kinematics.laws import CruiseLaw as CruiseLaw, TrapezoidalLaw as TrapezoidalLaw

@@ -25,7 +25,7 @@ from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, U
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
-from paraflex.kinematics.paths import Path, PathMotion, turning_of
+from paraflex.kinematics.paths import FixedPoint, Path, PathMotion, turning_of
 from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.limits import INSTANTS, solvable
 from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
@@ -137,6 +137,36 @@ def follow_path(
     """
     end = float(np.max(times, initial=0.0))
     return path_follower(mechanism, path, end, assembly=assembly, orientation=orientation)(times)
+
+
+@checked_arguments()
+def pose_at(
+    mechanism: Mechanism,
+    position: tuple[float, float],
+    *,
+    assembly: str | Assembly | None = None,
+    orientation: float = 0.0,
+) -> Array:
+    """Compute the pose of the rigid mechanism with its end-effector at a position.
+
+    Parameters
+    ----------
+    mechanism, assembly, orientation
+        See `follow_path`.
+    position : (float, float)
+        Position of the end-effector [m].
+
+    Returns
+    -------
+    (n,) array
+        Coordinates of the bodies, those of `RigidMotion.q`.
+
+    Raises
+    ------
+    InputError, AssemblyError, UnreachablePathError
+        See `follow_path`.
+    """
+    return path_follower(mechanism, FixedPoint(position), 0.0, assembly=assembly, orientation=orientation)([0.0]).q[0]
 
 
 @checked_arguments()

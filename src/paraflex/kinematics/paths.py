@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from math import pi
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import scipy
@@ -154,6 +154,20 @@ def Line(start: Sequence[float], end: Sequence[float], max_acceleration: float) 
         Largest acceleration [m/s^2].
     """
     return Polygon((_pair(start, "start"), _pair(end, "end")), max_acceleration, closed=False)
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """Path that stays at a position [m]."""
+
+    position: tuple[float, float]
+    duration: ClassVar[float] = 0.0
+    knots: ClassVar[tuple[float, ...]] = ()
+
+    def evaluate(self, t: Array) -> PathMotion:
+        """See `Path.evaluate`."""
+        still = np.zeros((len(t), 2))
+        return PathMotion(still + self.position, still, still)
 
 
 @dataclass(frozen=True)
