@@ -48,7 +48,7 @@ class SensorRows(NamedTuple):
 
 
 class _Needed:
-    """Recorder of the bodies, joints and beams that a sensor reads: a `mechanism.sensors.Moving` of zeros."""
+    """Recorder of the bodies, joints and beams that a sensor reads: a `mechanism.sensors.SensorInputs` of zeros."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
@@ -152,11 +152,11 @@ class _Local:
 
     def read(self, at: MotionSamples) -> Numbers:
         """Return the readings (k,) from the own columns of samples."""
-        return self._sensor.read(_Moving(self, at))
+        return self._sensor.read(_LocalInputs(self, at))
 
 
-class _Moving:
-    """Quantities of a reduced system in motion: a `mechanism.sensors.Moving`."""
+class _LocalInputs:
+    """Quantities of a reduced system in motion: a `mechanism.sensors.SensorInputs`."""
 
     def __init__(self, local: _Local, at: MotionSamples) -> None:
         self._local, self._system, self._at = local, local.system, at

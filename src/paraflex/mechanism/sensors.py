@@ -38,7 +38,7 @@ def _axis(*words: str, angle: bool = True) -> Callable[[Any, str], None]:
     return check
 
 
-class Moving(Protocol):
+class SensorInputs(Protocol):
     """Quantities of a mechanism in motion at k instants, from which sensors read.
 
     Vectors are in the ground frame. All may be complex, for derivatives by complex steps: use no absolute values, norms
@@ -97,7 +97,7 @@ class Moving(Protocol):
         ...
 
 
-class Described(Protocol):
+class SensedMembers(Protocol):
     """Members of a mechanism by which a sensor is checked."""
 
     @property
@@ -185,7 +185,7 @@ class Sensor(CheckedFields, ABC):
             SENSOR_KINDS[kind] = cls
 
     @abstractmethod
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """Return the readings (k,) for a mechanism in motion."""
 
     @property
@@ -198,7 +198,7 @@ class Sensor(CheckedFields, ABC):
         """Point whose position along a fixed axis is the reading, and the axis; None for any other reading."""
         return None
 
-    def check(self, mechanism: Described, field: str) -> None:
+    def check(self, mechanism: SensedMembers, field: str) -> None:
         """Check that the mechanism has what is measured; names of joints and points are checked before.
 
         Raises
@@ -224,7 +224,7 @@ class Encoder(Sensor, kind="encoder", units=("rad", "m")):
 
     joint: str = field(metadata=AT_JOINT)
 
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         return moving.coordinate(self.joint)
 
@@ -240,7 +240,7 @@ class Tachometer(Sensor, kind="tachometer", units=("rad/s", "m/s")):
 
     joint: str = field(metadata=AT_JOINT)
 
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         return moving.rate(self.joint)
 
@@ -277,11 +277,11 @@ class PointSensor(Sensor):
         """See `Sensor.location`."""
         return Location(point=self.point, axis=unit_vector(self.axis), frame=self.body)
 
-    def check(self, mechanism: Described, field: str) -> None:
+    def check(self, mechanism: SensedMembers, field: str) -> None:
         """See `Sensor.check`."""
         known(self.body, mechanism.points, f"{field}.body", "body")
 
-    def _component(self, vector: Numbers, moving: Moving) -> Numbers:
+    def _component(self, vector: Numbers, moving: SensorInputs) -> Numbers:
         """Component of vectors (k, 2) along the axis."""
         ex, ey = unit_vector(self.axis)
         if self.body == GROUND:
@@ -294,7 +294,7 @@ class PointSensor(Sensor):
 class PositionSensor(PointSensor, kind="position", units=("m",)):
     """Position of a point along an axis, from the origin of the frame in which the axis is fixed [m]."""
 
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         place = moving.position(self.point)
         return self._component(place if self.body == GROUND else place - moving.origin(self.body), moving)
@@ -309,7 +309,7 @@ class PositionSensor(PointSensor, kind="position", units=("m",)):
 class VelocitySensor(PointSensor, kind="velocity", units=("m/s",)):
     """Component of a point's absolute velocity along an axis [m/s]."""
 
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         return self._component(moving.velocity(self.point), moving)
 
@@ -322,7 +322,7 @@ class AccelerationSensor(PointSensor, kind="acceleration", units=("m/s^2",)):
     gravity; this reading does not include gravity.
     """
 
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         return self._component(moving.acceleration(self.point), moving)
 
@@ -351,7 +351,7 @@ class StrainGauge(Sensor, kind="strain", units=("1",), rigid=False):
         finite,
     )
 
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         return moving.strain(self.body, self.at, self.distance)
 
@@ -360,7 +360,7 @@ class StrainGauge(Sensor, kind="strain", units=("1",), rigid=False):
         """See `Sensor.location`."""
         return Location(at=self.at, axis="own", frame=self.body)
 
-    def check(self, mechanism: Described, field: str) -> None:
+    def check(self, mechanism: SensedMembers, field: str) -> None:
         """See `Sensor.check`."""
         known(self.body, mechanism.points, f"{field}.body", "body")
         beam = None if self.body == GROUND else mechanism.body(self.body)
@@ -411,7 +411,7 @@ class JointForceSensor(Sensor, kind="joint_force", rigid=False):
         )
     )
 
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         if self.axis == "moment":
             return moving.moment(self.joint)
@@ -428,7 +428,7 @@ class JointForceSensor(Sensor, kind="joint_force", rigid=False):
             return Location(joint=self.joint, axis="own")
         return Location(joint=self.joint, axis=None if self.axis == "moment" else unit_vector(self.axis))
 
-    def check(self, mechanism: Described, field: str) -> None:
+    def check(self, mechanism: SensedMembers, field: str) -> None:
         """See `Sensor.check`."""
         joint = mechanism.joint(self.joint)
         if self.axis == "along" and not (joint.slides or "distance" in joint.holds):
@@ -459,7 +459,7 @@ class DeflectionSensor(Sensor, kind="deflection", rigid=False):
         metadata=said('"x", "y" or "angle"', _axis("x", "y", "angle", angle=False))
     )
 
-    def read(self, moving: Moving) -> Numbers:
+    def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         return moving.displacement(self.point)[:, ("x", "y", "angle").index(self.axis)]
 
