@@ -10,7 +10,7 @@ import pytest
 
 import paraflex as pf
 from paraflex.actuation.feed_forward import FeedForward
-from paraflex.control.amplifiers import Amplifiers, relaxing
+from paraflex.control.loop.amplifiers import Amplifiers, relaxing
 from paraflex.designs.derivatives.plans import nominal_values
 from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import InputSignals, build_system

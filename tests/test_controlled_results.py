@@ -6,7 +6,7 @@ import pytest
 
 import paraflex as pf
 from paraflex import SampledController, Simulation
-from paraflex.control.laws import JointPID, internal_torques
+from paraflex.control.laws.joints import JointPID, internal_torques
 from paraflex.designs.measure import measure
 from paraflex.errors import ControllerError, InputError
 from paraflex.results import (

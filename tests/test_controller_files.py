@@ -13,7 +13,7 @@ import pytest
 import paraflex as pf
 from paraflex.cli.repeated import repeated_runs
 from paraflex.control import ControllerDescription, PIDDescription, Simulation, simulate_controlled
-from paraflex.control.described_laws import LAWS
+from paraflex.control.laws.described_laws import LAWS
 from paraflex.designs.derivatives.plans import check_open_and_whole
 from paraflex.designs.measure import measure
 from paraflex.errors import InputError

@@ -16,7 +16,7 @@ from paraflex.cli.commands.control import CompareLawsRequest
 from paraflex.cli.control_tables import print_laws
 from paraflex.cli.tables import plain_console
 from paraflex.control import ControllerDescription, PIDDescription, simulate_controlled
-from paraflex.control.laws import internal_torques
+from paraflex.control.laws.joints import internal_torques
 from paraflex.errors import InputError
 from paraflex.plots.style import BLUE, VERMILLION
 from paraflex.reduction import reduced_mechanism

@@ -23,7 +23,7 @@ from paraflex.control import (
     RateFeedbackDescription,
     simulate_controlled,
 )
-from paraflex.control.described_laws import LAWS
+from paraflex.control.laws.described_laws import LAWS
 from paraflex.designs.derivatives.plans import check_open_and_whole
 from paraflex.errors import InputError, ResultWarning
 from paraflex.files import model_from

@@ -10,7 +10,7 @@ from numba import njit
 
 import paraflex as pf
 from paraflex import CompiledLaw, JointPID, RateFeedback, SampledController, Simulation
-from paraflex.control.discrete import DiscreteModel
+from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.errors import ControllerError, InputError
 from paraflex.files import model_from
 from rotors import ROTOR, J, T, rotor

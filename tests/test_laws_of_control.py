@@ -10,11 +10,11 @@ import pytest
 
 import paraflex as pf
 from paraflex import SampledController, Simulation
-from paraflex.control.computed_torque import ComputedTorque
-from paraflex.control.controllers import Plant
-from paraflex.control.laws import JointPID, internal_torques, joint_gains, task_inertia, torque_projectors
-from paraflex.control.rates import RateFeedback
-from paraflex.control.references import planned_readings
+from paraflex.control.laws.computed_torque import ComputedTorque
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.joints import JointPID, internal_torques, joint_gains, task_inertia, torque_projectors
+from paraflex.control.laws.rates import RateFeedback
+from paraflex.control.loop.references import planned_readings
 from paraflex.files import model_from
 from paraflex.mechanism import TorsionalSpring
 from rotors import ROTOR, T, under_rate_feedback

@@ -11,7 +11,7 @@ import pytest
 import paraflex as pf
 import twins
 from paraflex.control import DesignedLQG
-from paraflex.control.discrete import DiscreteModel
+from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.dynamics import State, build_system, inputs_of
 from paraflex.dynamics.projection import second_rates
 from paraflex.dynamics.signals import constant_signals, moment_signals, pack_signals

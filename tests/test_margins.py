@@ -9,9 +9,9 @@ import pytest
 import scipy
 
 import paraflex as pf
-from paraflex.control.chain import SampledController
-from paraflex.control.closed_loops import damped_frequency, poles_beyond
-from paraflex.control.discrete import DiscreteModel
+from paraflex.control.design.closed_loops import damped_frequency, poles_beyond
+from paraflex.control.laws.discrete import DiscreteModel
+from paraflex.control.loop.chain import SampledController
 from paraflex.errors import InputError
 from test_regulators import PERIOD, oscillator, quanser, quanser_design
 

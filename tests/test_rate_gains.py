@@ -8,10 +8,10 @@ import scipy
 
 import paraflex as pf
 from paraflex import SampledController, Simulation
-from paraflex.control.closed_loops import named_law
-from paraflex.control.discrete import DiscreteModel, side_by_side
-from paraflex.control.rate_gains import _Search, _Tried
-from paraflex.control.rates import RateFeedback
+from paraflex.control.design.closed_loops import named_law
+from paraflex.control.design.rate_gains import _Search, _Tried
+from paraflex.control.laws.discrete import DiscreteModel, side_by_side
+from paraflex.control.laws.rates import RateFeedback
 
 # An oscillator x'' = -omega^2 x + u, sampled slowly, torques a sample late.
 F, T = 10.0, 5e-3

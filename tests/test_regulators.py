@@ -10,10 +10,10 @@ import pytest
 import scipy
 
 import paraflex as pf
-from paraflex.control.chain import SampledController
-from paraflex.control.coloured import disturbed_plant
-from paraflex.control.controllers import Plant
-from paraflex.control.estimators import kalman_filter, riccati
+from paraflex.control.design.coloured import disturbed_plant
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.estimators import kalman_filter, riccati
+from paraflex.control.loop.chain import SampledController
 from paraflex.errors import InputError
 from paraflex.kinematics import Line
 from rotors import rotor

@@ -105,31 +105,31 @@ from .reduction import reduced_mechanism as reduced_mechanism
 from .equilibria import statics as statics, Statics as Statics
 
 # Control
-from .control.simulation import Simulation as Simulation
-from .control.chain import SampledController as SampledController
-from .control.controllers import Controller as Controller, Plant as Plant
-from .control.laws import JointPID as JointPID, joint_gains as joint_gains, internal_torques as internal_torques
-from .control.computed_torque import ComputedTorque as ComputedTorque
-from .control.inside import CompiledLaw as CompiledLaw
-from .control.rates import RateFeedback as RateFeedback
-from .control.rate_gains import rate_feedback_gains as rate_feedback_gains, RateGains as RateGains
-from .control.shaping import Shaper as Shaper, shaper as shaper
-from .control.shaped import ShapedPath as ShapedPath, shape_torques as shape_torques
-from .control.sampled import discretise as discretise, SampledPlant as SampledPlant
-from .control.lqg_law import LQGDesign as LQGDesign, Regulator as Regulator
-from .control.regulators import lqr as lqr, lqg as lqg
-from .control.estimators import (
+from .control.loop.simulation import Simulation as Simulation
+from .control.loop.chain import SampledController as SampledController
+from .control.laws.controllers import Controller as Controller, Plant as Plant
+from .control.laws.joints import JointPID as JointPID, joint_gains as joint_gains, internal_torques as internal_torques
+from .control.laws.computed_torque import ComputedTorque as ComputedTorque
+from .control.loop.inside import CompiledLaw as CompiledLaw
+from .control.laws.rates import RateFeedback as RateFeedback
+from .control.design.rate_gains import rate_feedback_gains as rate_feedback_gains, RateGains as RateGains
+from .control.shaping.shapers import Shaper as Shaper, shaper as shaper
+from .control.shaping.shaped import ShapedPath as ShapedPath, shape_torques as shape_torques
+from .control.design.sampled import discretise as discretise, SampledPlant as SampledPlant
+from .control.laws.lqg_law import LQGDesign as LQGDesign, Regulator as Regulator
+from .control.design.regulators import lqr as lqr, lqg as lqg
+from .control.laws.estimators import (
     quantisation_noise as quantisation_noise,
     Differentiator as Differentiator,
     BackwardDifference as BackwardDifference,
 )
-from .control.closed_loops import (
+from .control.design.closed_loops import (
     closed_loop as closed_loop,
     closed_loops as closed_loops,
     spillover as spillover,
     ClosedLoop as ClosedLoop,
 )
-from .control.margins import margins as margins, Margins as Margins
+from .control.design.margins import margins as margins, Margins as Margins
 from .control.environment import Environment as Environment
 
 # Studies

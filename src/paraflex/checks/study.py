@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from paraflex.actuation import actuation_condition
-from paraflex.control.shaped import ShapedPath
+from paraflex.control.shaping.shaped import ShapedPath
 from paraflex.equilibria.given import StaticsDefaults
 from paraflex.errors import ActuationError, AssemblyError, InputError, NumericalError, UnreachablePathError
 from paraflex.files import Model

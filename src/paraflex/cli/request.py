@@ -10,7 +10,7 @@ from typing import Any
 from paraflex.cli.commands.options import FramesChoice, ModelChoice, PlanChoice
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.control.described import NONE, ControllerDescription
+from paraflex.control.laws.described import NONE, ControllerDescription
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError, renamed
 from paraflex.files import Model, load, load_path
 from paraflex.files.outside import may_be_outside

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
+from paraflex.control.loop.simulation import Simulation
+from paraflex.control.loop.together import by_name, checked_number, periods_in
 from paraflex.control.observations import WIDEST, Observer, observed_sensors
-from paraflex.control.simulation import Simulation
-from paraflex.control.together import by_name, checked_number, periods_in
 from paraflex.dynamics import State
 from paraflex.dynamics.joint_coordinates import marker_position
 from paraflex.errors import InputError, IntegrationError

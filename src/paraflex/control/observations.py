@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.control.estimators import rounded
-from paraflex.control.references import readings_of
-from paraflex.control.simulation import Simulation
+from paraflex.control.laws.estimators import rounded
+from paraflex.control.loop.references import readings_of
+from paraflex.control.loop.simulation import Simulation
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from paraflex.control.described import TABLE, ControllerDescription, check_controllers
-from paraflex.control.described_laws import LAWS
+from paraflex.control.laws.described import TABLE, ControllerDescription, check_controllers
+from paraflex.control.laws.described_laws import LAWS
 from paraflex.errors import InputError, renamed, within
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, cast
 
-from paraflex.control.shaped import ShapedPath
-from paraflex.control.shaping import Shaper, ShaperKind
+from paraflex.control.shaping.shaped import ShapedPath
+from paraflex.control.shaping.shapers import Shaper, ShaperKind
 from paraflex.errors import InputError, within
 from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters

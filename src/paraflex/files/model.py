@@ -8,8 +8,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
-from paraflex.control.described import NONE, ControllerDescription, check_together
-from paraflex.control.shaped import shape_torques
+from paraflex.control.laws.described import NONE, ControllerDescription, check_together
+from paraflex.control.shaping.shaped import shape_torques
 from paraflex.equilibria.given import StaticsDefaults, conditions
 from paraflex.errors import InputError, renamed, suggestion, within
 from paraflex.files.controllers import read_controllers

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from paraflex.control.shaping import Shaper
+from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, renamed, within
 from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions, check_times, find_method
 from paraflex.kinematics import Path

@@ -8,8 +8,8 @@ from itertools import count
 from numbers import Integral
 from typing import Any
 
-from paraflex.control.shaped import ShapedPath
-from paraflex.control.shaping import Shaper
+from paraflex.control.shaping.shaped import ShapedPath
+from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, within
 from paraflex.files.controllers import controller_table
 from paraflex.files.laws import components_table, law_parameters, law_table

@@ -40,7 +40,7 @@ class SampledLaw(NamedTuple):
 
     clock: NDArray[np.float64]
     counts: NDArray[np.int64]
-    angle: NDArray[np.int64]  # (inputs,) index of an angle in each reading, see `control.readings.Affine`
+    angle: NDArray[np.int64]  # (inputs,) index of an angle in each reading, see `control.loop.readings.Affine`
     value: NDArray[np.float64]  # (inputs,)
     rows_q: NDArray[np.float64]  # (inputs, n)
     rows_v: NDArray[np.float64]
@@ -138,7 +138,7 @@ def read(law, q, v, a, y):
 
 @routine
 def place_of(law, p, q):
-    """Return the position of a point along an axis: see `control.readings.Place`."""
+    """Return the position of a point along an axis: see `control.loop.readings.Place`."""
     offset, angle, first, nf, numbers = law.points[p, 1], law.points[p, 2], law.points[p, 3], law.points[p, 4], 4
     x, y, bent = law.shapes[p, 2], law.shapes[p, 3], 0.0
     for i in range(nf):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from math import pi
-from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import scipy
@@ -161,8 +161,16 @@ class FixedPoint:
     """Path that stays at a position [m]."""
 
     position: tuple[float, float]
-    duration: ClassVar[float] = 0.0
-    knots: ClassVar[tuple[float, ...]] = ()
+
+    @property
+    def duration(self) -> float:
+        """See `Path.duration`."""
+        return 0.0
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """See `Path.knots`."""
+        return ()
 
     def evaluate(self, t: Array) -> PathMotion:
         """See `Path.evaluate`."""

@@ -15,7 +15,7 @@ from paraflex.results.formulas import largest_norm
 from paraflex.results.numbers import finite_or_none, largest
 
 if TYPE_CHECKING:
-    from paraflex.control.loop import ControllerRecord
+    from paraflex.control.loop.run_loop import ControllerRecord
 
 # Attribute of a dataset that describes its controllers by name.
 CONTROLLERS = "controllers"

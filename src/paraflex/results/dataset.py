@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.control.laws import internal_torques
+from paraflex.control.laws.joints import internal_torques
 from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions

@@ -23,7 +23,7 @@ from paraflex.units import WHERE_IT_SLIDES
 
 if TYPE_CHECKING:
     from paraflex.actuation import Electrical
-    from paraflex.control.loop import ControllerRecord
+    from paraflex.control.loop.run_loop import ControllerRecord
 
 # Kinds of runs.
 PATH, MOTION, STATICS = "path", "motion", "statics"

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.control.runs import ControlledMotion
+from paraflex.control.loop.runs import ControlledMotion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of

@@ -8,8 +8,8 @@ from typing import Any
 
 from paraflex.arguments import given_as
 from paraflex.arrays import Array
-from paraflex.control.loop import ControllerRecord
-from paraflex.control.runs import ControlledTracking
+from paraflex.control.loop.run_loop import ControllerRecord
+from paraflex.control.loop.runs import ControlledTracking
 from paraflex.dynamics.points import PointMotion, point_motion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions

@@ -10,9 +10,9 @@ from typing import Generic, TypeVar, overload
 import numpy as np
 
 from paraflex.actuation import Electrical
-from paraflex.control.laws import internal_torques
-from paraflex.control.loop import ControllerRecord
-from paraflex.control.runs import ControlledMotion, ControlledTracking
+from paraflex.control.laws.joints import internal_torques
+from paraflex.control.loop.run_loop import ControllerRecord
+from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import (
     LoadErrors,

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
 from paraflex.campaign import THREADS, LostWorker, OnProgress, Progress, Result, Row, WholeStudy, Workers, outcomes
-from paraflex.control.chain import SampledController
-from paraflex.control.described import NONE, ControllerDescription
+from paraflex.control.laws.described import NONE, ControllerDescription
+from paraflex.control.loop.chain import SampledController
 from paraflex.designs.measure import members_of, metrics_of
 from paraflex.designs.run import measured_mode, under_control
 from paraflex.errors import InputError

@@ -13,7 +13,7 @@ from paraflex.actuation.allocation import add_springs_and_dampers, motor_rows
 from paraflex.actuation.feed_forward import splines
 from paraflex.arguments import with_fields
 from paraflex.arrays import Array, Numbers
-from paraflex.control.shaped import ShapedPath
+from paraflex.control.shaping.shaped import ShapedPath
 from paraflex.designs.derivatives.plans import Given
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
 from paraflex.designs.derivatives.steps import Stepped, another_layout, complex_step, part, stepped

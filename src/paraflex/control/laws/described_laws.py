@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from paraflex.arguments import CheckedFields
-from paraflex.control.together import Numbers
+from paraflex.control.loop.together import Numbers
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import all_known, known
 
 if TYPE_CHECKING:
-    from paraflex.control.computed_torque import ComputedTorque
-    from paraflex.control.designed import DesignedLQG
-    from paraflex.control.discrete import DiscreteModel
-    from paraflex.control.laws import JointPID
-    from paraflex.control.rates import RateFeedback
+    from paraflex.control.laws.computed_torque import ComputedTorque
+    from paraflex.control.laws.designed import DesignedLQG
+    from paraflex.control.laws.discrete import DiscreteModel
+    from paraflex.control.laws.joints import JointPID
+    from paraflex.control.laws.rates import RateFeedback
 
 Rows = Sequence[Sequence[float]]
 # Gains of a PID law.
@@ -101,7 +101,7 @@ class PIDDescription(DescribedLaw):
 
     def check(self, names: LawNames) -> None:
         """Check the gains and pairs of readings and motors: see `DescribedLaw.check`."""
-        from paraflex.control.laws import check_pairs, gains_of
+        from paraflex.control.laws.joints import check_pairs, gains_of
 
         for name in _GAINS:
             gains_of(getattr(self, name), names.motors, name)
@@ -111,7 +111,7 @@ class PIDDescription(DescribedLaw):
 
     def made(self, outputs: Sequence[str], period: float) -> JointPID:
         """Return the law: see `DescribedLaw.made`."""
-        from paraflex.control.laws import JointPID
+        from paraflex.control.laws.joints import JointPID
 
         gains: dict[str, Any] = {name: of_names(getattr(self, name), outputs) for name in _GAINS}
         return JointPID(**gains, project=self.project, cutoff=self.cutoff)
@@ -164,7 +164,7 @@ class StateSpaceDescription(DescribedLaw):
         return self._model(period)
 
     def _model(self, period: float) -> DiscreteModel:
-        from paraflex.control.discrete import DiscreteModel, matrices_of
+        from paraflex.control.laws.discrete import DiscreteModel, matrices_of
 
         return DiscreteModel(*matrices_of(self), period, (), ())
 
@@ -195,7 +195,7 @@ class ComputedTorqueDescription(DescribedLaw):
 
     def made(self, outputs: Sequence[str], period: float) -> ComputedTorque:
         """Return the law: see `DescribedLaw.made`."""
-        from paraflex.control.computed_torque import ComputedTorque
+        from paraflex.control.laws.computed_torque import ComputedTorque
 
         return ComputedTorque(self.frequency, self.damping_ratio, cutoff=self.cutoff)
 
@@ -231,7 +231,7 @@ class RateFeedbackDescription(DescribedLaw):
 
     def made(self, outputs: Sequence[str], period: float) -> RateFeedback:
         """Return the law: see `DescribedLaw.made`."""
-        from paraflex.control.rates import RateFeedback
+        from paraflex.control.laws.rates import RateFeedback
 
         return RateFeedback(_some_of(self.gains, outputs, "gains"), cutoff=self.cutoff)
 
@@ -288,7 +288,7 @@ class LQGDescription(DescribedLaw):
 
     def made(self, outputs: Sequence[str], period: float) -> DesignedLQG:
         """Return the law: see `DescribedLaw.made`."""
-        from paraflex.control.designed import DesignedLQG
+        from paraflex.control.laws.designed import DesignedLQG
 
         return DesignedLQG(
             self.deviations, _some_of(self.effort, outputs, "effort"), noise=self.noise,

@@ -9,8 +9,8 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.control.filters import transfer_function
-from paraflex.control.sampled import NamedMatrices, SampledPlant, as_sampled, discretise, named_matrices
+from paraflex.control.design.sampled import NamedMatrices, SampledPlant, as_sampled, discretise, named_matrices
+from paraflex.control.loop.filters import transfer_function
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import all_known, positive

@@ -18,11 +18,11 @@ import scipy
 from paraflex.actuation import Effort, required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.controllers import Plant
-from paraflex.control.discrete import DiscreteModel
-from paraflex.control.estimators import BackwardDifference, checked_cutoff
-from paraflex.control.linear_law import LinearLaw
-from paraflex.control.references import PLAN, AtSamples, planned_motion
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.discrete import DiscreteModel
+from paraflex.control.laws.estimators import BackwardDifference, checked_cutoff
+from paraflex.control.laws.linear_law import LinearLaw
+from paraflex.control.loop.references import PLAN, AtSamples, planned_motion
 from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError
 from paraflex.mechanism import ActuationMode, Mechanism

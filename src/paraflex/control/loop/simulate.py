@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from paraflex.control.described import TABLE, ControllerDescription
-from paraflex.control.runs import ControlledMotion, ControlledTracking
-from paraflex.control.simulation import Simulation
+from paraflex.control.laws.described import TABLE, ControllerDescription
+from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
+from paraflex.control.loop.simulation import Simulation
 from paraflex.dynamics import State
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions

@@ -13,9 +13,9 @@ import numpy as np
 from paraflex.actuation import required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.controllers import Plant
-from paraflex.control.estimators import BackwardDifference, checked_cutoff
-from paraflex.control.references import planned_motion
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.estimators import BackwardDifference, checked_cutoff
+from paraflex.control.loop.references import planned_motion
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import InputError
 from paraflex.kernel.closure import LOOPS_CLOSED

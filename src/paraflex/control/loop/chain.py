@@ -17,13 +17,13 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.amplifiers import largest_commands
-from paraflex.control.controllers import Plant
-from paraflex.control.discrete import DiscreteModel, discrete_model, is_model
-from paraflex.control.estimators import rounded
-from paraflex.control.filters import transfer_function
-from paraflex.control.references import Reference, references
-from paraflex.control.together import by_name, checked_number, is_number, real_numbers
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.discrete import DiscreteModel, discrete_model, is_model
+from paraflex.control.laws.estimators import rounded
+from paraflex.control.loop.amplifiers import largest_commands
+from paraflex.control.loop.filters import transfer_function
+from paraflex.control.loop.references import Reference, references
+from paraflex.control.loop.together import by_name, checked_number, is_number, real_numbers
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import not_negative

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments, numbers_in
 from paraflex.arrays import Array
-from paraflex.control.coloured import disturbed_plant
-from paraflex.control.estimators import kalman_filter, riccati
-from paraflex.control.lqg_law import LQGDesign, Regulator
-from paraflex.control.reach import check_reach
-from paraflex.control.sampled import SampledPlant, as_sampled, places
-from paraflex.control.together import numbers_by_name
+from paraflex.control.design.coloured import disturbed_plant
+from paraflex.control.design.reach import check_reach
+from paraflex.control.design.sampled import SampledPlant, as_sampled, places
+from paraflex.control.laws.estimators import kalman_filter, riccati
+from paraflex.control.laws.lqg_law import LQGDesign, Regulator
+from paraflex.control.loop.together import numbers_by_name
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel
 from paraflex.mechanism.quantities import not_negative

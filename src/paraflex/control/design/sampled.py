@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.together import check_distinct, same_period, whole_and_part
+from paraflex.control.loop.together import check_distinct, same_period, whole_and_part
 from paraflex.errors import InputError
 from paraflex.limits import PLANT_STATES, at_most
 from paraflex.linear.model import LinearModel

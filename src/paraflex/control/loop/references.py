@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.actuation import required_effort
 from paraflex.arrays import Array
-from paraflex.control.controllers import Plant
+from paraflex.control.laws.controllers import Plant
 from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.discrete import DiscreteModel, check_discrete, is_model, matrices_of
-from paraflex.control.reach import frequency_of
-from paraflex.control.sampled import SampledPlant, as_sampled, discretise, places
+from paraflex.control.design.reach import frequency_of
+from paraflex.control.design.sampled import SampledPlant, as_sampled, discretise, places
+from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.errors import InputError, ResultWarning, warn_user, within
 from paraflex.linear.named import places_in_s
 from paraflex.linear.zeros import StateSpace

@@ -14,14 +14,14 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
-from paraflex.control.controllers import Controller, Plant
-from paraflex.control.described import ControllerDescription
-from paraflex.control.held import HeldTorques, Torques
-from paraflex.control.inside import sampled_law
-from paraflex.control.loop import LawFailure, Loop
-from paraflex.control.readings import Readings
-from paraflex.control.runs import ControlledMotion, ControlledTracking, TorqueLog
-from paraflex.control.together import SAME, is_number
+from paraflex.control.laws.controllers import Controller, Plant
+from paraflex.control.laws.described import ControllerDescription
+from paraflex.control.loop.held import HeldTorques, Torques
+from paraflex.control.loop.inside import sampled_law
+from paraflex.control.loop.readings import Readings
+from paraflex.control.loop.run_loop import LawFailure, Loop
+from paraflex.control.loop.runs import ControlledMotion, ControlledTracking, TorqueLog
+from paraflex.control.loop.together import SAME, is_number
 from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
 from paraflex.findings import warn_of

@@ -9,9 +9,9 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.control.controllers import Plant
-from paraflex.control.linear_law import LinearLaw
-from paraflex.control.together import same_period
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.linear_law import LinearLaw
+from paraflex.control.loop.together import same_period
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from paraflex.control.closed_loops import closed_loop, poles_beyond, unstable_poles
-from paraflex.control.discrete import side_by_side
-from paraflex.control.together import same_period, whole_and_part
+from paraflex.control.design.closed_loops import closed_loop, poles_beyond, unstable_poles
+from paraflex.control.laws.discrete import side_by_side
+from paraflex.control.loop.together import same_period, whole_and_part
 from paraflex.errors import ParaflexError
 from paraflex.findings import Finding
 from paraflex.linear import linearise
 
 if TYPE_CHECKING:
-    from paraflex.control.loop import ControllerRecord
+    from paraflex.control.loop.run_loop import ControllerRecord
     from paraflex.motion import MotionRun
     from paraflex.tracking import TrackingRun
 

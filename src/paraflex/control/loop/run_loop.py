@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.control.chain import ChainSample, SampledController, as_law
-from paraflex.control.controllers import Controller, Plant
-from paraflex.control.discrete import DiscreteModel
-from paraflex.control.inside import exception_of, linear_model, wrong_torques
-from paraflex.control.together import (
+from paraflex.control.laws.controllers import Controller, Plant
+from paraflex.control.laws.discrete import DiscreteModel
+from paraflex.control.loop.chain import ChainSample, SampledController, as_law
+from paraflex.control.loop.inside import exception_of, linear_model, wrong_torques
+from paraflex.control.loop.together import (
     check_distinct,
     check_name,
     check_whole,

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.control.sampled import SampledPlant
+from paraflex.control.design.sampled import SampledPlant
 from paraflex.errors import InputError
 
 # Poles further inside the unit circle than this decay without control.

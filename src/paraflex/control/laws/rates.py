@@ -8,10 +8,10 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.controllers import Plant
-from paraflex.control.discrete import DiscreteModel
-from paraflex.control.estimators import BackwardDifference, checked_cutoff
-from paraflex.control.linear_law import LinearLaw
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.discrete import DiscreteModel
+from paraflex.control.laws.estimators import BackwardDifference, checked_cutoff
+from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import all_known, finite
 

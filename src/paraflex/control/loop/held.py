@@ -9,9 +9,9 @@ import numpy as np
 
 from paraflex.actuation import FeedForward
 from paraflex.arrays import Array
-from paraflex.control.amplifiers import Amplifiers, relaxing, with_room
-from paraflex.control.runs import TorqueLog
-from paraflex.control.together import real_numbers
+from paraflex.control.loop.amplifiers import Amplifiers, relaxing, with_room
+from paraflex.control.loop.runs import TorqueLog
+from paraflex.control.loop.together import real_numbers
 from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals

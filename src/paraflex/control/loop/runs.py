@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import given_as
 from paraflex.arrays import Array
-from paraflex.control.loop import ControllerRecord
-from paraflex.control.loop_check import unstable_loop
+from paraflex.control.loop.loop_check import unstable_loop
+from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.findings import Finding
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun

@@ -7,13 +7,13 @@ from typing import Any
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.coloured import deviation_and_filter
-from paraflex.control.controllers import Plant
-from paraflex.control.estimators import quantisation_noise
-from paraflex.control.linear_law import LinearLaw
-from paraflex.control.references import OPEN_LOOP
-from paraflex.control.regulators import LQGDesign, lqg
-from paraflex.control.together import Numbers, numbers_by_name
+from paraflex.control.design.coloured import deviation_and_filter
+from paraflex.control.design.regulators import LQGDesign, lqg
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.estimators import quantisation_noise
+from paraflex.control.laws.linear_law import LinearLaw
+from paraflex.control.loop.references import OPEN_LOOP
+from paraflex.control.loop.together import Numbers, numbers_by_name
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel, linearise, reduce
 from paraflex.mechanism import mode_of_motors

@@ -12,14 +12,14 @@ from numba.extending import is_jitted
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.chain import SampledController
-from paraflex.control.compiled import MOST_STATES, compiled_function
-from paraflex.control.controllers import Plant
-from paraflex.control.discrete import DiscreteModel
-from paraflex.control.linear_law import LinearLaw
-from paraflex.control.readings import Readings
-from paraflex.control.references import AtSamples
-from paraflex.control.together import SAME, periods_in, whole_and_part
+from paraflex.control.laws.compiled import MOST_STATES, compiled_function
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.discrete import DiscreteModel
+from paraflex.control.laws.linear_law import LinearLaw
+from paraflex.control.loop.chain import SampledController
+from paraflex.control.loop.readings import Readings
+from paraflex.control.loop.references import AtSamples
+from paraflex.control.loop.together import SAME, periods_in, whole_and_part
 from paraflex.errors import InputError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.sampled import NOT_FINITE, RAISED, SAMPLED, WRONG, SampledLaw

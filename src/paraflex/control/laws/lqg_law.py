@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.control.controllers import Plant
-from paraflex.control.estimators import KalmanFilter
-from paraflex.control.linear_law import LinearLaw
-from paraflex.control.sampled import SampledPlant
-from paraflex.control.together import SAME
+from paraflex.control.design.sampled import SampledPlant
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.estimators import KalmanFilter
+from paraflex.control.laws.linear_law import LinearLaw
+from paraflex.control.loop.together import SAME
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 

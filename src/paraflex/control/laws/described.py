@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.control.described_laws import LawNames, of_names
-from paraflex.control.together import Numbers, check_distinct, check_name, check_whole, multiple_of
+from paraflex.control.laws.described_laws import LawNames, of_names
+from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
 from paraflex.mechanism import AngleLaw, Mechanism
 from paraflex.mechanism.loads import InTime
@@ -18,7 +18,7 @@ from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known
 
 if TYPE_CHECKING:
-    from paraflex.control.chain import SampledController
+    from paraflex.control.loop.chain import SampledController
 
 # Table of a model file that holds the controllers; and the word that selects none of them.
 TABLE, NONE = "controller", "none"
@@ -130,7 +130,7 @@ class ControllerDescription(CheckedFields):
         return self._sampled(law, chosen)
 
     def _sampled(self, law: Any, chosen: Mapping[str, Any]) -> SampledController:
-        from paraflex.control.chain import SampledController
+        from paraflex.control.loop.chain import SampledController
 
         more = {name: getattr(self, name) for name in ("limits", "rates", "quantise", "filters")} | dict(chosen)
         return SampledController(

@@ -10,7 +10,7 @@ import numpy as np
 from paraflex.actuation import FeedForward, TorquePlan, plan_torques, required_effort
 from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.shaping import Shaper
+from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError
 from paraflex.kinematics import Path, PathFollower, PathMotion, turning_of
 from paraflex.mechanism import ActuationMode

@@ -1,0 +1,1 @@
+"""Input shaping: shapers, and shaped paths and torques."""
