@@ -148,7 +148,9 @@ def setting_of_commit() -> str:
     """One of the settings but the first, another one with each commit."""
     command = ["git", "rev-parse", "HEAD"]
     digest = subprocess.run(command, cwd=TESTS, capture_output=True, text=True, check=True).stdout
-    others = list(SETTINGS)[1:]
+    # Instructions of SkylakeX end a process on a processor that lacks them.
+    lacks = "" if "avx512f" in Path("/proc/cpuinfo").read_text() else "SkylakeX"
+    others = [name for name in list(SETTINGS)[1:] if not lacks or lacks not in name]
     return others[int(digest, 16) % len(others)]
 
 
