@@ -167,7 +167,7 @@ def drive_torques(system: System, multipliers: Array) -> Array:
 
 
 class LoadErrors(NamedTuple):
-    """Error bounds of the loads of joints and drives.
+    """Estimated errors of the loads of joints and drives.
 
     Attributes
     ----------
