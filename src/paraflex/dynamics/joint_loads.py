@@ -185,7 +185,7 @@ class LoadErrors(NamedTuple):
 
 
 def load_errors(system: System, names: Sequence[str], errors: Array) -> LoadErrors:
-    """Return error bounds of the loads of joints and of all drives, from those of the multipliers (m,)."""
+    """Return estimated errors of the loads of joints and of all drives, from those of the multipliers (m,)."""
     force, moment = np.zeros(len(names)), np.zeros(len(names))
     for i, name in enumerate(names):
         for rows, term in joint_parts(system, name).terms:
