@@ -4,11 +4,13 @@ import copy
 import dataclasses
 import math
 import tomllib
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 import paraflex as pf
+from paraflex.control.loop.readings import Readings
 from paraflex.dynamics import (
     build_system,
     consistent_state,
@@ -20,9 +22,13 @@ from paraflex.dynamics import (
 from paraflex.dynamics.joint_loads import joint_loads
 from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.reduction import missed_turns
+from paraflex.dynamics.state import reference_pose
 from paraflex.elastodynamics import simulate_ked
+from paraflex.errors import InputError
 from paraflex.files import model_from
-from paraflex.mechanism import SENSOR_KINDS
+from paraflex.mechanism import SENSOR_KINDS, Encoder, Sensor, StrainGauge
+from paraflex.mechanism.frames import in_frames
+from paraflex.mechanism.sensors import Location
 from paraflex.motion import simulate_motion
 from paraflex.report.motion import motion_page
 from paraflex.results import motion_summary
@@ -579,3 +585,111 @@ def test_kineto_elastodynamics_and_rigid_links_are_measured(short_task):
     rigid = short_task.remodelled(short_task.mechanism.rigid())
     found = pf.tracking_dataset([rigid.simulate("++")])["sensor_reading"].isel(mode=0)
     assert np.all(found.sel(sensor="strain") == 0.0)
+
+
+@pytest.fixture
+def own():
+    """Kinds of sensors that a test defines are known within it only."""
+    before = dict(SENSOR_KINDS)
+    yield
+    SENSOR_KINDS.clear()
+    SENSOR_KINDS.update(before)
+
+
+def two_points(read, location=None):
+    """A sensor of a user's own: something between two points of the pendulum's rod."""
+
+    @dataclass(frozen=True)
+    class Between(Sensor, kind="between", units=("m",)):
+        point: pf.PointRef
+
+        def read(self, moving):
+            return read(moving.position(self.point))
+
+        @property
+        def location(self):
+            return Location(point=self.point) if location is None else location
+
+    return Between("own", pf.PointRef("rod", "T"))
+
+
+def pendulum_with(sensor):
+    mechanism = model_from(PENDULUM, "pendulum.toml").mechanism
+    return replace(mechanism, sensors=(*mechanism.sensors, sensor))
+
+
+def test_a_reading_that_divides_by_a_distance_has_derivatives_and_is_not_taken_for_linear(own):
+    """The distance of the tip from the pin is the length; that of nothing is 0/0 at zero coordinates."""
+    sensor = two_points(lambda place: place[:, 0] ** 2 / np.sqrt(np.sum(place**2, axis=1)))
+    system = build_system(pendulum_with(sensor).rigid())
+    assert Readings(system, [sensor]).linear == []
+    q = reference_pose(system, system.mechanism.assembly("start"))
+    still = np.zeros(system.n)
+    rows = sensor_rows(system, q, still, still, np.zeros(system.m), np.zeros(1), [sensor])
+    assert rows.q.toarray()[0, :2] == pytest.approx([np.cos(0.3) * (2.0 - np.cos(0.3) ** 2),
+                                                     -np.cos(0.3) ** 2 * np.sin(0.3)], abs=1e-12)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("read", "says"),
+    [
+        (lambda place: place, r"sensor.own: its `read` returns an array of the shape \(1, 2\)"),
+        (lambda place: 1.0, r"shape \(\)"),
+        (lambda place: np.linalg.norm(place, axis=1), "its `read` returns real numbers for complex ones"),
+        (lambda place: np.abs(place[:, 0]), "its `read` returns real numbers for complex ones"),
+    ],
+)
+def test_what_a_sensor_of_a_users_own_returns_is_checked(own, read, says):
+    sensor = two_points(read)
+    system = build_system(pendulum_with(sensor))
+    with pytest.raises(InputError, match=says):
+        sensor_rows(system, *any_state(system), [sensor])
+
+
+@pytest.mark.parametrize(
+    ("location", "says"),
+    [
+        (Location(), "sensor.own.location.joint: unknown joint"),
+        (Location(joint="nope"), "sensor.own.location.joint: unknown joint"),
+        (Location(point=pf.PointRef("rod", "ZZ")), "unknown point"),
+        (Location(joint="O", frame="nob"), "sensor.own.location.frame: unknown body"),
+    ],
+)
+def test_the_location_of_a_sensor_exists(own, location, says):
+    with pytest.raises(InputError, match=says):
+        pendulum_with(two_points(lambda place: place[:, 0], location))
+
+
+def test_kinds_of_sensors_have_a_name_of_their_own_and_a_unit(own):
+    with pytest.raises(TypeError, match="there is a sensor of kind"):
+
+        class Other(Sensor, kind="encoder", units=("rad",)):
+            pass
+
+    with pytest.raises(TypeError, match="has no unit"):
+
+        class Unitless(Sensor, kind="unitless"):
+            pass
+
+
+def test_sensors_inside_beams_of_several_frames_are_moved_or_refused(own):
+    @dataclass(frozen=True)
+    class Bridge(Sensor, kind="bridge", units=("1",), rigid=False):
+        body: str
+        at: float
+        other: float
+
+        def read(self, moving):
+            return moving.strain(self.body, self.at, None) - moving.strain(self.body, self.other, None)
+
+        @property
+        def location(self):
+            return Location(at=self.at, axis="own", frame=self.body)
+
+    bridge = Bridge("own", "rod", 0.05, 0.4)
+    rod = replace(pendulum_with(bridge).body("rod"), frames=2)
+    kept = (Encoder("angle", "O"), StrainGauge("one", "rod", 0.4))
+    whole = replace(pendulum_with(bridge), bodies=(rod,), sensors=kept)
+    assert [one.location.frame for one in in_frames(whole).sensors] == ["ground", "rod_2"]
+    with pytest.raises(InputError, match=r"sensor.own: measures in a beam of several frames"):
+        in_frames(replace(whole, sensors=(*kept, bridge)))

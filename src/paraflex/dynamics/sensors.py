@@ -21,6 +21,7 @@ from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
 from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.sections import section_at
 from paraflex.dynamics.system import System
+from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam, Joint, Mechanism, PointRef, Sensor
 from paraflex.mechanism.checks import check_sensor
 
@@ -48,13 +49,20 @@ class SensorRows(NamedTuple):
 
 
 class _Needed:
-    """Recorder of the bodies, joints and beams that a sensor reads: a `mechanism.sensors.SensorInputs` of zeros."""
+    """Recorder of the bodies, joints and beams that a sensor reads: a `mechanism.sensors.SensorInputs`.
+
+    It returns numbers that differ from each other and from zero, as a reading may divide by a distance.
+    """
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
         self.bodies: dict[str, None] = {}
         self.loads: dict[str, None] = {}
         self.beams: dict[str, None] = {}
+        self._random = np.random.default_rng(0)
+
+    def _some(self, *columns: int) -> Array:
+        return 1.0 + self._random.random((1, *columns))
 
     def _of_joints(self, *joints: Joint) -> None:
         self._of_bodies(*(point.body for joint in joints for point in (joint.a, joint.b)))
@@ -64,33 +72,33 @@ class _Needed:
 
     def coordinate(self, joint: str) -> Array:
         self._of_joints(self._mechanism.joint(joint))
-        return np.zeros(1)
+        return self._some()
 
     rate = coordinate
 
     def position(self, point: PointRef) -> Array:
         self._of_bodies(point.body)
-        return np.zeros((1, 2))
+        return self._some(2)
 
     velocity = acceleration = position
 
     def displacement(self, point: PointRef) -> Array:
         self._of_bodies(point.body)
-        return np.zeros((1, 3))
+        return self._some(3)
 
     def origin(self, body: str) -> Array:
         self._of_bodies(body)
-        return np.zeros((1, 2))
+        return self._some(2)
 
     def angle(self, body: str) -> Array:
         self._of_bodies(body)
-        return np.zeros(1)
+        return self._some()
 
     def strain(self, beam: str, at: float | str, distance: float | None) -> Array:
         self._of_joints(*sliding_joints(self._mechanism, beam))
         self._of_bodies(beam)
         self.beams[beam] = None
-        return np.zeros(1)
+        return self._some()
 
     def moment(self, joint: str) -> Array:
         self.loads[joint] = None
@@ -98,7 +106,7 @@ class _Needed:
 
     def axis(self, joint: str) -> Array:
         self.coordinate(joint)
-        return np.zeros((1, 2))
+        return self._some(2)
 
     def force(self, joint: str) -> Array:
         self.loads[joint] = None
@@ -116,8 +124,8 @@ class _Local:
 
     def __init__(self, system: System, sensor: Sensor) -> None:
         needed = _Needed(system.mechanism)
-        sensor.read(needed)
         self._sensor = sensor
+        self._checked(sensor.read(needed), 1, complex_step=False)
         bodies, columns, offset = [], [np.zeros(0, int)], 0
         for name in needed.bodies:
             body = system.body(name)
@@ -152,7 +160,19 @@ class _Local:
 
     def read(self, at: MotionSamples) -> Numbers:
         """Return the readings (k,) from the own columns of samples."""
-        return self._sensor.read(_LocalInputs(self, at))
+        return self._checked(self._sensor.read(_LocalInputs(self, at)), len(at.q), complex_step=np.iscomplexobj(at.q))
+
+    def _checked(self, readings: Numbers, samples: int, *, complex_step: bool) -> Numbers:
+        """Check what a sensor returns, which may be a user's own class."""
+        field, problem = f"sensor.{self._sensor.name}", ""
+        if np.shape(readings) != (samples,):
+            problem = f"its `read` returns an array of the shape {np.shape(readings)}"
+        elif complex_step and not np.iscomplexobj(readings):
+            problem = "its `read` returns real numbers for complex ones, so that it has no derivatives"
+        if problem:
+            remedy = "return readings (k,), and use no abs, norm or real part: np.sqrt(np.sum(x**2, axis=1))"
+            raise InputError(problem, field=field, remedy=remedy)
+        return readings
 
 
 class _LocalInputs:
@@ -196,7 +216,7 @@ class _LocalInputs:
         assert isinstance(described, FlexibleBeam | AssumedModesBeam)
         at_place = self._local.section_at(beam, described.points[at] if isinstance(at, str) else at)
         if at_place is None:
-            return np.zeros(len(self._at.q))
+            return np.zeros(len(self._at.q), self._at.q.dtype)
         section, stiffness = at_place.section, at_place.material.youngs_modulus
         distance = section.outer_fibre if distance is None else distance
         assert distance is not None

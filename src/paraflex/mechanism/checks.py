@@ -39,7 +39,7 @@ def check_mechanism(mechanism: Members) -> None:
     check_task(mechanism)
     check_loads(mechanism)
     for sensor in mechanism.sensors:
-        sensor.check(mechanism, f"sensor.{sensor.name}")
+        _check_measured(mechanism, sensor)
     check_actuators(mechanism)
 
 
@@ -185,7 +185,19 @@ def check_sensor(mechanism: Members, sensor: Sensor) -> None:
     group = groups_of(type(mechanism))["sensors"]
     _check_joints_of(sensor, group, {joint.name: joint for joint in mechanism.joints})
     _check_points_of(mechanism, group, sensor)
-    sensor.check(mechanism, f"sensor.{sensor.name}")
+    _check_measured(mechanism, sensor)
+
+
+def _check_measured(mechanism: Members, sensor: Sensor) -> None:
+    """Check what a sensor measures, and its location, which a class of the user's own defines."""
+    field = f"sensor.{sensor.name}"
+    sensor.check(mechanism, field)
+    location = sensor.location
+    known(location.frame, mechanism.points, f"{field}.location.frame", "body")
+    if location.point is not None:
+        known_point(mechanism, location.point, f"{field}.location.point")
+    elif location.at is None:
+        known(location.joint, {joint.name: joint for joint in mechanism.joints}, f"{field}.location.joint", "joint")
 
 
 def _two_bodies(mechanism: Members, a: PointRef, b: PointRef, field: str, what: str, remedy: str) -> None:

@@ -81,8 +81,7 @@ def _on_part(sensor: Sensor, beams: Mapping[str, FlexibleBeam]) -> Sensor:
     beam = beams[location.frame]
     place = location.along(beam.points)
     number = _part_at(beam, place)
-    part = {"body": _name(beam, number), "at": place - number * beam.length / beam.frames}
-    return replace(sensor, **part)
+    return sensor.on_part(_name(beam, number), place - number * beam.length / beam.frames)
 
 
 def _name(beam: FlexibleBeam, number: int) -> str:

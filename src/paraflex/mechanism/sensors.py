@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Protocol
 
@@ -181,6 +181,10 @@ class Sensor(CheckedFields, ABC):
         super().__init_subclass__()
         cls.rigid = cls.rigid if rigid is None else rigid
         if kind:
+            if kind in SENSOR_KINDS and SENSOR_KINDS[kind].__qualname__ != cls.__qualname__:
+                raise TypeError(f'there is a sensor of kind "{kind}": {SENSOR_KINDS[kind].__name__}')
+            if not units and cls.unit is Sensor.unit:
+                raise TypeError(f"{cls.__name__} has no unit: give the class units=, or a method `unit`")
             cls.kind, cls.units = kind, units
             SENSOR_KINDS[kind] = cls
 
@@ -206,6 +210,26 @@ class Sensor(CheckedFields, ABC):
         InputError
             The mechanism lacks it; the message begins with `field`.
         """
+
+    def on_part(self, body: str, at: float) -> Sensor:
+        """Return the same sensor on a part of its beam, for a section in a beam of several frames.
+
+        Parameters
+        ----------
+        body : str
+            Part of the beam.
+        at : float
+            Distance of the section from the first end of the part [m].
+
+        Raises
+        ------
+        InputError
+            The kind of sensor cannot be moved.
+        """
+        raise InputError(
+            "measures in a beam of several frames", field=f"sensor.{self.name}", value=self.location.frame,
+            remedy="give the beam one frame, or the sensor's class a method `on_part`",
+        )  # fmt: skip
 
     def unit(self, slides: bool) -> str:
         """Return the SI unit of readings.
@@ -359,6 +383,10 @@ class StrainGauge(Sensor, kind="strain", units=("1",), rigid=False):
     def location(self) -> Location:
         """See `Sensor.location`."""
         return Location(at=self.at, axis="own", frame=self.body)
+
+    def on_part(self, body: str, at: float) -> Sensor:
+        """See `Sensor.on_part`."""
+        return replace(self, body=body, at=at)
 
     def check(self, mechanism: SensedMembers, field: str) -> None:
         """See `Sensor.check`."""
