@@ -619,15 +619,21 @@ def pendulum_with(sensor):
 
 
 def test_a_reading_that_divides_by_a_distance_has_derivatives_and_is_not_taken_for_linear(own):
-    """The distance of the tip from the pin is the length; that of nothing is 0/0 at zero coordinates."""
-    sensor = two_points(lambda place: place[:, 0] ** 2 / np.sqrt(np.sum(place**2, axis=1)))
+    """The tip's distance from where it is at zero coordinates, at which the reading is 0/0."""
+
+    def read(place):
+        apart = place - np.array([0.5, 0.0])
+        return apart[:, 0] ** 2 / np.sqrt(np.sum(apart**2, axis=1))
+
+    sensor = two_points(read)
     system = build_system(pendulum_with(sensor).rigid())
     assert Readings(system, [sensor]).linear == []
     q = reference_pose(system, system.mechanism.assembly("start"))
     still = np.zeros(system.n)
     rows = sensor_rows(system, q, still, still, np.zeros(system.m), np.zeros(1), [sensor])
-    assert rows.q.toarray()[0, :2] == pytest.approx([np.cos(0.3) * (2.0 - np.cos(0.3) ** 2),
-                                                     -np.cos(0.3) ** 2 * np.sin(0.3)], abs=1e-12)  # fmt: skip
+    dx, dy = 0.5 * np.cos(0.3) - 0.5, 0.5 * np.sin(0.3)
+    r = math.hypot(dx, dy)
+    assert rows.q.toarray()[0, :2] == pytest.approx([2.0 * dx / r - dx**3 / r**3, -(dx**2) * dy / r**3], rel=1e-9)
 
 
 @pytest.mark.parametrize(
