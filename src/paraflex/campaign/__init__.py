@@ -20,7 +20,7 @@ from paraflex.campaign.study import (
     no_workers as no_workers,
 )
 from paraflex.campaign.tables import (
-    check_rows as check_rows,
+    checked_rows as checked_rows,
     read_data as read_data,
     read_table as read_table,
     read_tables as read_tables,

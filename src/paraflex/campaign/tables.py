@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sqlite3
-from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from paraflex.campaign.journal import JOURNAL, Journal, read_journal
+from paraflex.campaign.journal import JOURNAL, Journal, Row, read_journal
 from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.interrupts import uninterrupted
 from paraflex.results.parquet import open_parquet, read_parquet
@@ -188,17 +187,23 @@ def _schema(journal: Journal) -> pa.Schema:
         raise sqlite3.DatabaseError("its columns are not noted") from error
 
 
-def check_rows(journal: Journal) -> None:
-    """Check that the rows of a journal have the types of its columns; raise `sqlite3.DatabaseError` if not."""
-    deque(_pieces(journal, _HELD), maxlen=0)
+def checked_rows(journal: Journal) -> Iterator[Row]:
+    """Yield all rows of a journal; raise `sqlite3.DatabaseError` if one has not the types of its columns."""
+    return (row for rows, _ in _batches(journal, _HELD) for row in rows)
 
 
 def _pieces(journal: Journal, size: int) -> Iterator[pa.Table]:
+    return (piece for _, piece in _batches(journal, size))
+
+
+def _batches(journal: Journal, size: int) -> Iterator[tuple[list[Row], pa.Table]]:
+    """Yield the rows of a journal, some at a time, with the table of these."""
     import pyarrow as pa
 
     schema, rows = _schema(journal), journal.rows()
     while some := list(islice(rows, size)):
         try:
-            yield pa.Table.from_pylist(some, schema)
+            piece = pa.Table.from_pylist(some, schema)
         except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
             raise sqlite3.DatabaseError("a row holds what its columns do not") from error
+        yield some, piece

@@ -8,11 +8,8 @@ from paraflex.folders.held import ResultsFolder as ResultsFolder, added_to as ad
 from paraflex.folders.kinds import (
     COMPARISON as COMPARISON,
     DATA_FILES as DATA_FILES,
-    EQUILIBRIA as EQUILIBRIA,
     FOLDER_FILES as FOLDER_FILES,
     LAW_COMPARISON as LAW_COMPARISON,
-    LINEAR_MODELS as LINEAR_MODELS,
-    REDUCED_MODELS as REDUCED_MODELS,
     RESULT_KINDS as RESULT_KINDS,
     RUN as RUN,
     RUN_COMPARISON as RUN_COMPARISON,

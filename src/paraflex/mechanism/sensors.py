@@ -310,7 +310,8 @@ class PointSensor(Sensor):
         ex, ey = unit_vector(self.axis)
         if self.body == GROUND:
             return ex * vector[:, 0] + ey * vector[:, 1]
-        c, s = np.cos(moving.angle(self.body)), np.sin(moving.angle(self.body))
+        angle = moving.angle(self.body)
+        c, s = np.cos(angle), np.sin(angle)
         return (c * ex - s * ey) * vector[:, 0] + (s * ex + c * ey) * vector[:, 1]
 
 

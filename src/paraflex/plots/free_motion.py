@@ -123,7 +123,7 @@ def point_motions(data: xr.Dataset, mode: str | None = None, points: Sequence[st
 def moving_points(run: xr.Dataset) -> list[int]:
     """Return the indices of the named points that move, the end-effector first; at most seven, those that travel most.
 
-    Of coincident points only one is returned.
+    Only one of coincident points is returned.
     """
     places = run["point_position"].transpose("time", "point", "axis").values
     names = names_of(run, "point")

@@ -190,7 +190,7 @@ def _end_markers(system: System, names: Sequence[str]) -> tuple[Marker, ...]:
 def _chord(system: System, names: Sequence[str], q: Array, v: Array) -> tuple[Array, Array]:
     """Return angle and rate of the line from a beam's first end to its last, minus its angle in the undeformed body.
 
-    That angle is zero for a beam. For a rigid body, or if both ends coincide, return those of the body frame.
+    The angle is zero for a beam. For a rigid body, or if both ends coincide, return those of the body frame.
     """
     angle, ends = system.body(names[0]).angle, _end_markers(system, names)
     x, y = ends[1].x0 - ends[0].x0 if ends else (0.0, 0.0)

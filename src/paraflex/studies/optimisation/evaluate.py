@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.campaign import Engine, Journal, LostWorker, Row, check_rows, outcomes
+from paraflex.campaign import Engine, Journal, LostWorker, Row, checked_rows, outcomes
 from paraflex.campaign.study import Result
 from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, lost, run_id, run_task
 from paraflex.designs.setting import Setting
@@ -104,8 +104,7 @@ class Evaluate:
         self.run_slopes = run_slopes
         self.known: dict[Design, Evaluated] = {}
         self.fresh: int = 0
-        check_rows(journal)
-        self._rows = {row["id"]: row for row in journal.rows()}
+        self._rows = {row["id"]: row for row in checked_rows(journal)}
         self._numbers: dict[Design, int] = {}
         self._single = {mode: replace(study.setting, modes=(mode,)) for mode in study.setting.modes}
 
