@@ -72,7 +72,7 @@ def test_balanced_models_come_with_their_bound(tmp_path):
         (["raparm_i", "--method", "magic"], "unknown reduction method"),
         (["raparm_i", "--until", "-1"], "--until: is not positive"),
         (["slider_crank"], "has rigid links only"),
-        (["raparm_i", "--pose", "9,9"], "--pose: the end-effector does not get there"),
+        (["raparm_i", "--pose", "9,9"], "--pose: the end-effector cannot reach it"),
         (["raparm_i", "--method", "balanced"], "damp"),
     ],
 )

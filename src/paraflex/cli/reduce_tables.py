@@ -39,7 +39,7 @@ def print_reduction(out: Console, data: xr.Dataset) -> None:
                  plain_table("mode", "method", numbers=outputs, rows=errors))  # fmt: skip
     heads = [str(k + 1) for k in range(_FREQUENCIES)]
     table = plain_table("mode", "motors", "states", numbers=heads, rows=_frequency_rows(data))
-    print_titled(out, "Frequencies [Hz], how far those of reduced models are off below", table)
+    print_titled(out, "Frequencies [Hz], with the errors of reduced models below", table)
     for mode, name in pairs:
         bound = float(data["bound"].sel(mode=mode, reduction=name))
         if not math.isnan(bound):
