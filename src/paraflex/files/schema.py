@@ -48,7 +48,7 @@ def _number(value: Any, info: ValidationInfo) -> Any:
 
 def _function(value: Any, info: ValidationInfo) -> Any:
     """Return a finite number as a float, or an expression of the time t after a check of its syntax."""
-    example = 'say "0.2 * sin(3 * t)"'
+    example = 'write "0.2 * sin(3 * t)"'
     if isinstance(value, str):
         try:
             check_in_time(value, _parameters(info))
@@ -179,7 +179,7 @@ def _number_or_word(words: Sequence[str]) -> Any:
         if value.isidentifier() and value not in {*_parameters(info), *CONSTANTS}:
             if not words:
                 return value
-            raise _refused("neither such a word nor a number", 'an angle may have a unit, "30 deg"')
+            raise _refused("neither a known word nor a number", 'an angle may have a unit, "30 deg"')
         return _number(value, info)
 
     numbers: Any = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
