@@ -398,7 +398,7 @@ def test_the_command_makes_a_film_and_writes_over_none(folder, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--size", "wide"], "--size: not a size (got 'wide'); write width and height, say 1280x720"),
+        (["--size", "wide"], "--size: not a size (got 'wide'); write width and height, such as 1280x720"),
         (["--mode", "+++"], "--mode: no such mode in these results (got '+++')"),
         (["--theme", "drak"], "--theme: unknown theme (got 'drak'); did you mean \"dark\"?"),
         (["--magnify", "-2"], "--magnify: must not be negative"),

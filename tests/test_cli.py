@@ -226,7 +226,7 @@ def test_modes_of_a_model_without_any_are_sets_of_motors_that_suffice(tmp_path):
         if row["mode"] in known:
             assert row["condition_max"] == pytest.approx(known[row["mode"]]["condition_max"], rel=1e-12)
     assert "RAParM-I has no [mode] tables" in done.stderr
-    assert "ask for some by --mode tau2,tau6" in done.stderr
+    assert "choose some by --mode tau2,tau6" in done.stderr
     table = paraflex("modes", without(["mode", "study"], "raparm_i", tmp_path))
     assert "tau5, tau6" in table.stdout
     assert "has no [mode] tables" in table.stderr

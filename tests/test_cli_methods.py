@@ -50,8 +50,8 @@ def test_events_are_read(text, event):
             "--constraints: newmark cannot keep the constraints in this way .*position",
         ),
         ({"constraints": "ggl", "automatic_gains": True}, "--automatic-gains: .*choose --constraints baumgarte"),
-        ({"automatic_gains": True, "alpha": 3.0}, "--alpha: means nothing with --automatic-gains"),
-        ({"constraints": "ggl", "beta": 3.0}, "--beta: means nothing where ggl keeps the constraints"),
+        ({"automatic_gains": True, "alpha": 3.0}, "--alpha: has no effect with --automatic-gains"),
+        ({"constraints": "ggl", "beta": 3.0}, "--beta: has no effect where ggl keeps the constraints"),
         ({"stop_at": ["speed=1"]}, "--stop-at: not an event .*write joint:NAME=LOW..HIGH"),
         ({"stop_at": ["joint:A1"]}, "--stop-at: not an event"),
         ({"stop_at": ["joint=0..1"]}, "--stop-at: not an event"),
@@ -159,8 +159,8 @@ def test_a_study_stopped_by_an_event_is_a_success(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["run", "--ked", "--method", "newmark"], "--method: means nothing with --ked (got 'newmark')"),
-        (["run", "--ked", "--stop-at", "singular=0.1"], "--stop-at: means nothing with --ked (got 'singular=0.1')"),
+        (["run", "--ked", "--method", "newmark"], "--method: has no effect with --ked (got 'newmark')"),
+        (["run", "--ked", "--stop-at", "singular=0.1"], "--stop-at: has no effect with --ked (got 'singular=0.1')"),
         (["run", "--stop-at", "joint:A9=0..1"], "--stop-at: unknown joint A9 (got 'joint:A9=0..1'); choose from A1"),
         (
             ["run", "--stop-at", "joint:A1=..80 mm"],

@@ -104,9 +104,9 @@ def test_run_at_other_fidelities(tmp_path, flag, extra, largest):
     [
         (["--rigid", "--ked"], "--rigid: cannot be combined (got '--rigid --ked'); choose one of them"),
         (["--segments", "4", "--geometry", "linear"], "--segments: cannot be combined"),
-        (["--segments", "0"], "--segments: must be positive (got 0); say 8"),
-        (["--ked", "--tol", "1e-4"], "--tol: means nothing with --ked (got 0.0001); its steps are fixed"),
-        (["--ked", "--balanced"], "--balanced: means nothing with --ked"),
+        (["--segments", "0"], "--segments: must be positive (got 0); give 8"),
+        (["--ked", "--tol", "1e-4"], "--tol: has no effect with --ked (got 0.0001); its steps are fixed"),
+        (["--ked", "--balanced"], "--balanced: has no effect with --ked"),
     ],
 )
 def test_fidelities_exclude_one_another(tmp_path, arguments, says):

@@ -40,7 +40,7 @@ def test_nothing_is_written_over(tmp_path):
     (tmp_path / "mine.toml").write_text("precious")
     done = paraflex("new", "mine.toml", cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr == "error: mine.toml: there is one already; choose another name, or remove it\n"
+    assert done.stderr == "error: mine.toml: already exists; choose another name, or remove it\n"
     assert (tmp_path / "mine.toml").read_text() == "precious"
 
 

@@ -87,7 +87,7 @@ def test_frames_are_chosen_on_the_command_line(tmp_path):
     assert len(set(errors.values())) == 3
     for arguments, says in (
         (("--reference", "pined"), "--reference: unknown reference"),
-        (("--rigid", "--curvature", "shared"), "--curvature: means nothing with --rigid"),
+        (("--rigid", "--curvature", "shared"), "--curvature: has no effect with --rigid"),
     ):
         refused = paraflex("run", "--no-figures", "--out", str(tmp_path / "none"), *arguments)
         assert refused.returncode == 2

@@ -322,7 +322,7 @@ def test_the_model_file_and_the_command_line_say_so(tmp_path):
     assert done.returncode == 2
     assert "--after: unknown ending (got 'brake')" in done.stderr
     done = paraflex("run", "--no-figures", "-m", "raparm_i", "--ked", "--after", "hold", cwd=tmp_path)
-    assert "--after: means nothing with --ked" in done.stderr
+    assert "--after: has no effect with --ked" in done.stderr
     done = paraflex("run", "--no-figures", "-m", "pendulum", "--after", "hold", cwd=tmp_path)
     assert "--after: the model has no path after which motors could be held" in done.stderr
 

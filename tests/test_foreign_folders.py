@@ -289,8 +289,8 @@ def test_what_results_without_a_seal_lead_to_is_one_line(tmp_path):
     done = paraflex("compare", str(tmp_path / "whole.nc"), str(tmp_path / "turned.nc"))
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
-        f"error: {tmp_path / 'turned.nc'}: holds something else than what paraflex writes (ValueError); "
-        "run again what made it"
+        f"error: {tmp_path / 'turned.nc'}: holds something other than what paraflex writes (ValueError); "
+        "repeat the command that wrote it"
     ]
 
 
@@ -299,7 +299,7 @@ def test_what_plain_numbers_without_a_digest_lead_to_is_one_line(tmp_path):
     (tmp_path / "sensitivity.json").write_text(json.dumps(numbers))
     done = paraflex("plot", str(tmp_path), "all")
     assert done.returncode == 2
-    assert done.stderr.startswith(f"error: {tmp_path / 'sensitivity.json'}: holds something else than what paraflex")
+    assert done.stderr.startswith(f"error: {tmp_path / 'sensitivity.json'}: holds something other than what paraflex")
 
 
 def test_control_characters_in_names_and_endless_names_leave_pictures_whole(tmp_path):

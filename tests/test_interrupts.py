@@ -152,7 +152,7 @@ def test_a_sweep_ends_with_its_rows_and_all_its_processes(study, tmp_path, engin
         wait_until(lambda: not child.descendants(), within=30.0, what="the end of workers")
     assert done.returncode == 128 + number, done.stderr
     assert "interrupted; " in done.stderr
-    assert "the same command goes on from there" in done.stderr
+    assert "the same command continues from there" in done.stderr
     assert "Traceback" not in done.stderr
     assert "resource_tracker" not in done.stderr
     assert rows_in(out) > 0
@@ -184,7 +184,7 @@ def test_processes_that_compile_end_with_the_command(tmp_path, number, code):
     assert done.returncode == code
     assert "Traceback" not in done.stderr
     if code > 0:
-        assert done.stderr.splitlines()[-1] == "interrupted; the same command begins anew"
+        assert done.stderr.splitlines()[-1] == "interrupted; the same command starts over"
 
 
 @pytest.mark.parametrize(("number", "code"), ENDING)
@@ -205,7 +205,7 @@ def test_libraries_do_not_keep_a_command_from_ending(script, when, last):
         child.until(lambda: when in child.out)
         child.send(signal.SIGTERM)
         done = child.end()
-    assert (done.returncode, done.stderr) == (143, "interrupted; the same command begins anew\n")
+    assert (done.returncode, done.stderr) == (143, "interrupted; the same command starts over\n")
     # An import is brought to its end: half of one can be neither used nor begun again.
     assert done.stdout.split()[-1] == last
 

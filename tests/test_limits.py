@@ -137,7 +137,7 @@ def test_a_folder_that_no_file_system_can_have(command):
     run = paraflex(*command, "o" * 300)
     assert run.returncode == 2
     assert "\n" not in run.stderr.strip()
-    assert re.match(r"\s*error: .*file name too long|error: file: too long a name|error: there: ", run.stderr)
+    assert re.match(r"\s*error: .*file name too long|error: file: the name is too long|error: there: ", run.stderr)
 
 
 def test_a_model_whose_name_no_file_can_have():

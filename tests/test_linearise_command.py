@@ -298,12 +298,12 @@ def test_about_the_runs_of_a_folder(tmp_path):
     assert paraflex("run", "--no-figures", *line, "--samples", "5", "--no-report", "--out", changed).returncode == 0
     file.write_text(library_text("five_bar").replace("mass = 0.100", "mass = 0.200", 1))
     for words, problem in (
-        ([tmp_path / "path", "--pose", "start"], "--pose: means nothing for results"),
+        ([tmp_path / "path", "--pose", "start"], "--pose: has no effect on results"),
         ([tmp_path / "path", "--mode", "+-"], "--mode: no such mode in these results"),
         ([tmp_path / "own", "--mode", "+-"], "--mode: no such mode in these results"),
         ([tmp_path / "path", "--at", "9"], "--at: is not a time of the motion"),
         ([tmp_path], f"{tmp_path}: no results in this folder"),
-        ([changed], f"{changed}: these results are of another state"),
+        ([changed], f"{changed}: these results are of another version"),
     ):
         done = paraflex("linearise", *words)
         assert (done.returncode, done.stderr.splitlines()[-1][: len(problem) + 7]) == (2, f"error: {problem}")
@@ -341,12 +341,12 @@ BAD = [
     (["slider_crank_flexible", "--at", "9"], "--at: is not a time of the motion (got 9.0); choose one up to 0.1 s"),
     (["five_bar", "--at", "0.1", "--pose", "outward"], "--at: is about a motion, --pose about rest"),
     (["five_bar", "--along", "9", "--balanced"], "--along: is about a motion, --balanced about rest"),
-    (["five_bar", "--along", "1"], "--along: not a number of moments"),
+    (["five_bar", "--along", "1"], "--along: not a valid number of times"),
     (["five_bar", "--pose", "nothing"], "--pose: no such pose"),
     (["five_bar", "--pose", "start"], "--pose: no such pose"),
-    (["five_bar", "--pose", "9,9"], "--pose: the end-effector does not get there"),
-    (["five_bar", "--pose", "a,b"], "--pose: not a place"),
-    (["four_bar", "--pose", "1,2"], "--pose: no end-effector with a place"),
+    (["five_bar", "--pose", "9,9"], "--pose: the end-effector cannot reach it"),
+    (["five_bar", "--pose", "a,b"], "--pose: not a position"),
+    (["four_bar", "--pose", "1,2"], "--pose: no end-effector with a position"),
     (["five_bar", "--pose", "1,2", "--assembly", "x"], "--assembly: names the pose as --pose does"),
     (["five_bar", "--force-at", "link1.Z"], "--force-at: unknown body"),
     (["five_bar", "--coordinates", "x"], "--coordinates: unknown first coordinates (got 'x')"),

@@ -274,7 +274,7 @@ def test_torques_of_a_file_hold_an_arm_level(tmp_path):
     assert simulate_motion(load(file), 1.0, samples=3, torques={}).solution.q[-1, 2] < -1.0
     done = paraflex("run", "-m", str(file), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
-    assert "--duration: the model has no path, and nothing says how long it is to run" in done.stderr
+    assert "--duration: the model has no path, and its run has no duration" in done.stderr
     done = paraflex("run", "-m", str(file), "--duration", "1", "--json", "--out", str(tmp_path / "out"))
     assert abs(json.loads(done.stdout)["final"]["angle"]["arm"]) < 1e-9
     file.write_text(SHORT.replace("drive = 4.905", "drvie = 4.905"))

@@ -543,7 +543,7 @@ def test_control_c_keeps_what_is_done(tmp_path):
     assert done.returncode == 130, done.stderr
     assert "interrupted" in done.stdout
     assert "objective" in done.stdout
-    assert "the same command goes on from there" in done.stderr
+    assert "the same command continues from there" in done.stderr
     assert len(pd.read_parquet(out / "unfinished.parquet")) > 0
     assert json.loads((out / "result.json").read_text())["interrupted"]
 

@@ -173,7 +173,7 @@ def test_info_prints_it(tmp_path):
     (tmp_path / "model.toml").write_text(text)
     done = CliRunner().invoke(app, ["info", str(tmp_path / "model.toml")])
     assert "0.2 kg, 3e-05 kg m^2 at distal1.C" in done.output
-    assert "its payload among it" in done.output
+    assert "including its payload" in done.output
     assert "payload" not in CliRunner().invoke(app, ["info", "five_bar"]).output
 
 

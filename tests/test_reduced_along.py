@@ -266,12 +266,12 @@ def test_bases_that_cannot_be_taken_over():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--along", "5", "--basis", "0,9"], "--basis: the end-effector does not get there (got '0,9')"),
+        (["--along", "5", "--basis", "0,9"], "--basis: the end-effector cannot reach it (got '0,9')"),
         (["--along", "5", "--basis", "nowhere"], "--basis: no such pose (got 'nowhere')"),
         (["--basis", "0,0.264"], "--basis: is the pose whose basis is taken along a path"),
         (["--along", "5", "--method", "modal"], "--method: have no basis that other poses could take over"),
         (["--along", "5", "--pose", "0,0.264"], "--along: is about a motion, --pose about rest"),
-        (["--along", "1"], "--along: not a number of moments"),
+        (["--along", "1"], "--along: not a valid number of times"),
         (["--along", "9999"], "--along: more poses than samples of the motion that lie apart"),
     ],
 )

@@ -90,7 +90,7 @@ def test_results_of_another_kind_are_named_with_the_files_they_lose(paraflex, mo
     date = dated(tmp_path / "here", ["study.json"])
     _, err = paraflex(*RUN, "--out", "here", "--force")
     said = f'here holds a sweep "bars" of 1 run, {date}; it will be replaced (--out another folder keeps both)'
-    assert err.splitlines()[:2] == [said, "here holds files that are not of paraflex and stay: notes.txt"]
+    assert err.splitlines()[:2] == [said, "here holds files not written by paraflex, which stay: notes.txt"]
     assert {file.name for file in (tmp_path / "here").iterdir()} == {
         ".lock", "figures", "manifest.json", "notes.txt", "results.nc", "summary.json",
     }  # fmt: skip
@@ -157,4 +157,4 @@ def test_other_files_are_named(tmp_path, capsys):
         (tmp_path / name).write_text("mine")
     say_replaced(tmp_path)
     said = capsys.readouterr().err
-    assert said == f"{tmp_path} holds files that are not of paraflex and stay: a, b, c and 2 more\n"
+    assert said == f"{tmp_path} holds files not written by paraflex, which stay: a, b, c and 2 more\n"

@@ -402,7 +402,7 @@ def test_the_report_is_written_again_the_same(ran, tmp_path):
     before = (out / "report.html").read_bytes()
     refused = paraflex("report", str(out))
     assert refused.returncode == 2
-    assert "is there already; say --force to write over it" in refused.stderr
+    assert "already exists; give --force to overwrite it" in refused.stderr
     assert paraflex("report", str(out), "--output", str(tmp_path / "again.html")).returncode == 0
     assert (tmp_path / "again.html").read_bytes() == before
     (out / "report.html").write_text("old")

@@ -127,7 +127,7 @@ def test_every_command_that_takes_a_model_takes_settings(command):
     wrong = paraflex(*command.split(), "five_bar", "--set", "bar.thickness=6 kg")
     assert wrong.returncode == 2
     assert "five_bar.toml: section.bar.thickness: a quantity in kg where one in m is asked for" in wrong.stderr
-    lacks = "--set: no field and value"
+    lacks = "--set: not FIELD=VALUE"
     for text, says in (
         ("bar.thickness", lacks),
         ("=3", lacks),

@@ -426,7 +426,7 @@ def test_a_deflection_from_a_file(tmp_path):
             ["--balanced"],
             "--balanced: the [start] gives",
         ),
-        ("[start.velocity]\nangular = { rod = 1.0 }", ["--segments", "4"], "--segments: the file's [start] speaks of"),
+        ("[start.velocity]\nangular = { rod = 1.0 }", ["--segments", "4"], "--segments: the file's [start] refers to"),
         (
             "[start.velocity]\nangualr = { rod = 1.0 }",
             [],

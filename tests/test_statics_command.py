@@ -108,7 +108,7 @@ def test_a_mechanism_that_turns_freely_is_refused_with_the_remedy():
     ("arguments", "message"),
     [
         (["--load", "stage.T.z=1"], "--load: is neither a joint nor a coordinate of a point (got 'stage.T.z')"),
-        (["--load", "stage.T.x"], "--load: no name and value (got 'stage.T.x')"),
+        (["--load", "stage.T.x"], "--load: not NAME=VALUE (got 'stage.T.x')"),
         (["--load", "stage.T.x=1 mm"], "--load stage.T.x: a quantity in m where one in N is asked for"),
         (["--move", "stage.T.x=1 m", "--hold", "stage.T.x"], "--hold: is given twice"),
         (["--move", "A=1"], "--move: holds its angle"),

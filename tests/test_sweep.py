@@ -517,7 +517,7 @@ def test_command_line(tmp_path):
     first = shell(*command, "--limit", "2")
     assert first.returncode == 0, first.stderr
     assert "2 of 4 runs: 2 complete" in first.stdout
-    assert "the same command goes on from there" in first.stderr
+    assert "the same command continues from there" in first.stderr
     again = shell(*command, "--json")
     assert again.returncode == 0, again.stderr
     figures = json.loads(again.stdout)

@@ -204,6 +204,6 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(study, tmp_path):
         done = child.end()
     assert done.returncode == 130
     assert "of 8192 runs:" in done.stdout
-    assert "the same command goes on from there" in done.stderr
+    assert "the same command continues from there" in done.stderr
     assert "Traceback" not in done.stderr
     assert 0 < len(pd.read_parquet(out / "unfinished.parquet")) < 8192

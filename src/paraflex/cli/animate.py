@@ -72,7 +72,7 @@ def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film])
 def _size(text: str) -> tuple[int, int]:
     found = re.fullmatch(r"(\d+)[x×](\d+)", text)
     if found is None:
-        raise InputError("not a size", field="size", value=text, remedy="write width and height, say 1280x720")
+        raise InputError("not a size", field="size", value=text, remedy="write width and height, such as 1280x720")
     return int(found[1]), int(found[2])
 
 

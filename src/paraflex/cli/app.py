@@ -82,14 +82,14 @@ def main() -> None:
         # A file name that is too long raises this error wherever the file is first looked up.
         if error.errno != errno.ENAMETOOLONG:
             raise
-        _complain(InputError("too long a name", field="file", value=error.filename, remedy="choose a shorter one"))
+        _complain(InputError("the name is too long", field="file", value=error.filename, remedy="choose a shorter one"))
         sys.exit(BAD_INPUT)
     except Exception as error:
         # An unsealed file may hold anything and so lead to any error; otherwise the traceback is wanted.
         if not unsealed:
             raise
-        why = f"holds something else than what paraflex writes ({type(error).__name__})"
-        _complain(InputError(why, field=str(unsealed[-1]), remedy="run again what made it"))
+        why = f"holds something other than what paraflex writes ({type(error).__name__})"
+        _complain(InputError(why, field=str(unsealed[-1]), remedy="repeat the command that wrote it"))
         sys.exit(BAD_INPUT)
     except KeyboardInterrupt as interrupt:
         typer.echo(": ".join(["interrupted", *map(str, interrupt.args)]), err=True)

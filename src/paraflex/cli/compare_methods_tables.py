@@ -31,8 +31,8 @@ def print_comparison(console: Console, summary: dict[str, Any]) -> None:
         return
     console.print(
         f"{summary['mechanism']}, {summary['case']}, {summary['duration']:g} s. Errors are distances from "
-        f"{reference['method']} at {reference['tolerance']:g} m, certain to {reference['uncertainty']:.0e} m "
-        f"(as far as {reference['check_method']} at {reference['check_tolerance']:g} m is off).",
+        f"{reference['method']} at {reference['tolerance']:g} m, known to {reference['uncertainty']:.0e} m "
+        f"(the distance of {reference['check_method']} at {reference['check_tolerance']:g} m).",
         soft_wrap=True,
     )
     done = {
@@ -81,7 +81,7 @@ def _print_reasons(console: Console, methods: dict[str, Any]) -> None:
             if run["status"] != "complete":
                 console.print(f"{name}{where}: {run['status']}, {run['reason']}", soft_wrap=True)
             for text in run["warnings"]:
-                console.print(f"{name}{where}: warns: {text}", soft_wrap=True)
+                console.print(f"{name}{where}: warning: {text}", soft_wrap=True)
 
 
 def _setting(run: dict[str, Any]) -> str:

@@ -35,7 +35,7 @@ def print_laws(console: Console, result: LawComparison) -> None:
     for line in (*_reasons(result), *_doubtful(result)):
         console.print(line, soft_wrap=True)
     if result.interrupted:
-        console.print("interrupted: what is not run begins anew with the same command", soft_wrap=True)
+        console.print("interrupted before all laws had run: the same command starts over", soft_wrap=True)
 
 
 def _heading(data: xr.Dataset, name: str) -> str:

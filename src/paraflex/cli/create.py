@@ -20,7 +20,7 @@ def new_command(request: NewRequest) -> None:
         text = library_text(template)
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if path.exists():
-        raise OutputError("there is one already", field=str(path), remedy="choose another name, or remove it")
+        raise OutputError("already exists", field=str(path), remedy="choose another name, or remove it")
     text = re.sub(r'^name = ".*"$', lambda _: f"name = {json.dumps(path.stem)}", text, count=1, flags=re.MULTILINE)
     write_text(path, text, parents=False)
     console = plain_console()

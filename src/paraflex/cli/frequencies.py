@@ -66,7 +66,7 @@ def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:
 def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float, path: str | None) -> State:
     """Return the pose of the rigid mechanism at the time `at` [s], on its path or by its prescribed angles."""
     if not (math.isfinite(at) and at >= 0.0):
-        raise InputError("not a time of the motion", field="--at", value=at, remedy="give it in s, from 0 on")
+        raise InputError("not a time of the motion", field="--at", value=at, remedy="give it in s, not negative")
     if path is not None or model.paths:
         motion = follow_path(model.mechanism, model.path(path), [0.0, at] if at else [0.0], assembly=assembly)
         return State(at, motion.q[-1], np.zeros(rigid.n))

@@ -42,6 +42,6 @@ def _report(console: Console, result: IdentificationResult) -> None:
     else:
         described = ", ".join(f"{share:+.2f} {name}" for name, share in found.weakest.items())
         console.print(
-            f"the targets cannot tell the parameters apart (condition {found.condition:.3g}): they hardly change along "
-            f"{described}, in shares of the ranges"
+            f"the targets cannot distinguish the parameters (condition {found.condition:.3g}): they hardly change "
+            f"along {described}, as fractions of the ranges"
         )

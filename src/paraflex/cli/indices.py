@@ -28,7 +28,9 @@ def indices_command(request: IndicesRequest) -> int:
             on_progress=lambda at: progress.update(bar, completed=at.done),
         )  # fmt: skip
     if not result.complete:
-        console.print(f"interrupted; so far: {result.sweep.table}; the same command goes on from there", soft_wrap=True)
+        console.print(
+            f"interrupted; so far: {result.sweep.table}; the same command continues from there", soft_wrap=True
+        )
         return signals.exit_code()
     numbers = result.to_dict()
     verdict = study.sweep.setting.verdict()

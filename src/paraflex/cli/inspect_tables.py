@@ -29,8 +29,8 @@ def print_library(facts: Sequence[dict[str, Any]]) -> None:
             runs += f" for {one['duration']:g} s"
         console.print(f"{one['name']}: {freedoms}bodies {one['bodies']}, {motors}; runs {runs}", soft_wrap=True)
         console.print(Padding(one["description"], (0, 0, 0, 4)))
-    console.print(f"and of any size, a number behind the name: {', '.join(generator_names())}")
-    console.print("paraflex info NAME tells more; paraflex new FILE --from NAME copies one to edit")
+    console.print(f"and of any size, with a number after the name: {', '.join(generator_names())}")
+    console.print("paraflex info NAME describes one; paraflex new FILE --from NAME copies one to edit")
 
 
 def print_facts(facts: dict[str, Any]) -> None:
@@ -61,7 +61,7 @@ def print_verdict(console: Console, facts: dict[str, Any]) -> None:
     for one in verdict["findings"]:
         console.print(f"{one['level']}: {one['place']}: {one['text']}; {one['remedy']} [{one['code']}]", soft_wrap=True)
     if verdict["level"] == Level.SOUND.value:
-        drives = ", every mode drives all that is free" if facts["modes"] else ""
+        drives = ", every mode drives all degrees of freedom" if facts["modes"] else ""
         paths = "paths" if facts["several_paths"] else "path"
         path = f", the study's {paths} can be followed" if facts["paths"] else ""
         console.print(f"sound: every assembly closes, the pose is not a special one{drives}{path}", soft_wrap=True)
@@ -99,7 +99,7 @@ def _counts(facts: dict[str, Any]) -> Table:
         if key in facts and (facts[key] or key not in (*related, "actuators", "prescribed", "loads")):
             value = facts[key]
             if key == "total_mass" and facts["payload"]:
-                table.add_row(label, f"{value:g}, its payload among it")
+                table.add_row(label, f"{value:g}, including its payload")
                 table.add_row("payload", _payload(facts["payload"]))
                 continue
             table.add_row(label, (few(value, _LISTED) or "none") if isinstance(value, list) else f"{value:g}")
@@ -123,7 +123,7 @@ def _print_some(console: Console, lines: Sequence[str], count: int, what: str = 
 
 
 def _print_starts(console: Console, facts: dict[str, Any]) -> None:
-    headings = ("assembly", "gap of the angles given", "closed to [m, rad]", "rates to [1/s]", "remaining gap", "where")
+    headings = ("assembly", "gap of the given angles", "closed to [m, rad]", "rates to [1/s]", "remaining gap", "where")
     table = framed_table("assemblies, rigid", headings, right=(1, 2, 3, 4))
     for start in facts["starts"]:
         numbers = ["" if start[key] is None else f"{start[key]:.2g}" for key in ("gap_before", "position", "velocity")]
@@ -170,19 +170,19 @@ def _print_frequencies(console: Console, facts: dict[str, Any]) -> None:
             console.print(f"  {label}: {lowest or 'none: nothing can move'}", soft_wrap=True)
     if found["growing"]:
         where = (
-            "unstable there" if found["is_equilibrium"] else "the pose is no equilibrium, so that this may be its fall"
+            "unstable there" if found["is_equilibrium"] else "the pose is not an equilibrium, so this may be its fall"
         )
         console.print(f"  {found['growing']} motion(s) grow instead of vibrating: {where}")
     if not found["is_equilibrium"]:
         nearby = (
             "--balanced takes the equilibrium nearby"
             if found["equilibrium_nearby"]
-            else "with its motors held, too, there is none nearby"
+            else "there is none nearby, even with its motors held"
             if motors
             else "there is none nearby"
         )
         console.print(
-            f"  not an equilibrium: let go it would start with {found['acceleration']:.3g} m/s^2, root mean square "
-            f"over the mass; {nearby}",
+            f"  not an equilibrium: when released it would start with {found['acceleration']:.3g} m/s^2, root mean "
+            f"square over the mass; {nearby}",
             soft_wrap=True,
         )

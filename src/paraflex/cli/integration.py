@@ -74,10 +74,10 @@ def _check_coefficients(request: RunRequest, options: IntegrationOptions) -> Non
         if value is None:
             continue
         if options.automatic_gains:
-            raise conflict("means nothing with --automatic-gains", flag, value)
+            raise conflict("has no effect with --automatic-gains", flag, value)
         if options.treatment is not Treatment.BAUMGARTE:
             raise InputError(
-                f"means nothing where {options.treatment.value} keeps the constraints", field=flag, value=value,
+                f"has no effect where {options.treatment.value} keeps the constraints", field=flag, value=value,
                 remedy="leave it out, or choose --constraints baumgarte with a method that has it",
             )  # fmt: skip
 
@@ -86,7 +86,7 @@ def _parameter(text: str) -> tuple[str, float]:
     name, sign, value = text.partition("=")
     if not (sign and name.strip()):
         raise InputError(
-            "not NAME=VALUE", field="--method-parameter", value=text, remedy='say "spectral_radius=0.8"; '
+            "not NAME=VALUE", field="--method-parameter", value=text, remedy='write "spectral_radius=0.8"; '
             "paraflex methods lists the parameters",
         )  # fmt: skip
     return name.strip(), _number(value, "--method-parameter", text)
@@ -118,7 +118,10 @@ def _range(value: str, text: str) -> tuple[float, float]:
     low, dots, high = value.partition("..")
     if not dots or not (low.strip() or high.strip()):
         raise InputError(
-            "not a range", field="--stop-at", value=text, remedy="write LOW..HIGH; either may be left out, say ..1.4"
+            "not a range",
+            field="--stop-at",
+            value=text,
+            remedy="write LOW..HIGH; either may be left out, such as ..1.4",
         )
     lower = _number(low, "--stop-at", text, _OF_JOINT) if low.strip() else -math.inf
     return lower, _number(high, "--stop-at", text, _OF_JOINT) if high.strip() else math.inf

@@ -64,7 +64,7 @@ def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModel
     for flag, value in given.items():
         if value:
             raise InputError(
-                "means nothing for results, which are what they are", field=flag, value=str(value),
+                "has no effect on results, which are already computed", field=flag, value=str(value),
                 remedy="leave it out, or name the model",
             )  # fmt: skip
     from paraflex.cli.repeated import repeated_runs  # imports the reports, which rebuild the command of a run
@@ -91,10 +91,15 @@ def _check(request: LinearRequest) -> None:
             if given is not None:
                 raise conflict(f"is about a motion, {other} about rest", flag, value)
     if request.at is not None and not (math.isfinite(request.at) and request.at >= 0.0):
-        raise InputError("not a time of the motion", field="--at", value=request.at, remedy="give it in s, from 0 on")
+        raise InputError(
+            "not a time of the motion", field="--at", value=request.at, remedy="give it in s, not negative"
+        )
     if request.along is not None and not 2 <= request.along <= _MOST_MOMENTS:
         raise InputError(
-            "not a number of moments", field="--along", value=request.along, remedy=f"from 2 to {_MOST_MOMENTS}"
+            "not a valid number of times",
+            field="--along",
+            value=request.along,
+            remedy=f"give from 2 to {_MOST_MOMENTS}",
         )
     if request.pose is not None and request.assembly is not None:
         raise conflict("names the pose as --pose does", "--assembly", request.assembly)
@@ -180,7 +185,7 @@ def pose_asked(model: Model, wanted: str | None, assembly: str | None, flag: str
 
 def _poses(model: Model) -> str:
     names = [one.name for one in model.mechanism.assemblies] + ([START] if model.start is not None else [])
-    return f"choose from {', '.join(names)}; or give the end-effector's place, X,Y in m" if names else "leave it out"
+    return f"choose from {', '.join(names)}; or give the end-effector's position, X,Y in m" if names else "leave it out"
 
 
 def _at_place(model: Model, text: str, flag: str) -> State:
@@ -188,16 +193,18 @@ def _at_place(model: Model, text: str, flag: str) -> State:
     parts = [part.strip() for part in text.split(",")]
     effector = model.mechanism.end_effector
     if effector is None or not {"x", "y"} <= set(effector.coordinates):
-        raise InputError("no end-effector with a place", field=flag, value=text, remedy="name an assembly")
+        raise InputError("no end-effector with a position", field=flag, value=text, remedy="name an assembly")
     try:
         x, y = (number_in(part, "m") for part in parts)
     except (InputError, ValueError) as error:
-        raise InputError("not a place", field=flag, value=text, remedy='say 0.05,0.314 or "50 mm, 314 mm"') from error
+        raise InputError(
+            "not a position", field=flag, value=text, remedy='write 0.05,0.314 or "50 mm, 314 mm"'
+        ) from error
     try:
         q = pose_at(model.mechanism, (x, y), assembly=model.study.assembly)
     except AssemblyError as error:
         raise InputError(
-            "the end-effector does not get there", field=flag, value=text, remedy="choose a place within its reach"
+            "the end-effector cannot reach it", field=flag, value=text, remedy="choose a position within its reach"
         ) from error
     system, rigid = build_system(model.mechanism), build_system(model.mechanism.rigid())
     return undeformed(system, rigid, State(0.0, q, np.zeros(rigid.n)))
@@ -214,9 +221,9 @@ def _at_rest(model: Model, pose: State, mode: ActuationMode, balanced: bool, por
     if free and found.unbalanced > BALANCED:
         remain = "one motion remains" if free == 1 else f"{free} motions remain"
         raise InputError(
-            f"it does not hold the mechanism in this pose: with its motors held {remain} free, and let go it would "
-            f"start with {found.unbalanced:.3g} m/s^2",
-            field="--mode", value=mode.name, remedy="name more motors, or say --balanced for a pose in which it stays",
+            f"it does not hold the mechanism in this pose: with its motors held {remain} free, and when released it "
+            f"would start with {found.unbalanced:.3g} m/s^2",
+            field="--mode", value=mode.name, remedy="name more motors, or give --balanced for a pose in equilibrium",
         )  # fmt: skip
     return found
 

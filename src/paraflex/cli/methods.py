@@ -27,7 +27,7 @@ def methods_command(request: MethodsRequest) -> None:
     )
     heads = ("method", "parameter", "default", "range", "meaning")
     out.print(plain_table(*heads, rows=parameters, title="their parameters", wrapped=heads[2:]))
-    out.print(f"The default is {DEFAULT_METHOD}; of what keeps the constraints, the first.")
+    out.print(f"The default is {DEFAULT_METHOD}; of the treatments of constraints, the first.")
 
 
 def _row(method: Method) -> list[str]:

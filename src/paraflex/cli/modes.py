@@ -117,12 +117,12 @@ def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: i
         left = f" ({more} more sets suffice)" if more else ""
         lines.append(
             f"{mechanism.name} has no [mode] tables; listed are {sets}{left}: "
-            f"ask for some by --mode {','.join(rows[0]['motors'])}"
+            f"choose some by --mode {','.join(rows[0]['motors'])}"
         )
     if not model.paths and path is None:
         lines.append(f"{mechanism.name} has no path: add [path.NAME], or name a file by --path, to see what drives it")
     elif mechanism.end_effector is None:
-        lines.append(f"{mechanism.name} has no [end_effector] to follow a path: what drives it cannot be said")
+        lines.append(f"{mechanism.name} has no [end_effector] to follow a path: what drives it cannot be determined")
     return lines
 
 

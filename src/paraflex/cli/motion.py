@@ -170,7 +170,7 @@ def own_motion(model: Model, chosen: PlanChoice) -> StudyDefaults:
     study = model.study.filled(**asdict(chosen))
     if study.duration is None:
         raise InputError(
-            "the model has no path, and nothing says how long it is to run",
+            "the model has no path, and its run has no duration",
             field="--duration",
             remedy="give it in seconds",
         )

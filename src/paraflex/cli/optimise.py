@@ -33,4 +33,4 @@ def _report(members: Members, console: Console, result: OptimisationResult) -> N
             of, over = (f"{unit.factor * one:.6g} {unit.name}".rstrip() for one in (limit, value - limit))
             console.print(f"limit exceeded: {name} is above {of} by {over}", soft_wrap=True)
     if not result.holds_limits:
-        console.print("no design keeps all limits: this one, and best.toml, exceed them least and do not satisfy them")
+        console.print("no design satisfies all limits: this one, in best.toml, exceeds them least")

@@ -41,7 +41,7 @@ def _along(found: AskedModels, request: ReduceRequest) -> list[PosesAlong]:
     if request.along is None:
         if request.basis is not None:
             raise InputError("is the pose whose basis is taken along a path", field="--basis", value=request.basis,
-                             remedy="say how many poses: --along 21")  # fmt: skip
+                             remedy="give the number of poses: --along 21")  # fmt: skip
         return []
     pose = None if request.basis is None else pose_asked(found.model, request.basis, request.assembly, "--basis")
     with renamed("--along", only="count"):

@@ -39,11 +39,11 @@ def print_reduction(out: Console, data: xr.Dataset) -> None:
                  plain_table("mode", "method", numbers=outputs, rows=errors))  # fmt: skip
     heads = [str(k + 1) for k in range(_FREQUENCIES)]
     table = plain_table("mode", "motors", "states", numbers=heads, rows=_frequency_rows(data))
-    print_titled(out, "Frequencies [Hz], how far those of reduced models are off below", table)
+    print_titled(out, "Frequencies [Hz], with the errors of reduced models below", table)
     for mode, name in pairs:
         bound = float(data["bound"].sel(mode=mode, reduction=name))
         if not math.isnan(bound):
-            out.print(f"mode {mode}, {name}: the gain of the error is nowhere above {bound:.3g}", soft_wrap=True)
+            out.print(f"mode {mode}, {name}: the gain of the error is at most {bound:.3g}", soft_wrap=True)
     if rows := list(along_rows(data)):
         title, stretch = along_heads(data)
         cells = ([*one[:3], *(number(error, ".1e") for error in one[3:6]), one.within] for one in rows)

@@ -51,7 +51,7 @@ def repeated_runs(results: str, modes: Sequence[str] = ()) -> tuple[Model, Itera
         if name not in names:
             raise InputError(
                 "no such mode in these results", field="--mode", value=name,
-                remedy=f"one of {', '.join(names)}" if names else "leave it out: the run has none",
+                remedy=f"choose from {', '.join(names)}" if names else "leave it out: the run has none",
             )  # fmt: skip
     return model, _runs(model, request, asked(data).get("path"), modes or names)
 
@@ -62,7 +62,7 @@ def _model(data: xr.Dataset, request: RunRequest, results: str) -> Model:
     then, now = json.loads(data.attrs["parameters"]).get("model"), json.loads(json.dumps(dict(model.parameters)))
     if then != now:
         raise InputError(
-            f"these results are of another state of {request.model.name}", field=results,
+            f"these results are of another version of {request.model.name}", field=results,
             remedy="run it again, then linearise",
         )  # fmt: skip
     return model
@@ -73,7 +73,11 @@ def _request(data: xr.Dataset, results: str) -> RunRequest:
 
     run = asked(data)
     if not run or run.get("ked"):
-        why = "of kineto-elastodynamics, which has no equations of motion" if run else "not told how they were made"
+        why = (
+            "of kineto-elastodynamics, which has no equations of motion"
+            if run
+            else "stored without the command that made them"
+        )
         raise InputError(f"these results are {why}", field=results, remedy=_OTHER)
     command = get_command(app).commands["run"]  # type: ignore[attr-defined]
     return filled(RunRequest, command.make_context("run", shlex.split(run_command_line(run))[2:]).params)

@@ -57,9 +57,9 @@ def refuse_existing(output: Path, force: bool) -> None:
     if force or not output.exists() or (output.is_dir() and not any(output.iterdir())):
         return
     raise InputError(
-        "exists already" if output.is_file() else "the folder holds files already",
+        "already exists" if output.is_file() else "the folder already holds files",
         field=str(output),
-        remedy="name another, or write over it with --force",
+        remedy="name another, or overwrite it with --force",
     )
 
 
@@ -70,7 +70,7 @@ def say_replaced(folder: Path) -> None:
     if kind:
         said.append(f"{folder} holds {_described(folder, kind)}; it will be replaced (--out another folder keeps both)")
     if foreign:
-        said.append(f"{folder} holds files that are not of paraflex and stay: {few(foreign, _NAMED)}")
+        said.append(f"{folder} holds files not written by paraflex, which stay: {few(foreign, _NAMED)}")
     for line in said:
         plain_console(stderr=True).print(line, soft_wrap=True)
 

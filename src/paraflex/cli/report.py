@@ -25,7 +25,7 @@ def report_command(request: ReportRequest) -> None:
     if target.is_dir():
         target = target / "report.html"
     if target.exists() and not request.force:
-        raise InputError("is there already", field=str(target), remedy="say --force to write over it, or --output FILE")
+        raise InputError("already exists", field=str(target), remedy="give --force to overwrite it, or --output FILE")
     if study is None:
         save_page(page_of(open_results(file), file.parent), target)
     else:

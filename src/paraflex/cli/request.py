@@ -27,9 +27,9 @@ def asked_model(choice: ModelChoice) -> Model:
     for text in choice.settings:
         name, equals, value = text.partition("=")
         if name.strip() and equals and not value.strip():
-            raise InputError("has no value", field=f"--set {name.strip()}", remedy=f'say "{name.strip()}=0.3"')
+            raise InputError("has no value", field=f"--set {name.strip()}", remedy=f'write "{name.strip()}=0.3"')
         if not (name.strip() and equals):
-            raise InputError("no field and value", field="--set", value=text, remedy='say "link1.length=0.3"')
+            raise InputError("not FIELD=VALUE", field="--set", value=text, remedy='write "link1.length=0.3"')
         found[name.strip()] = value_of(value.strip())
     return load(choice.name, set=found)
 
@@ -86,13 +86,13 @@ def acting_controllers(model: Model, request: RunRequest) -> tuple[ControllerDes
         found = model.acting(request.controllers)
     if found and request.ked:
         raise InputError(
-            "means nothing with --ked, which holds motors on the rigid motion", field="--controller",
-            value=found[0].name, remedy=f"say --controller {NONE}",
+            "has no effect with --ked, which holds motors on the rigid motion", field="--controller",
+            value=found[0].name, remedy=f"give --controller {NONE}",
         )  # fmt: skip
     if found and not model.paths and not request.paths and model.study.torques:
         raise InputError(
-            "given torques and controllers are for one or the other run", field="study.torques",
-            value=", ".join(model.study.torques), remedy=f"leave one of them out, or say --controller {NONE}",
+            "given torques and controllers cannot act in the same run", field="study.torques",
+            value=", ".join(model.study.torques), remedy=f"leave one of them out, or give --controller {NONE}",
             source=model.source,
         )  # fmt: skip
     return found

@@ -64,7 +64,7 @@ def _without_path(model: Model, request: RunRequest) -> Mechanism:
     if request.segments is None:
         return mechanism
     if model.start is not None:
-        raise conflict("the file's [start] speaks of links that are not cut", "--segments", request.segments)
+        raise conflict("the file's [start] refers to links that are not cut", "--segments", request.segments)
     return finite_segments(mechanism, proportional_segments(mechanism, request.segments)).mechanism
 
 
@@ -83,16 +83,16 @@ def _check_fidelity(request: RunRequest) -> None:
     if len(asked) > 1:
         raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
     if request.reduced and any(flag != "--geometry" for flag in asked):
-        raise conflict(f"means nothing with {asked[0]}", "--reduced", request.reduced)
+        raise conflict(f"has no effect with {asked[0]}", "--reduced", request.reduced)
     for name, given in asdict(request.frames).items():
         if given is not None and (request.rigid or request.segments is not None):
-            raise conflict(f"means nothing with {asked[0]}", f"--{name}", given)
+            raise conflict(f"has no effect with {asked[0]}", f"--{name}", given)
     if request.segments is not None and request.segments < 1:
-        raise InputError("must be positive", field="--segments", value=request.segments, remedy="say 8")
+        raise InputError("must be positive", field="--segments", value=request.segments, remedy="give 8")
     for flag, value in given_flags(request).items():
         if request.ked:
             remedy = "its steps are fixed, its start undeformed, its motors held"
-            raise InputError("means nothing with --ked", field=flag, value=value, remedy=remedy)
+            raise InputError("has no effect with --ked", field=flag, value=value, remedy=remedy)
 
 
 def asked_mechanism(model: Model, request: RunRequest) -> Mechanism:

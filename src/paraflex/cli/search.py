@@ -69,12 +69,12 @@ def _with_bar(console: Console, study: DesignStudy[R], request: SearchRequest, w
 
 def _say_end(console: Console, result: OptimisationResult | IdentificationResult, folder: Path) -> None:
     out = plain_console()
-    failed = f", {result.failed} of them not running" if result.failed else ""
+    failed = f", {result.failed} of them failed" if result.failed else ""
     out.print(f"{result.evaluations} designs{failed}; {result.stopped}")
     for reason in result.reasons[:1]:
-        console.print(f"a design that does not run: {reason}", soft_wrap=True)
+        console.print(f"a design that failed: {reason}", soft_wrap=True)
     console.print(f"{result.fresh} designs in {result.seconds:.1f} s now")
     if result.interrupted:
-        console.print(f"interrupted; so far: {result.table}; the same command goes on from there", soft_wrap=True)
+        console.print(f"interrupted; so far: {result.table}; the same command continues from there", soft_wrap=True)
     else:
         console.print(f"every run: {result.table}; the best mechanism: {folder / 'best.toml'}", soft_wrap=True)

@@ -56,7 +56,7 @@ def _values(entries: list[str], setting: Setting) -> dict[str, float]:
         try:
             values[name] = evaluate(value, {})
         except ExpressionError:
-            raise InputError("not NAME=VALUE", field="--at", value=entry, remedy="say --at thickness=0.006") from None
+            raise InputError("not NAME=VALUE", field="--at", value=entry, remedy="give --at thickness=0.006") from None
         for place in dict(zip(setting.names, setting.places, strict=True)).get(name, ()):
             check_unit_of(setting.data, place, value, "--at")
     return values

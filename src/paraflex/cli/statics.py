@@ -89,7 +89,7 @@ def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
-            raise InputError("no name and value", field=flag, value=text, remedy=f'say {flag} "stage.T.x=1"')
+            raise InputError("not NAME=VALUE", field=flag, value=text, remedy=f'write {flag} "stage.T.x=1"')
         if name in found:
             raise InputError("given twice", field=flag, value=name, remedy="leave one of them out")
         found[name] = value

@@ -44,10 +44,10 @@ def _lines(data: xr.Dataset, summary: dict) -> list[str]:
     lines = []
     last = data.isel(step=-1)
     for name, word in lowest_frequencies(data).items():
-        kept = "what is moved let go" if word == "free" else "what is held and moved kept"
+        kept = "moved coordinates released" if word == "free" else "held and moved coordinates fixed"
         values = last[name].values[np.isfinite(last[name].values)]
         known = ", ".join(map(four_digits, values))
-        kept += ", 0 of motions that grow" if np.any(values == 0.0) else ""
+        kept += ", 0 for growing motions" if np.any(values == 0.0) else ""
         lines.append(f"{'free ' if word == 'free' else ''}frequencies: {known} Hz, {kept}")
     if words := buckling_words(data):
         lines.append(f"buckling at {words}")

@@ -76,7 +76,7 @@ def _report(console: Console, result: SweepResult) -> None:
         console.print(f"one table: {result.table}", soft_wrap=True)
     else:
         stopped = "interrupted; " if result.interrupted else ""
-        console.print(f"{stopped}so far: {result.table}; the same command goes on from there", soft_wrap=True)
+        console.print(f"{stopped}so far: {result.table}; the same command continues from there", soft_wrap=True)
 
 
 def _clock(seconds: float) -> str:

@@ -242,7 +242,7 @@ def reduction(console: Console, summary: Mapping[str, Any]) -> None:
     """Print error and time of a run without a path with few flexible coordinates, relative to the full run."""
     if (one := summary.get("reduction")) is not None:
         console.print(
-            f"{_reduced_words(one)}: points are up to {one['distance']:.1e} m from their places in the full run, in "
+            f"{_reduced_words(one)}: points are up to {one['distance']:.1e} m from their positions in the full run, in "
             f"{summary['wall_time'] / one['full_wall_time']:.2f} of its time", soft_wrap=True,
         )  # fmt: skip
 

@@ -30,7 +30,7 @@ class VaryTable(Table):
     values: list[Any] | None = Field(default=None, description="a list of numbers, in the unit of its fields")
     low: NumberOfFields | None = Field(default=None, description="the smallest value, in the unit of its fields")
     high: NumberOfFields | None = Field(default=None, description="the largest value, in the unit of its fields")
-    number: Count | None = Field(default=None, description="how many values of a grid from low to high")
+    number: Count | None = Field(default=None, description="the number of values of a grid from low to high")
     scale: Literal["linear", "log"] = Field(default="linear", description='"linear" or "log"')
     whole: Yes = Field(default=False, description="true for whole numbers only")
 
@@ -41,8 +41,8 @@ class SamplingTable(Table):
     kind: Literal["grid", "list", "random", "sobol"] = Field(
         default="grid", description='"grid", "list", "random" or "sobol"'
     )
-    number: Count | None = Field(default=None, description="how many designs")
-    seed: Count = Field(default=0, description="a whole number from 0 on")
+    number: Count | None = Field(default=None, description="the number of designs")
+    seed: Count = Field(default=0, description="a non-negative whole number")
 
 
 class IntegrationTable(Table):
@@ -57,7 +57,7 @@ class IntegrationTable(Table):
     alpha: Number | None = Field(default=None, description="Baumgarte's coefficient alpha in 1/s")
     beta: Number | None = Field(default=None, description="Baumgarte's coefficient beta in 1/s")
     automatic_gains: Yes | None = Field(default=None, description="true or false")
-    max_steps: Count | None = Field(default=None, description="steps before a run is given up")
+    max_steps: Count | None = Field(default=None, description="the maximum number of steps of a run")
     parameters: dict[str, Number] = Field(default={}, description="the method's own parameters")
 
 
@@ -65,8 +65,8 @@ class SweepTable(Table):
     """Contents of a study file."""
 
     name: Text = Field(default=DEFAULT_NAME, description="a name for the study")
-    mechanism: Text = Field(description="a library mechanism or a file, seen from the study file's folder")
-    set: dict[str, Any] = Field(default={}, description="values in place of the mechanism's file, by field")
+    mechanism: Text = Field(description="a library mechanism or a file, relative to the study file's folder")
+    set: dict[str, Any] = Field(default={}, description="values in place of those of the mechanism's file, by field")
     paths: list[Text] = Field(
         default=[], description="paths of the mechanism's file by name; by default those of its [study]"
     )
@@ -76,14 +76,14 @@ class SweepTable(Table):
     assembly: Text | None = Field(default=None, description="the name of an assembly")
     balanced: Yes = Field(
         default=False,
-        description="true for a start bent as in steady running, of a mechanism without a path",
+        description="true to start a mechanism without a path with the deflections of steady running",
     )
     metrics: list[Text] = Field(default=[], description="names of the metrics to keep, validity always; all by default")
     trajectories: Yes = Field(default=False, description="true to keep every run as a netCDF file")
     statics: dict[str, Any] | None = Field(
         default=None,
-        description="equilibria in place of runs: what is other than in [statics] of the mechanism's file, each in the "
-        "unit of its field there",
+        description="equilibria in place of runs: fields that differ from [statics] of the mechanism's file, each in "
+        "the unit of its field there",
     )
     sampling: SamplingTable = SamplingTable()
     integration: IntegrationTable = IntegrationTable()

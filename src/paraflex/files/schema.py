@@ -48,7 +48,7 @@ def _number(value: Any, info: ValidationInfo) -> Any:
 
 def _function(value: Any, info: ValidationInfo) -> Any:
     """Return a finite number as a float, or an expression of the time t after a check of its syntax."""
-    example = 'say "0.2 * sin(3 * t)"'
+    example = 'write "0.2 * sin(3 * t)"'
     if isinstance(value, str):
         try:
             check_in_time(value, _parameters(info))
@@ -117,7 +117,7 @@ def _optional(description: str, default: Any = None) -> Any:
 
 
 _UNTIL = _optional("the time in s at which the next piece takes over")
-_INTERPOLATION = _optional('how a table is interpolated: "spline", smoothly, by default, or "linear"')
+_INTERPOLATION = _optional('the interpolation of a table: "spline", smooth, by default, or "linear"')
 InterpolationName = Literal["spline", "linear"]
 _PAIR_IN_TIME = Annotated[list[FunctionOfTime], Field(min_length=2, max_length=2)]
 
@@ -179,7 +179,7 @@ def _number_or_word(words: Sequence[str]) -> Any:
         if value.isidentifier() and value not in {*_parameters(info), *CONSTANTS}:
             if not words:
                 return value
-            raise _refused("neither such a word nor a number", 'an angle may have a unit, "30 deg"')
+            raise _refused("neither a known word nor a number", 'an angle may have a unit, "30 deg"')
         return _number(value, info)
 
     numbers: Any = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
@@ -274,7 +274,7 @@ class MaterialTable(_Table):
 
     youngs_modulus: Number = Field(description="Young's modulus in Pa")
     density: Number = Field(description="the density in kg/m^3")
-    strength: Number | None = _optional("the largest stress that it bears in Pa")
+    strength: Number | None = _optional("the largest admissible stress in Pa")
 
 
 class LumpTable(_Table):
@@ -288,14 +288,12 @@ class DampingTable(_Table):
     """Structural damping of a body: modal damping ratios, a loss factor, or Rayleigh damping."""
 
     ratios: list[Number] = _optional(
-        "the damping ratio of each mode of the body as its joints hold it; the last serves the rest", []
+        "the damping ratio of each mode of the body as its joints hold it; the last applies to all others", []
     )
-    loss_factor: Number = _optional(
-        "twice the damping ratio of a vibration at the frequency, in proportion to stiffness", 0.0
-    )
-    frequency: Number = _optional("the frequency in Hz that the loss factor is meant for", 0.0)
-    mass: Number = _optional("the part in proportion to mass in 1/s, of the body as it is held", 0.0)
-    stiffness: Number = _optional("the part in proportion to stiffness in s", 0.0)
+    loss_factor: Number = _optional("twice the damping ratio at the frequency, of stiffness-proportional damping", 0.0)
+    frequency: Number = _optional("the frequency in Hz at which the loss factor holds", 0.0)
+    mass: Number = _optional("the mass-proportional coefficient in 1/s, of the body as it is held", 0.0)
+    stiffness: Number = _optional("the stiffness-proportional coefficient in s", 0.0)
 
 
 ReferenceName = Literal["pinned", "cantilever", "free"]
@@ -308,12 +306,12 @@ class BeamTable(_Table):
 
     type: Literal["beam"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
     length: Number = Field(description="the length in m")
-    section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one a span")
-    material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one a span")
+    section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one per span")
+    material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one per span")
     points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
     elements: Count | list[Count] | None = _optional(
-        "elements per span, one number or one a span; by default 1, and where a joint slides along "
-        "the beam so many that none is longer than a third of it"
+        "elements per span, one number or one per span; by default 1, and where a joint slides along "
+        "the beam enough that none is longer than a third of it"
     )
     lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
     reference: ReferenceName | None = _optional(
@@ -322,15 +320,17 @@ class BeamTable(_Table):
     curvature: CurvatureName | None = _optional(
         'curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default'
     )
-    modes: Count | None = _optional("how many modes of lowest frequency to keep")
+    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
     reduction: ReductionName = _optional(
-        'what is kept with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
+        'the reduction basis with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
         "held, and static shapes of these",
         "modal",
     )
     damping: DampingTable | None = _optional("a damping table")
     flexible: Yes = _optional("false for a rigid beam", True)
-    frames: Count = _optional("floating frames of equal length, joined rigidly: more of them for large deflections", 1)
+    frames: Count = _optional(
+        "the number of floating frames of equal length, joined rigidly: more for large deflections", 1
+    )
 
 
 class RigidTable(_Table):
@@ -367,13 +367,13 @@ class AssumedModesTable(_Table):
     length: Number = Field(description="the length in m")
     section: Text = Field(description="the name of a [section.NAME] table")
     material: Text = Field(description="the name of a [material.NAME] table")
-    transverse_sines: Count = _optional("how many sin(n pi z), from n = 1 on", 0)
+    transverse_sines: Count = _optional("the number of shapes sin(n pi z), n = 1, 2, ...", 0)
     transverse_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
-    axial_sines: Count = _optional("how many sin(n pi z), from n = 1 on", 0)
+    axial_sines: Count = _optional("the number of shapes sin(n pi z), n = 1, 2, ...", 0)
     axial_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
     points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
     lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
-    modes: Count | None = _optional("how many modes of lowest frequency to keep")
+    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
     damping: DampingTable | None = _optional("a damping table")
     flexible: Yes = _optional("false for a rigid bar", True)
 
@@ -383,7 +383,7 @@ class ModalPointTable(_Table):
 
     position: Pair = Field(description="[x, y] in the body frame in m")
     shape: list[list[Number]] = Field(description="two rows, displacement along x and y per flexible coordinate")
-    slope: list[Number] = Field(description="the turn per flexible coordinate")
+    slope: list[Number] = Field(description="the rotation per flexible coordinate")
 
 
 class ModalTable(_Table):
@@ -401,7 +401,7 @@ class ModalTable(_Table):
     G2: list[list[Number]] = Field(description="rows of the skew int (N_x^T N_y - N_y^T N_x) dm")
     I2: list[list[Number]] | None = _optional("rows of int N^T N dm")
     points: dict[str, ModalPointTable] = _optional("position, shape and slope of each named point", {})
-    modes: Count | None = _optional("how many modes of lowest frequency to keep")
+    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
     damping: DampingTable | None = _optional("a damping table")
     flexible: Yes = _optional("false for a rigid body", True)
 
@@ -424,7 +424,7 @@ class PrescribedTable(_Table):
     displacement: FunctionOfTime | None = _optional(
         "the displacement at t = 0 in m, by default that of the assembly, or an expression of the time t"
     )
-    speed: Number | None = _optional("the speed in rad/s or m/s, from a constant start")
+    speed: Number | None = _optional("the speed in rad/s or m/s, from a constant start value")
     pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = _optional(
         'a list of { until = s, angle = "..." }, the last without until'
     )
@@ -452,7 +452,7 @@ class AssemblyTable(BaseModel):
 class DeflectionTable(_Table):
     """Deflection of a point of a beam from its undeformed position in the body frame."""
 
-    axial: Number | None = _optional("the stretch along the beam in m")
+    axial: Number | None = _optional("the displacement along the beam in m")
     transverse: Number | None = _optional("the displacement across the beam in m")
     slope: Number | None = _optional("the slope in rad")
 
@@ -519,7 +519,9 @@ class ShaperTable(_Table):
         description="the undamped natural frequencies of the modes in Hz, one number or a list"
     )
     damping: Number | list[Number] = _optional("the damping ratio of all modes, or a list with one for each", 0.0)
-    tolerance: Number | None = _optional('of "ei", the residual at its frequency as a fraction, by default 0.05')
+    tolerance: Number | None = _optional(
+        'the residual vibration of "ei" at its frequency as a fraction, by default 0.05'
+    )
 
 
 class _PathTable(_Table):
@@ -532,7 +534,7 @@ class PolygonTable(_PathTable):
     type: Literal["polygon"]
     corners: list[Pair] = Field(description="a list of [x, y] in m")
     max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
-    closed: Yes = _optional("whether the path returns to start", True)
+    closed: Yes = _optional("whether the path returns to its start", True)
 
 
 class LineTable(_PathTable):
@@ -582,7 +584,7 @@ class SequenceTable(_PathTable):
 
     type: Literal["sequence"]
     paths: list[Text] = Field(description="names of other [path.NAME] tables, in order")
-    dwell: Number = _optional("the rest between two of them in s", 0.0)
+    dwell: Number = _optional("the dwell between two paths in s", 0.0)
 
 
 PathTable = Annotated[
@@ -633,7 +635,7 @@ class ControllerTable(_Table):
     )
     outputs: list[Text] = _optional("motors; by default all of a mode", [])
     reference: ReferenceEntry | None = _optional(
-        'what is taken off the readings: "plan", the planned motion; "open-loop", what sensors read where '
+        'the reference subtracted from readings: "plan", the planned motion; "open-loop", the readings where '
         "the planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the "
         'unit of the sensor; by default "plan" with "pid", "open-loop" with "lqg", nothing with others'
     )
@@ -657,7 +659,7 @@ class PIDTable(ControllerTable):
     stiffness: NumbersOf = Field(description="the proportional gain in N m/rad or N/m, of all motors or by motor")
     damping: NumbersOf = _optional("the derivative gain in N m s/rad or N s/m, of all motors or by motor", 0.0)
     integral: NumbersOf = _optional("the integral gain in N m/rad/s or N/m/s, of all motors or by motor", 0.0)
-    project: Yes = _optional("whether torques that only strain links are taken out", True)
+    project: Yes = _optional("whether torques that only strain links are removed", True)
     cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
 
@@ -675,7 +677,7 @@ class ComputedTorqueTable(ControllerTable):
     """Computed-torque control of the rigid mechanism in task space, in place of planned torques."""
 
     type: Literal["computed-torque"]
-    frequency: Number = Field(description="the frequency of the end-effector's error, as of an oscillator, in Hz")
+    frequency: Number = Field(description="the natural frequency of the end-effector's error in Hz")
     damping_ratio: Number = _optional("the damping ratio of the end-effector's error", 0.7)
     cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
 
@@ -712,13 +714,13 @@ class LQGTable(ControllerTable):
         "by sensor the time constant in s with which its error under constant loads decays", {}
     )
     coloured: dict[str, tuple[Number, Number | list[list[Number]]]] = _optional(
-        'disturbances that last, by motor or as "link.tip.x" by point and axis: the standard deviation in '
+        'coloured disturbances, by motor or as "link.tip.x" by point and axis: the standard deviation in '
         "N m or N and the cut-off frequency in Hz, or lists of the coefficients of numerator and denominator of a "
         "filter in descending powers of s",
         {},
     )
-    states: Count | None = _optional("the states of the reduced model, by default 16, or all of fewer")
-    at: Number | None = _optional("the time of the planned motion that it is designed about in s, by default its start")
+    states: Count | None = _optional("the number of states of the reduced model, by default 16, or all if fewer")
+    at: Number | None = _optional("the time of the planned motion for which it is designed in s, by default its start")
 
 
 AnyControllerTable = Annotated[
@@ -731,7 +733,7 @@ class StudyDefaultsTable(_Table):
 
     path: Text | None = _optional("the name of a [path.NAME] table")
     paths: list[Text] = _optional(
-        "in its place several names: runs and studies of many designs take all, others the first", []
+        "several names in place of path: runs and studies of many designs take all, others the first", []
     )
     modes: list[Text] = _optional("actuation modes by name, signs or motor names", [])
     duration: Number | None = _optional("the duration in s, dwell included")
@@ -741,7 +743,7 @@ class StudyDefaultsTable(_Table):
         "torques of motors in N m, without a path: numbers, expressions of the time t, or tables", {}
     )
     controllers: list[Text] = _optional(
-        "names of [controller.NAME] tables that act, beside the torques planned along a path", []
+        "names of active [controller.NAME] tables, in addition to torques planned along a path", []
     )
     shaper: ShaperTable | None = _optional(
         'the input shaper of torques planned along a path, as { type = "zvd", frequencies = ["9 Hz"] }: none by default'
@@ -754,20 +756,21 @@ class StudyDefaultsTable(_Table):
         "the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
     )
     tolerance_per: Literal["cycle", "run"] | None = _optional(
-        'the time in which errors may add up to it: a "cycle" of the motion or the "run"; own methods only'
+        'the time over which errors may accumulate to it: a "cycle" of the motion or the "run"; own methods only'
     )
     control: Literal["positions", "forces"] | None = _optional(
-        'whose errors choose the steps: "positions" or "forces" as well, the default of damped beams and ESDIRK methods'
+        'the errors that control the steps: "positions", or "forces" as well, the default of damped beams and '
+        "ESDIRK methods"
     )
     step: Number | None = _optional("a fixed step in s, with methods that take one")
     after: Literal["free", "hold"] = _optional(
         'what the active motors do after the path: "free" or "hold", by brakes', "free"
     )
     reduced: Count | None = _optional(
-        "flexible coordinates that runs keep, all bodies together; all by default, or with 0"
+        "the number of flexible coordinates kept, all bodies together; all by default, or with 0"
     )
     error: Literal["motion", "whole"] = _optional(
-        'which tracking error ranks modes: of the "motion", or the "whole" run with dwell', "motion"
+        'the tracking error that ranks modes: of the "motion", or the "whole" run with dwell', "motion"
     )
 
 
@@ -792,10 +795,12 @@ class StaticsTable(_Table):
     moved: NumbersByName = _optional(
         'the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start', {}
     )
-    held: list[Text] | None = _optional("coordinates that stay; by default the joints of motors without a torque")
-    steps: Count = _optional("how many equal steps of all that is given", STEPS)
-    stiffness: list[Text] | None = _optional("coordinates with a stiffness; by default those loaded or moved")
-    buckling: Count = _optional("how many factors of buckling about every equilibrium", FACTORS)
+    held: list[Text] | None = _optional("coordinates held fixed; by default the joints of motors without a torque")
+    steps: Count = _optional("the number of equal steps of loads and travels", STEPS)
+    stiffness: list[Text] | None = _optional(
+        "coordinates whose stiffness is computed; by default those loaded or moved"
+    )
+    buckling: Count = _optional("the number of buckling factors about every equilibrium", FACTORS)
 
 
 class _Parts(_Table):

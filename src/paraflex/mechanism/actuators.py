@@ -72,10 +72,10 @@ class Actuator(CheckedFields):
     _table = "actuator"
 
     name: str
-    motors: tuple[str, ...] = optional((), "names of motors that it is of, by default all")
+    motors: tuple[str, ...] = optional((), "names of the motors it belongs to, by default all")
     gear: float = optional(
-        1.0, "the rotor's angle by the joint's, or in rad/m where the joint slides", positive,
-        "turns of the rotor by those of the joint",
+        1.0, "the rotor's angle over the joint's, or in rad/m where the joint slides", positive,
+        "turns of the rotor per turn of the joint",
     )  # fmt: skip
     rotor_inertia: float = optional(0.0, "the rotor's moment of inertia in kg m^2", not_negative, "kg m^2")
     torque_constant: float | None = optional(None, "the torque constant in N m/A", positive, "N m/A")

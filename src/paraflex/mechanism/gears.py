@@ -9,8 +9,8 @@ from paraflex.arguments import CheckedFields
 from paraflex.mechanism.quantities import finite, not_zero, optional, said
 
 PHASE = said(
-    "the coordinate of the second joint where that of the first is zero in rad, or m; by default as the first assembly "
-    "stands",
+    "the coordinate of the second joint where that of the first is zero in rad, or m; by default that of the "
+    "first assembly",
     finite,
 )
 
@@ -82,10 +82,10 @@ class Gear(Relation):
     second_joint: str = field(metadata=said("second joint", joint="moves"))
     ratio: float = field(
         metadata=said(
-            "the second joint's angle by the first's, negative where wheels mesh outside; of a rack the radius of its "
+            "the second joint's angle over the first's, negative for external meshing; of a rack the radius of its "
             "pinion",
             not_zero,
-            "as the second joint's angle or travel by the first's",
+            "as the second joint's angle or travel over the first's",
         )
     )
     phase: float | None = field(default=None, metadata=PHASE)

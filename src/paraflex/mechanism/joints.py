@@ -184,7 +184,7 @@ class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
 
 
 _DIRECTION = said("the angle of its axis against the first body in rad", finite)
-_LENGTH = said("the distance that it keeps in m, by default as the first assembly stands", positive, "m")
+_LENGTH = said("the constant distance in m, by default that of the first assembly", positive, "m")
 _ANGLE = said("the angle of the second body against the first in rad", finite)
 
 

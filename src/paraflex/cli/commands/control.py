@@ -28,8 +28,8 @@ class CompareLawsRequest:
         Option(
             "--controller",
             metavar="NAME",
-            help="A controller of the model, or several that act together, a+b; repeatable. Default: each by itself. "
-            "The open loop is always there, with none it is alone.",
+            help="A controller of the model, or several that act together, a+b; repeatable. Default: each alone. "
+            "The open loop is always run, with none as the only law.",
         ),
     ] = field(default_factory=list)
     modes: Annotated[
@@ -41,7 +41,7 @@ class CompareLawsRequest:
         Option(
             "--path",
             metavar="NAME|FILE",
-            help="A path of the model or a TOML file with one; repeatable, each law then has a row for each. Default: "
+            help="A path of the model or a TOML file with one; repeatable, with one row per law and path. Default: "
             "the study's first.",
         ),
     ] = field(default_factory=list)
@@ -50,18 +50,19 @@ class CompareLawsRequest:
         Option(
             "--metric",
             metavar="NAME",
-            help="A metric, as studies have them; repeatable. Default: errors, vibration, settling, torques, energy.",
+            help="A metric, as in studies; repeatable. Default: errors, vibration, settling, torques, energy.",
         ),
     ] = field(default_factory=list)
     tolerance: ToleranceOption = None
     method: MethodOption = None
     step: Annotated[
         float | None,
-        Option(metavar="S", parser=SECONDS, help="A fixed step. Default: the study's, else chosen by errors."),
+        Option(metavar="S", parser=SECONDS, help="Fixed step. Default: the study's, else error control."),
     ] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
     workers: Annotated[
-        int | None, Option(metavar="N", help="Runs at a time. Default: one a processor; results are the same.")
+        int | None,
+        Option(metavar="N", help="Number of parallel runs. Default: one per processor; results are the same."),
     ] = None
     out: Annotated[str, Option("--output", "--out", metavar="DIR", help="Folder for table and figure.")] = "laws"
     force: ReplaceOption = False

@@ -22,7 +22,7 @@ class LibraryChoice(ModelChoice):
     """Choice of a model, or of the whole library."""
 
     source: Annotated[
-        str | None, Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file; all of the library.")
+        str | None, Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file. Default: list the library.")
     ] = None
 
 
@@ -35,10 +35,12 @@ class InfoRequest:
     path: PathOption = None
     at: Annotated[
         float | None,
-        Option(metavar="S", parser=SECONDS, help="Frequencies where the path, or prescribed angles, lead by then."),
+        Option(
+            metavar="S", parser=SECONDS, help="Time of the pose, on the path or by prescribed angles, for frequencies."
+        ),
     ] = None
     balanced: Annotated[
-        bool, Option("--balanced", help="Frequencies about static equilibrium, motors held; else undeformed.")
+        bool, Option("--balanced", help="Frequencies about static equilibrium with motors held; else undeformed.")
     ] = False
     json: Json = False
 
@@ -59,7 +61,7 @@ class DrawRequest:
         bool | None,
         Option("--open/--no-open", help="Show it in a browser, or not. Default: without --output, at a screen."),
     ] = None
-    force: Annotated[bool, Option("--force", help="Write over a file that is there.")] = False
+    force: Annotated[bool, Option("--force", help="Overwrite an existing file.")] = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,18 +90,20 @@ class LinearRequest:
         str | None,
         Option(
             metavar="NAME|start|X,Y",
-            help="At rest: an assembly, the file's [start], or the end-effector's place. Default: the model's start.",
+            help="Pose at rest: an assembly, the file's [start], or the end-effector's position. "
+            "Default: the model's start.",
         ),
     ] = None
     balanced: Annotated[
-        bool, Option("--balanced", help="About static equilibrium near the pose, the mode's motors held; else there.")
+        bool,
+        Option("--balanced", help="Use the static equilibrium near the pose, the mode's motors held; else the pose."),
     ] = False
     at: Annotated[
         float | None,
         Option(
             metavar="S",
             parser=SECONDS,
-            help="About the planned motion at a time; of a model without a path, or of results, about the run.",
+            help="Time in the planned motion, or in the run of a model without a path or of results.",
         ),
     ] = None
     along: ClassVar[int | None] = None
@@ -107,11 +111,15 @@ class LinearRequest:
     assembly: AssemblyOption = None
     forces: Annotated[
         list[str],
-        Option("--force-at", metavar="BODY.POINT", help="Point with forces along x and y as inputs too; repeatable."),
+        Option(
+            "--force-at", metavar="BODY.POINT", help="Point whose forces along x and y are also inputs; repeatable."
+        ),
     ] = field(default_factory=list)
     coordinates: Annotated[
         str,
-        Option(metavar="motors|task", help="First states: angles of the motors' joints, or the end-effector's place."),
+        Option(
+            metavar="motors|task", help="First states: angles of the motors' joints, or the end-effector's position."
+        ),
     ] = "motors"
     prescribed: Annotated[
         list[str],
@@ -124,7 +132,8 @@ class LineariseRequest(LinearRequest):
     """Options of `paraflex linearise`."""
 
     along: Annotated[  # type: ignore[misc]
-        int | None, Option(metavar="N", help="Poles at so many moments of the motion too, as branches over time.")
+        int | None,
+        Option(metavar="N", help="Number of times in the motion at which poles are also computed, as branches."),
     ] = None
     files: FilesChoice = field(default_factory=FilesChoice)
 
@@ -134,7 +143,7 @@ class ReduceRequest(LinearRequest):
     """Options of `paraflex reduce`."""
 
     states: Annotated[
-        int | None, Option(metavar="N", help="States of the reduced models. Default: 16, or all of fewer.")
+        int | None, Option(metavar="N", help="Number of states of the reduced models. Default: 16, or all if fewer.")
     ] = None
     methods: Annotated[
         list[str],
@@ -145,14 +154,14 @@ class ReduceRequest(LinearRequest):
         ),
     ] = field(default_factory=list)
     until: Annotated[float, Option(metavar="HZ", help="Highest frequency [Hz].")] = 40.0
-    error: Annotated[float, Option(metavar="PART", help="Error that the states needed are counted for.")] = 0.01
+    error: Annotated[float, Option(metavar="PART", help="Error that determines the states needed.")] = 0.01
     along: Annotated[  # type: ignore[misc]
         int | None,
-        Option(metavar="N", help="How far the basis of one pose holds at so many poses along the path, too."),
+        Option(metavar="N", help="Number of poses along the path at which the basis of one pose is also tested."),
     ] = None
     basis: Annotated[
         str | None,
-        Option(metavar="NAME|start|X,Y", help="The pose whose basis is taken along. Default: the first of the path."),
+        Option(metavar="NAME|start|X,Y", help="The pose whose basis is used along the path. Default: its first pose."),
     ] = None
     files: FilesChoice = field(default_factory=FilesChoice)
 
@@ -186,20 +195,23 @@ class StaticsRequest:
         Option(
             "--hold",
             metavar="NAME|none",
-            help="Joint or point's coordinate that stays; repeatable. Default: joints of motors without --torque.",
+            help="Joint or point's coordinate held fixed; repeatable. Default: joints of motors without --torque.",
         ),
     ] = None
-    steps: Annotated[int | None, Option(metavar="N", help="Equal steps of all loads and travels. Default: 10.")] = None
+    steps: Annotated[
+        int | None, Option(metavar="N", help="Number of equal steps of all loads and travels. Default: 10.")
+    ] = None
     stiffness: Annotated[
         list[str] | None,
         Option(
             "--stiffness",
             metavar="NAME",
-            help="Coordinate with a stiffness; repeatable. Default: those loaded or moved, else the end-effector's.",
+            help="Coordinate whose stiffness is computed; repeatable. Default: those loaded or moved, "
+            "else the end-effector's.",
         ),
     ] = None
     buckling: Annotated[
-        int | None, Option(metavar="N", help="Factors of buckling about every equilibrium. Default: 1.")
+        int | None, Option(metavar="N", help="Number of buckling factors about every equilibrium. Default: 1.")
     ] = None
     assembly: AssemblyOption = None
     files: FilesChoice = field(default_factory=FilesChoice)
@@ -216,7 +228,7 @@ class MethodsRequest:
 class NewRequest:
     """Options of `paraflex new`."""
 
-    name: Annotated[str, Argument(metavar="NAME", help="Of the file to write, NAME.toml.")]
+    name: Annotated[str, Argument(metavar="NAME", help="Name of the file to write, NAME.toml.")]
     template: Annotated[str, Option("--from", metavar="NAME", help="Library mechanism to start from.")] = "five_bar"
 
 

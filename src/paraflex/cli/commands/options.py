@@ -45,17 +45,17 @@ PathOption = Annotated[
 ]
 ToleranceOption = Annotated[
     float | None,
-    Option("--tol", metavar="METRES", parser=METRES, help="Tolerance; the study's, else 4e-5 of the size."),
+    Option("--tol", metavar="METRES", parser=METRES, help="Tolerance. Default: the study's, else 4e-5 of the size."),
 ]
 MethodOption = Annotated[str | None, Option(metavar="NAME", help="Method of integration: paraflex methods lists them.")]
-AssemblyOption = Annotated[str | None, Option(metavar="NAME", help="Which way the mechanism is put together.")]
-StudyArgument = Annotated[str, Argument(metavar="STUDY.toml", help="What is free within which bounds, what is run.")]
+AssemblyOption = Annotated[str | None, Option(metavar="NAME", help="Assembly (configuration) of the mechanism.")]
+StudyArgument = Annotated[str, Argument(metavar="STUDY.toml", help="Study file: free parameters, their bounds, runs.")]
 OutputOption = Annotated[
     str | None, Option("--output", "--out", metavar="DIR", help="Folder for results. Default: results/STUDY.")
 ]
 ReplaceOption = Annotated[bool, Option("--force", help="Replace results of another kind that the folder holds.")]
 ReportOption = Annotated[bool, Option("--report/--no-report", help="Write report.html, or leave it out.")]
-OutsideOption = Annotated[bool, Option("--allow-outside", help="Read tables that the model names outside its folder.")]
+OutsideOption = Annotated[bool, Option("--allow-outside", help="Read tables outside the model's folder that it names.")]
 
 
 @dataclass(frozen=True)
@@ -80,12 +80,12 @@ class ModelChoice:
         str | None, Argument(metavar="NAME|FILE", help=f"A library mechanism or a TOML file. Default: {DEFAULT_MODEL}.")
     ] = None
     mechanism: Annotated[
-        str | None, Option("--mechanism", "-m", metavar="NAME|FILE", help="The same, named by an option.")
+        str | None, Option("--mechanism", "-m", metavar="NAME|FILE", help="The same, given as an option.")
     ] = None
 
     settings: Annotated[
         list[str],
-        Option("--set", metavar="FIELD=VALUE", help='In place of the file\'s, "link1.length=80 mm"; repeatable.'),
+        Option("--set", metavar="FIELD=VALUE", help='Value in place of the file\'s, "link1.length=80 mm"; repeatable.'),
     ] = field(default_factory=list)
     allow_outside: OutsideOption = False
 
@@ -111,8 +111,8 @@ class ModelChoice:
 class PlanChoice:
     """Options passed to `Model.plan`; None takes the model's value."""
 
-    duration: Annotated[float | None, Option(metavar="S", parser=SECONDS, help="Duration, dwell included.")] = None
-    samples: Annotated[int | None, Option(metavar="N", help="Samples kept.")] = None
+    duration: Annotated[float | None, Option(metavar="S", parser=SECONDS, help="Duration including dwell.")] = None
+    samples: Annotated[int | None, Option(metavar="N", help="Number of samples.")] = None
     assembly: AssemblyOption = None
 
 
@@ -148,13 +148,17 @@ class WorkersChoice:
     """Choice of the workers that compute the runs of a study."""
 
     engine: Annotated[
-        str, Option("--engine", metavar="threads|processes|dask", help="Who computes; results are the same.")
+        str, Option("--engine", metavar="threads|processes|dask", help="Engine that computes; results are the same.")
     ] = "threads"
-    workers: Annotated[int | None, Option("--workers", metavar="N", help="How many. Default: one a processor.")] = None
+    workers: Annotated[
+        int | None, Option("--workers", metavar="N", help="Number of workers. Default: one per processor.")
+    ] = None
     cluster: Annotated[
         str | None,
         Option(
-            "--cluster", metavar="ADDRESS", help="Of a Dask scheduler, tcp://host:8786. Default: one on this machine."
+            "--cluster",
+            metavar="ADDRESS",
+            help="Address of a Dask scheduler, tcp://host:8786. Default: one on this machine.",
         ),
     ] = None
 

@@ -50,8 +50,8 @@ class RunRequest:
         Option(
             "--controller",
             metavar="NAME",
-            help="A controller of the model, beside planned torques; repeatable; none for none of them. Default: the "
-            "study's.",
+            help="A controller of the model, in addition to planned torques; repeatable; none for no controller. "
+            "Default: the study's.",
         ),
     ] = field(default_factory=list)
     tolerance: ToleranceOption = None
@@ -59,21 +59,22 @@ class RunRequest:
         str | None,
         Option(
             metavar="cycle|run",
-            help="Time in which errors may add up to the tolerance. Default: cycle, or run for a tolerance given.",
+            help="Time over which errors may accumulate to the tolerance. Default: cycle, or run for a given "
+            "tolerance.",
         ),
     ] = None
     control: Annotated[
         str | None,
         Option(
             metavar="positions|forces",
-            help="Whose errors choose the steps: of positions, or of forces as well, the default of damped beams.",
+            help="Errors that control the steps: of positions, or of forces as well, the default of damped beams.",
         ),
     ] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
     alpha: Annotated[float | None, Option(metavar="1/S", parser=PER_SECOND, help="Baumgarte coefficient alpha.")] = None
     beta: Annotated[float | None, Option(metavar="1/S", parser=PER_SECOND, help="Baumgarte coefficient beta.")] = None
     max_steps: Annotated[
-        int | None, Option(metavar="N", help="Steps before a run is given up. Default: ten million.")
+        int | None, Option(metavar="N", help="Maximum number of steps of a run. Default: ten million.")
     ] = None
     method: MethodOption = None
     parameters: Annotated[
@@ -81,24 +82,24 @@ class RunRequest:
     ] = field(default_factory=list)
     step: Annotated[
         float | None,
-        Option(metavar="S", parser=SECONDS, help="A fixed step. Default: steps are chosen by their errors."),
+        Option(metavar="S", parser=SECONDS, help="Fixed step. Default: steps controlled by their errors."),
     ] = None
     constraints: Annotated[
         str | None,
-        Option(metavar="baumgarte|projection|ggl", help="What keeps the constraints. Default: the method's."),
+        Option(metavar="baumgarte|projection|ggl", help="Treatment of the constraints. Default: the method's."),
     ] = None
     automatic_gains: Annotated[
-        bool, Option("--automatic-gains", help="Baumgarte coefficients that follow the step.")
+        bool, Option("--automatic-gains", help="Adapt the Baumgarte coefficients to the step.")
     ] = False
     stop_at: Annotated[
         list[str],
         Option(
             metavar="EVENT",
-            help="Where the run ends: joint:NAME=LOW..HIGH, deflection:BODY=METRES, singular=DISTANCE, "
+            help="Event that ends the run: joint:NAME=LOW..HIGH, deflection:BODY=METRES, singular=DISTANCE, "
             "singular:MOTOR,...=DISTANCE; units as in files, ..80 deg; repeatable.",
         ),
     ] = field(default_factory=list)
-    rigid: Annotated[bool, Option("--rigid", help="Take all bodies as rigid.")] = False
+    rigid: Annotated[bool, Option("--rigid", help="Treat all bodies as rigid.")] = False
     geometry: Annotated[
         str | None, Option(metavar="second-order|linear", help="Shape of the beams. Default: the model's.")
     ] = None
@@ -107,12 +108,12 @@ class RunRequest:
         int | None,
         Option(
             metavar="N",
-            help="Keep N flexible coordinates of all bodies together, and tell how far off that is. Default: the "
+            help="Keep N flexible coordinates of all bodies together, and report the error. Default: the "
             "study's, else all; 0 for all.",
         ),
     ] = None
     segments: Annotated[
-        int | None, Option(metavar="N", help="Cut beams into finite segments, so many the longest (the paper's: 8).")
+        int | None, Option(metavar="N", help="Cut beams into finite segments, N for the longest (the paper's: 8).")
     ] = None
     ked: Annotated[bool, Option("--ked", help="Kineto-elastodynamics: active motors held on the rigid motion.")] = False
     balanced: Annotated[
@@ -123,7 +124,7 @@ class RunRequest:
     ] = False
     after: Annotated[
         str | None,
-        Option(metavar="free|hold", help="The active motors after the path: hold is by brakes. Default: free."),
+        Option(metavar="free|hold", help="Active motors after the path: free, or held by brakes. Default: free."),
     ] = None
     out: Annotated[str, Option(metavar="DIR", help="Folder for results and figures.")] = "results"
     force: ReplaceOption = False
@@ -189,10 +190,12 @@ class CompareMethodsRequest:
             "--step",
             metavar="S",
             parser=SECONDS,
-            help="Fixed step; repeatable. Without --tol fixed steps are all there is.",
+            help="Fixed step; repeatable. Without --tol only fixed steps are run.",
         ),
     ] = field(default_factory=list)
-    limit: Annotated[float | None, Option(metavar="S", parser=SECONDS, help="Wall time of a run. Default: 60.")] = None
+    limit: Annotated[
+        float | None, Option(metavar="S", parser=SECONDS, help="Limit on the wall time of a run. Default: 60.")
+    ] = None
     plan: PlanChoice = field(default_factory=PlanChoice)
     out: Annotated[str, Option(metavar="DIR", help="Folder for numbers and figure.")] = "comparison"
     force: ReplaceOption = False

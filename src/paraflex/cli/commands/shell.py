@@ -29,8 +29,8 @@ from paraflex.cli.commands.studies import IndicesRequest, SearchRequest, Sensiti
 from paraflex.cli.signals import exit_code, is_taken, raised
 
 # Messages after an interruption, for studies of many runs and for other commands.
-_GOES_ON = "interrupted; what is done is kept, and the same command goes on from there"
-_BEGINS = "interrupted; the same command begins anew"
+_GOES_ON = "interrupted; what is done is kept, and the same command continues from there"
+_BEGINS = "interrupted; the same command starts over"
 
 
 class ListedCommand(NamedTuple):
@@ -83,29 +83,29 @@ COMMANDS = (
 
         Writes report.html, verify.json, verify.nc and figures/."""),
     ListedCommand("report", ReportRequest, "report.report_command", """
-        Write the report of results that are there: one HTML file that needs no network."""),
+        Write the report of stored results: one HTML file that needs no network."""),
     ListedCommand("compare-methods", CompareMethodsRequest, "compare_methods.compare_methods_command", """
         Time every method of integration against its error; write compare-methods.json and figures/."""),
     ListedCommand("control compare", CompareLawsRequest, "control.compare_laws_command", """
         Run the controllers of a model, and the open loop, in several modes: errors, vibration, torques, energy.
 
-        Writes laws.csv, laws.json, laws.nc and figures/. A law that cannot run in a mode has its reason."""),
+        Writes laws.csv, laws.json, laws.nc and figures/. Laws that cannot run in a mode are listed with reasons."""),
     ListedCommand("sensitivity", SensitivityRequest, "sensitivity.sensitivity_command", """
-        Differentiate what runs are judged by; write sensitivity.json, a table and figures/."""),
+        Differentiate the metrics of runs; write sensitivity.json, a table and figures/."""),
     ListedCommand("sweep", SweepRequest, "sweep.sweep_command", """
-        Run a mechanism thousands of times with other numbers; the same command goes on where it was stopped.
+        Run a mechanism thousands of times with varied parameters; the same command continues an interrupted study.
 
-        Writes report.html, results.parquet and summary.json, and trajectories/ where the study says so."""),
+        Writes report.html, results.parquet and summary.json, and trajectories/ if the study requests it."""),
     ListedCommand("optimise", SearchRequest, "optimise.optimise_command", """
-        Look for the design whose metrics are least; the same command goes on where it was stopped.
+        Search for the design with the smallest metrics; the same command continues an interrupted study.
 
         Writes result.json, best.toml, results.parquet and figures/."""),
     ListedCommand("identify", SearchRequest, "identify.identify_command", """
-        Look for the parameters that reproduce given metrics; the same command goes on where it was stopped.
+        Search for the parameters that reproduce given metrics; the same command continues an interrupted study.
 
         Writes result.json, best.toml, results.parquet and figures/."""),
     ListedCommand("indices", IndicesRequest, "indices.indices_command", """
-        Tell which parameters metrics depend on: first-order and total Sobol indices over their ranges.
+        Show which parameters metrics depend on: first-order and total Sobol indices over their ranges.
 
         Writes indices.json, indices.parquet, results.parquet and figures/."""),
     ListedCommand("compare", CompareRequest, "compare.compare_command", """
@@ -133,11 +133,11 @@ COMMANDS = (
 
         With --out it writes statics.nc, statics.json and figures/."""),
     ListedCommand("methods", MethodsRequest, "methods.methods_command", """
-        List the methods of integration, what each takes and what keeps the constraints."""),
+        List the methods of integration, their options and their treatments of the constraints."""),
     ListedCommand("info", InfoRequest, "inspect.info_command", """
         Describe a mechanism and its study, and judge them: sound, doubtful or wrong, each reason with its remedy.
 
-        Exit code 1 where it is wrong. Without a name: what the library has."""),
+        Exit code 1 if it is wrong. Without a name: list of the library."""),
     ListedCommand("draw", DrawRequest, "draw.draw_command", """
         Draw a mechanism before anything runs: bodies, joints by kind, motors, springs, loads, path, and their names.
 

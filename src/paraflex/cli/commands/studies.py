@@ -37,13 +37,15 @@ class StudyRequest:
 class SensitivityRequest(StudyRequest):
     """Options of `paraflex sensitivity`."""
 
-    study: Annotated[str, Argument(metavar="STUDY.toml", help="What is run, and by what it is differentiated.")]
+    study: Annotated[str, Argument(metavar="STUDY.toml", help="Study file: runs, and parameters of the derivatives.")]
     at: Annotated[
         list[str],
-        Option(metavar="NAME=VALUE", help="Where derivatives are taken; repeatable. Default: the mechanism's."),
+        Option(
+            metavar="NAME=VALUE", help="Value at which derivatives are taken; repeatable. Default: the mechanism's."
+        ),
     ] = field(default_factory=list)
     metrics: Annotated[
-        list[str], Option(metavar="NAME,...", help="What is differentiated; repeatable. Default: the study's.")
+        list[str], Option(metavar="NAME,...", help="Metrics to differentiate; repeatable. Default: the study's.")
     ] = field(default_factory=list)
     force: ReplaceOption = False
     json: Json = False
@@ -53,9 +55,11 @@ class SensitivityRequest(StudyRequest):
 class SweepRequest(StudyRequest):
     """Options of `paraflex sweep`."""
 
-    study: Annotated[str, Argument(metavar="STUDY.toml", help="What varies, what is run, what is kept.")]
+    study: Annotated[str, Argument(metavar="STUDY.toml", help="Study file: parameters, runs, metrics.")]
     workers: WorkersChoice = field(default_factory=WorkersChoice)
-    limit: Annotated[int | None, Option(metavar="N", help="Runs this time, rounded up to whole designs.")] = None
+    limit: Annotated[int | None, Option(metavar="N", help="Number of runs this time, rounded up to whole designs.")] = (
+        None
+    )
     report: ReportOption = True
     json: Json = False
 
@@ -78,6 +82,6 @@ class IndicesRequest(StudyRequest):
     samples: Annotated[
         int | None, Option(metavar="N", help="Base samples, a power of two; (parameters + 2) N designs are run.")
     ] = None
-    seed: Annotated[int | None, Option(metavar="N", help="Of the samples. Default: the study's.")] = None
+    seed: Annotated[int | None, Option(metavar="N", help="Seed of the samples. Default: the study's.")] = None
     workers: WorkersChoice = field(default_factory=WorkersChoice)
     json: Json = False
