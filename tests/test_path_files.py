@@ -90,7 +90,7 @@ TABLE = '[path.p]\ntype = "table"\n'
     ("text", "says"),
     [
         (TABLE + "motion_time = 1", "path.p.table: "),
-        (TABLE + 'table = "drawn.csv"', "path.p.max_acceleration: nothing says how fast it is passed; give max_acc"),
+        (TABLE + 'table = "drawn.csv"', "path.p.max_acceleration: its law of motion is not given; give max_acc"),
         (TABLE + 'table = "timed.csv"\nmotion_time = 1', "path.p.motion_time: its law of motion is given in two ways"),
         (TABLE + 'table = "missing.csv"\nmotion_time = 1', "path.p.table: cannot be read (no such file or directory)"),
         (TABLE + 'table = "one.csv"\nmotion_time = 1', "path.p.table: line 1 of one.csv is not two or three numbers"),

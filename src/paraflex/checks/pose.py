@@ -98,7 +98,7 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
     """Yield findings about the pose; `at_rest` adds whether a mechanism at rest there would stay."""
     if not seen.starts:
         yield Finding(
-            "assembly-missing", "assembly", "no assembly: it cannot be seen whether the loops close",
+            "assembly-missing", "assembly", "no assembly: it is unknown whether the loops close",
             "add an [assembly.NAME] table with an approximate angle of each body, in rad",
         )  # fmt: skip
     for start in seen.starts:
@@ -145,7 +145,7 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
         slowest = float(np.min(body.modes.omega, initial=math.inf)) / (2.0 * math.pi)
         if slowest < SLOWEST_LINK:
             yield Finding(
-                "frequency-low", f"body.{name}", f"it vibrates on its own at {slowest:.2g} Hz, as no link does",
+                "frequency-low", f"body.{name}", f"its natural frequency is {slowest:.2g} Hz, too low for a link",
                 f"look at Young's modulus, section and length of {name}: Pa and m",
             )  # fmt: skip
     mechanism = seen.system.mechanism

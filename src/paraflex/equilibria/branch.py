@@ -152,13 +152,13 @@ class Branch:
         given = self.equations.given.words
         if turned:
             cause = (
-                f"no equilibrium with more than {furthest:.6g} of what is given, {given}: the branch turns back there, "
-                "at a limit point, and does not come to more"
+                f"no equilibrium beyond load factor {furthest:.6g} ({given}): the branch turns back there, "
+                "at a limit point, and does not go further"
             )
             return LimitPointError(cause, remedy=f"give at most {furthest:.4g} of it")
         return EquilibriumError(
-            f"the branch of equilibria is followed for {_MOST_STEPS} steps and has come to {furthest:.6g} of what is "
-            f"given only, {given}", remedy="give less, or more where it is next to nothing",
+            f"the branch of equilibria is followed for {_MOST_STEPS} steps and has only reached load factor "
+            f"{furthest:.6g} ({given})", remedy="give less, or more where values are almost zero",
         )  # fmt: skip
 
     def _stopped(self, at: Unknowns) -> EquilibriumError:
@@ -167,13 +167,13 @@ class Branch:
         if stuck:
             names = ", ".join(one.name for one in stuck)
             return EquilibriumError(
-                f"no equilibrium beyond {at.s:.6g} of what is given: the travel of {names} follows from the joints and "
+                f"no equilibrium beyond load factor {at.s:.6g}: the travel of {names} follows from the joints and "
                 "from what else is held and moved",
                 remedy="leave it out, or hold and move less",
             )
         return EquilibriumError(
-            f"no equilibrium is found beyond {at.s:.6g} of what is given, {self.equations.given.words}",
-            remedy="joints may not allow more, or links touch what the model has not: give less",
+            f"no equilibrium is found beyond load factor {at.s:.6g} ({self.equations.given.words})",
+            remedy="joints may not allow more, or links touch parts that the model lacks: give less",
         )
 
     def _next(self, here: Point, step: float, longest: float) -> tuple[Point, float]:
