@@ -100,7 +100,7 @@ TABLE = '[path.p]\ntype = "table"\n'
         (TABLE + "table = [[0, 0], [1, 0], [1, 1]]\nmotion_time = 1", "path.p.table: not a list of points"),
         (
             TABLE + "table = [[0, 0, 0], [1, 0, 1], [1, 1, 1], [2, 0, 2]]",
-            "path.p.table: its times must ascend, that of",
+            "path.p.table: its times must ascend, but that of",
         ),
         (TABLE + "table = [[0, 0], [1, 0, 1], [1, 1, 1], [2, 0, 2]]", "path.p.table: some points have a time"),
         ('[path.p]\ntype = "sequence"\npaths = ["q", "p"]', "path.p.paths: unknown path (got 'q')"),

@@ -366,7 +366,7 @@ def test_a_sequence_is_its_paths_with_rest_between():
         (lambda: TabulatedPath(WAVE, motion_time=1.0, max_acceleration=1.0), "max_acceleration: its law of motion is"),
         (lambda: TabulatedPath(WAVE, motion_time=1.0, max_speed=1.0), "max_speed: a largest speed needs"),
         (lambda: TabulatedPath(WAVE, times=(0.0, 1.0)), "times: there are 9 points and 2 times"),
-        (lambda: TabulatedPath(WAVE, times=(0, 1, 2, 2, 3, 4, 5, 6, 7)), "times: its times must ascend, that of"),
+        (lambda: TabulatedPath(WAVE, times=(0, 1, 2, 2, 3, 4, 5, 6, 7)), "times: its times must ascend, but that of"),
         (lambda: TabulatedPath(np.zeros((10_001, 2)), motion_time=1.0), "points: too many"),
         (lambda: SequencePath((PATHS["line"],)), "paths: a sequence needs two paths"),
         (lambda: SequencePath((PATHS["line"], PATHS["circle"])), "paths: path 2 starts .* m from where the one before"),

@@ -461,7 +461,7 @@ def test_more_load_than_any_equilibrium_carries_is_a_limit_point_error_with_the_
 
 
 def test_what_nothing_holds_is_said() -> None:
-    with pytest.raises(EquilibriumError, match="hold what turns or slides freely"):
+    with pytest.raises(EquilibriumError, match="hold joints that turn or slide freely"):
         pf.statics(truss(), moved={"apex.T.y": -0.1})
 
 

@@ -101,7 +101,7 @@ def test_a_mechanism_that_turns_freely_is_refused_with_the_remedy():
         done = paraflex("statics", "five_bar", "--torque", "left=0.1")
         assert done.returncode in (1, 2)
         assert "error: no static equilibrium is found near the start" in done.stderr
-        assert "hold what turns or slides freely" in done.stderr
+        assert "hold joints that turn or slide freely" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -125,8 +125,8 @@ def _mobility(free: Mobility, drives: Reach) -> Iterator[Finding]:
             "special-pose", "assembly",
             f"a special pose: {free.freedoms} degrees of freedom at this instant, "
             + (f"{free.nearby_freedoms} a little further along" if free.nearby_freedoms else
-               "but no way on from it was found"),
-            "which way the mechanism goes on from there is left to rounding: start elsewhere",
+               "but no continuation from it was found"),
+            "rounding decides how the mechanism continues from there: start elsewhere",
         )  # fmt: skip
     for name, reached in drives.modes.items():
         if reached < drives.freedoms:
@@ -166,5 +166,5 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
         yield Finding(
             "motions-grow", "assembly",
             f"{growing} {'motion grows' if growing == 1 else 'motions grow'} about the pose{held} instead of vibrating",
-            "is it to be unstable there? look at gravity's sign, springs and loads, or start from --balanced",
+            "should it be unstable there? look at gravity's sign, springs and loads, or start from --balanced",
         )  # fmt: skip

@@ -43,7 +43,7 @@ _SHORTEST, _MOST_STEPS = 1e-6, 2000
 # A branch has returned if links are this close to the start [sizes of the mechanism, rad].
 _BACK = 1e-6
 _LIMIT_ITERATIONS, _AT_LIMIT = 40, 1e-9
-_LOOSE = "hold what turns or slides freely, start nearer to the equilibrium, or make links and springs stiffer"
+_LOOSE = "hold joints that turn or slide freely, start nearer to the equilibrium, or make links and springs stiffer"
 
 
 class Point(NamedTuple):
@@ -95,7 +95,7 @@ class Branch:
         try:
             found = self._solve(begin, self._only_s(begin), 0.0, longest=_LONGEST_MOVE)
             if self.equations.gap(found) > _GAP:
-                raise EquilibriumError("what is held contradicts the joints", remedy="hold fewer coordinates")
+                raise EquilibriumError("held coordinates contradict the joints", remedy="hold fewer coordinates")
             return Point(found, self._tangent(found, self._only_s(found)))
         except _Failed:
             raise EquilibriumError("no static equilibrium is found near the start", remedy=_LOOSE) from None
@@ -168,7 +168,7 @@ class Branch:
             names = ", ".join(one.name for one in stuck)
             return EquilibriumError(
                 f"no equilibrium beyond load factor {at.s:.6g}: the travel of {names} follows from the joints and "
-                "from what else is held and moved",
+                "from other held and moved coordinates",
                 remedy="leave it out, or hold and move less",
             )
         return EquilibriumError(

@@ -216,7 +216,7 @@ class Statics(Shown):
                 "equilibrium-unstable", "",
                 f"{unstable.size} of {len(self.equilibria)} equilibria are unstable, the first at load factor "
                 f"{first.point.at.s:.4g}: {self.moving_away(unstable[0])}",
-                "such a state is not reached by itself: give less, hold the motion that grows, or move a coordinate "
+                "such a state is not reached on its own: give less, hold the motion that grows, or move a coordinate "
                 "in place of loading it",
             ),
             *stresses,

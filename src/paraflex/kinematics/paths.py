@@ -362,7 +362,7 @@ class TabulatedPath(CheckedFields):
         late = np.flatnonzero(np.diff(times) <= 0.0)
         if late.size:
             raise InputError(
-                f"its times must ascend, that of point {late[0] + 2} does not", field="times",
+                f"its times must ascend, but that of point {late[0] + 2} does not", field="times",
                 value=float(times[late[0] + 1]), remedy=f"it follows t = {times[late[0]]:g} s",
             )  # fmt: skip
 

@@ -120,15 +120,15 @@ _COMMENTS = {
     "joint_force": (
         "at the joint's point of the second body, in the ground frame: of the constraints and of motors, springs, "
         "dampers, friction, gears and prescribed motion along the joint; the opposite acts on the first body; NaN "
-        "where redundant constraints share it in any way"
+        "where redundant constraints leave it undetermined"
     ),
     "joint_moment": (
         "about the joint's point of the second body, positive anticlockwise: of the constraints and of motors, "
         "springs, dampers, friction, gears and prescribed motion that turn the joint; the opposite acts on the first "
-        "body; NaN where redundant constraints share it in any way"
+        "body; NaN where redundant constraints leave it undetermined"
     ),
     "multiplier": (
-        "stands on the left of the equations of motion: minus it acts on the joint's second body, in the ground frame, "
+        "on the left of the equations of motion: its negative acts on the joint's second body, in the ground frame, "
         "anticlockwise, or along the joint's axis or normal, of a gear at its second joint; of least norm where "
         "constraints depend on one another"
     ),

@@ -391,14 +391,14 @@ _ALL = (
                 "N m", lambda x: x.effort[-1], "force or torque", each=COORDINATE),
     _of_statics("effort_max", "largest magnitude of the force or torque at each named coordinate", "N m",
                 lambda x: _peaks(x.effort), "largest force or torque", each=COORDINATE, judged=True),
-    _of_statics("stiffness", "stiffness of each coordinate asked for at the last step", "N m/rad",
+    _of_statics("stiffness", "stiffness of each requested coordinate at the last step", "N m/rad",
                 lambda x: x.stiffness[-1], each=DIRECTION),
-    _of_statics("stiffness_min", "least stiffness of each coordinate asked for, of all steps", "N m/rad",
+    _of_statics("stiffness_min", "least stiffness of each requested coordinate, of all steps", "N m/rad",
                 lambda x: np.min(x.stiffness, axis=0), "least stiffness", each=DIRECTION),
-    _of_statics("compliance", "displacement by a unit force of each coordinate asked for at the last step; infinite "
+    _of_statics("compliance", "displacement by a unit force of each requested coordinate at the last step; infinite "
                 "past buckling", "rad/N/m",
                 lambda x: x.compliance[-1], each=DIRECTION, judged=True),
-    _of_statics("compliance_max", "largest compliance of each coordinate asked for, of all steps", "rad/N/m",
+    _of_statics("compliance_max", "largest compliance of each requested coordinate, of all steps", "rad/N/m",
                 lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, judged=True),
     _of_statics("frequency", "lowest natural frequency at the last step, held and moved coordinates fixed", "Hz",
                 lambda x: x.frequency[-1], "lowest natural frequency at the last step"),

@@ -41,7 +41,7 @@ UNITS = {
     "place": ("value of a named coordinate", ""),
     "travel": ("change of a named coordinate since the start", ""),
     "effort": ("force or torque at a named coordinate: given, or what holds or moves it", ""),
-    "role": ("what is given of a named coordinate", "1"),
+    "role": ("role of a named coordinate: loaded, held, moved or free", "1"),
     "stiffness": ("force for a unit displacement of a named coordinate", ""),
     "compliance": ("displacement by a unit force at a named coordinate", ""),
     "natural_frequency": ("undamped natural frequency about the equilibrium, held", "Hz"),
@@ -61,7 +61,7 @@ _COMMENTS = {
     "stiffness": "others are held and moved as they are, the coordinate itself set free; infinite where it cannot move",
     "natural_frequency": "zero for a motion that grows; held and moved coordinates are fixed",
     "free_frequency": "zero for a motion that grows; moved coordinates are released, under the force that moved them",
-    "buckling_factor": "that of the limit point to which stable steps lead, else a linear estimate from the stiffness "
+    "buckling_factor": "value at the limit point to which stable steps lead, else a linear estimate from the stiffness "
     "and its change along the branch; NaN where none is, see buckling_note",
 }
 

@@ -80,7 +80,7 @@ def _beside(mechanism: Mechanism) -> Iterator[Finding]:
                     yield Finding(
                         "point-unused", f"joint.{free.point}",
                         f"it and another joint hold {point}, and nothing holds {free}",
-                        f"is it to hold {free}?",
+                        f"should it hold {free}?",
                     )  # fmt: skip
 
 

@@ -174,7 +174,7 @@ def _gravity(gravity: Place) -> Iterator[Finding]:
     if abs(strength - STANDARD_GRAVITY) > ON_EARTH:
         yield Finding("gravity", "gravity", f"{text} is {strength:.4g} m/s^2", "on Earth it is 9.81, in m/s^2")
     elif 0.0 not in gravity:
-        yield Finding("gravity", "gravity", f"{text} is along no axis", "is the mechanism to lie on a slope?")
+        yield Finding("gravity", "gravity", f"{text} is along no axis", "does the mechanism lie on a slope?")
     elif max(gravity) > 0.0:
         yield Finding("gravity", "gravity", f"{text} pulls towards positive {'xy'[gravity[1] > 0.0]}", "is it -9.81?")
 

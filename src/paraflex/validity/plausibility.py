@@ -170,8 +170,8 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
         yield Finding(
             "loads-undetermined", "", f"{' and '.join(parts)} are not determined, because constraints are redundant, "
             "and tables omit them",
-            "leave out what holds or drives twice, with `slot` or `revolute` joints in place of `prismatic` or `weld` "
-            "ones, or make links flexible in what they share",
+            "leave out redundant joints or drives, with `slot` or `revolute` in place of `prismatic` or `weld` "
+            "ones, or make the links between them flexible",
         )  # fmt: skip
 
 
@@ -192,7 +192,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
     k = int(np.argmax(slopes[worst]))
     if slopes[worst][k] > STEEP:
         blame = where.blame(worst) or (
-            f"look at section and Young's modulus of {worst}, and at what moves and loads it"
+            f"look at section and Young's modulus of {worst}, and at its motion and loads"
             + _moving(where.mechanism, solution)
         )
         yield Finding(
