@@ -399,7 +399,7 @@ def test_back_emf_that_comes_late_or_unasked_is_found(square):
     run = pf.simulate(task, "+-+-", warning=False)
     found = {one.code: one for one in run.doubts}
     assert found["back-emf-passive"].text.startswith("motor tau6 is passive")
-    late = re.search(r"L/R = 0.5 ms makes up to ([\d.]+) of ([\d.]+)", found["back-emf-late"].text)
+    late = re.search(r"L/R = 0.5 ms would delay up to ([\d.]+) of ([\d.]+)", found["back-emf-late"].text)
     assert late
     k = run.task.mechanism.motors.index(next(one for one in run.task.mechanism.motors if one.name == "tau6"))
     assert float(late[2]) == pytest.approx(np.max(np.abs(run.electrical.torque[:, k])), rel=1e-2)

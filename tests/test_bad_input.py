@@ -156,7 +156,8 @@ FIELDS = [
     # Points of bodies
     ('B = "reach" }\nelements', "B = 0.3 }\nelements", "body.left.points.B: the point lies beyond", "0.25 m"),
     ('B = "reach" }\nelements', "B = -0.1 }\nelements", "body.left.points.B: the point lies beyond", "between 0 and"),
-    ('lumps = { B = "pin" }', 'lumps = { Z = "pin" }', "body.left.lumps: a lump on an unknown point (got 'Z')", "A, B"),
+    ('lumps = { B = "pin" }', 'lumps = { Z = "pin" }', "body.left.lumps: a lumped mass at an unknown point (got 'Z')",
+     "A, B"),
     # Expressions
     ('reach = "2.5 * base"', 'reach = "2.5 * bose"', 'parameters.reach: unknown parameter "bose"', '"base"?'),
     ('reach = "2.5 * base"', 'reach = "2.5 *"', "parameters.reach: neither a number nor an expression", "like"),

@@ -230,7 +230,7 @@ def test_what_they_cannot_do_is_refused_in_one_line():
         Start(deflection={"a": {"B": Deflection(transverse=0.01)}}),
         Start(coordinates={"a": BodyValues(0, 0, 0)}),
     ):
-        with pytest.raises(pf.InputError, match=r"cannot be given of a beam in several frames"):
+        with pytest.raises(pf.InputError, match=r"cannot be given for a beam in several frames"):
             pf.simulate_motion(framed(one_beam(), 2), 0.01, samples=3, start=start)
     robot = pf.load("five_bar")
     task = pf.plan(framed(robot.mechanism.with_geometry("linear"), 2), next(iter(robot.paths.values())), samples=11)

@@ -527,7 +527,7 @@ def test_a_drive_that_leaves_a_change_point_from_rest_is_refused(tmp_path, law):
 @pytest.mark.parametrize("start", [4.0, -7.0])
 def test_a_way_through_a_change_point_is_barred(tmp_path, start):
     """Either branch may lead on there: the rocker began whole turns away, or on the branch of the parallelogram."""
-    with pytest.raises(AssemblyError, match=r"bar the way .* or a change point"):
+    with pytest.raises(AssemblyError, match=r"block the way .* or a change point"):
         pf.simulate_motion(parallelogram(tmp_path, f"{start} + 5 * t", CROSSED), 0.1)
 
 

@@ -286,7 +286,10 @@ def test_the_study_names_controllers_and_none_is_none_of_them(robot, tmp_path):
         (["--controller", "none", "--controller", "pd"], "--controller: goes with no other .*say it alone"),
         (["--controller", "pd", "--ked"], "--controller: has no effect with --ked"),
         (["--controller", "pd", "--after", "hold", "--duration", "0.6"], "--after: brakes are not for motors under"),
-        (["--controller", "pd", "--method", "rk45"], "--method: goes on from time to time with own methods only"),
+        (
+            ["--controller", "pd", "--method", "rk45"],
+            "--method: continues from time to time with paraflex's own methods only",
+        ),
         (["--controller", "brake", "--mode", "-+-+"], r"robot.toml: controller.brake.outputs: unknown motor"),
     ],
 )

@@ -501,7 +501,7 @@ def test_a_rod_without_length_needs_an_assembly_with_its_points_apart():
 def test_a_body_on_rods_alone_needs_a_place():
     rods = double_pendulum()
     only = {ref("upper.C"): (0.4, -0.2)}
-    with pytest.raises(InputError, match=r"distances alone do not give a body its place \(got 'lower'\)") as caught:
+    with pytest.raises(InputError, match=r"distances alone do not determine a body's place \(got 'lower'\)") as caught:
         replace(rods, assemblies=(replace(rods.assemblies[0], points=only),))
     assert caught.value.field == "assembly.start.points"
 

@@ -266,7 +266,7 @@ def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:
         assert said in done.stderr
     with pytest.raises(pf.InputError, match="not a model"):
         pf.draw(3)
-    with pytest.raises(pf.InputError, match="nothing says where the bodies are"):
+    with pytest.raises(pf.InputError, match="the poses of the bodies are unknown"):
         pf.draw(replace(pf.load("slider_crank").mechanism, assemblies=()))
 
 

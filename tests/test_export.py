@@ -171,7 +171,10 @@ def test_a_folder_that_cannot_be_written(data, tmp_path):
     ("arguments", "message"),
     [
         (["--to", "matlab"], "--to: no such format (got 'matlab'); did you mean \"mat\"?"),
-        (["--to", "mat", "--output", "out.csv"], "--output: does not end as mat does (got 'out.csv'); end it in .mat"),
+        (
+            ["--to", "mat", "--output", "out.csv"],
+            "--output: does not have the ending of mat (got 'out.csv'); end it in .mat",
+        ),
     ],
 )
 def test_the_command_names_the_option_at_fault(folder, monkeypatch, capsys, arguments, message):

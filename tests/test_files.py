@@ -57,7 +57,7 @@ BROKEN = [
     ),
     ('section = "bar"', 'section = "baar"', "body.link1.section: unknown section", 'did you mean "bar"?'),
     ('material = "aluminium"', 'material = "steel"', "body.link1.material: unknown material", "aluminium"),
-    ('B1 = "joint" }', 'B9 = "joint" }', "body.link1.lumps: a lump on an unknown point (got 'B9')", "A1, B1"),
+    ('B1 = "joint" }', 'B9 = "joint" }', "body.link1.lumps: a lumped mass at an unknown point (got 'B9')", "A1, B1"),
     ('B1 = "joint" }', 'B1 = "joit" }', "body.link1.lumps.B1: unknown lump", 'did you mean "joint"?'),
     ("B1 = 0.250 }", "B1 = 0.3 }", "body.link1.points.B1: the point lies beyond the beam's end", "between 0 and"),
     ("elements = 3", "elements = 0", "body.link1.elements: a span needs at least one element", "1 or more"),

@@ -101,7 +101,7 @@ def test_info_judges_in_three_levels_and_ends_with_1_where_it_is_wrong(tmp_path)
     steel = slipped(tmp_path, "gantry", "210e9", "210.0")
     doubtful = paraflex("info", str(steel))
     assert doubtful.returncode == 0
-    assert "doubtful: body.rod1.material.youngs_modulus: 210 Pa is that of no solid" in doubtful.stdout
+    assert "doubtful: body.rod1.material.youngs_modulus: no solid has a modulus of 210 Pa" in doubtful.stdout
     assert doubtful.stderr == ""
     assert "210e9, aluminium 70e9 [modulus]" in doubtful.stdout
     assert "verdict: doubtful, for" in doubtful.stdout
@@ -124,14 +124,14 @@ def test_a_run_says_what_it_doubts_once_before_its_numbers_and_keeps_it(tmp_path
     assert done.returncode == 0, done.stderr
     text = done.stdout + done.stderr
     assert text.count("[density]") == 1
-    assert done.stdout.startswith("warning: body.rod1.material.density: 7.85 kg/m^3 is that of no solid")
+    assert done.stdout.startswith("warning: body.rod1.material.density: no solid has a density of 7.85 kg/m^3")
     figures = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert figures["verdict"]["level"] == "doubtful"
     assert "density" in [one["code"] for one in figures["verdict"]["findings"]]
     assert "density" in verdict_of(pf.load_results(out)).codes
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("7.85 kg/m^3 is that of no solid") == 1
-    assert page.index("7.85 kg/m^3 is that of no solid") < page.index("<table")
+    assert page.count("no solid has a density of 7.85 kg/m^3") == 1
+    assert page.index("no solid has a density of 7.85 kg/m^3") < page.index("<table")
     # With --json numbers stand alone on the standard output.
     done = paraflex(*command, "--no-report", "--json")
     assert json.loads(done.stdout)["verdict"]["level"] == "doubtful"

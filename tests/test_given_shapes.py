@@ -668,7 +668,7 @@ def test_info_and_run_take_them(tmp_path, source):
         ("[0, 0, 1],", '[0, 0, "l"],', 'body.rod.transverse_polynomials.0.2: unknown parameter "l"'),
         ('"assumed-modes"', '"assumed"', "body.rod.type: unknown type (got 'assumed'); did you mean \"assumed-modes"),
         ('section = "bar"', 'section = "bra"', "body.rod.section: unknown section (got 'bra')"),
-        ('P = "tip" }', 'Q = "tip" }', "body.rod.lumps: a lump on an unknown point (got 'Q')"),
+        ('P = "tip" }', 'Q = "tip" }', "body.rod.lumps: a lumped mass at an unknown point (got 'Q')"),
         ('P = "L" }', "P = 0.6 }", "body.rod.points.P: the point lies beyond the beam's end"),
         ("[[0, 0, 1]", "[[]", "body.rod.transverse: has no coefficients"),
         ("transverse_poly", "transverse_sines = -1\ntransverse_poly", "body.rod.transverse_sines: must not be neg"),

@@ -226,7 +226,7 @@ def test_a_tolerance_is_held_against_the_size_of_the_mechanism():
     assert not [one for one in run(0.04 * size).doubts if one.code == "tolerance-loose"]
     with pytest.warns(pf.ResultWarning, match=r"tolerance: .* m, in a mechanism of about 0.5 m: .*\[tolerance-loose\]"):
         run(0.06 * size)
-    with pytest.raises(InputError, match=r"tolerance: more than the mechanism is large, about 0.5 m \(got 2.0\)"):
+    with pytest.raises(InputError, match=r"tolerance: larger than the mechanism, about 0.5 m \(got 2.0\)"):
         run(2.0)
 
 
@@ -236,7 +236,7 @@ def test_info_and_run_say_so_of_a_study(tmp_path):
     assert "tolerance-loose" not in check("pendulum").codes
     run = paraflex("run", "-m", "pendulum", "--tol", "3", "--out", str(tmp_path / "out"))
     assert run.returncode == 2
-    assert run.stderr.startswith("error: --tol: more than the mechanism is large, about 0.5 m (got 3.0); it is in m:")
+    assert run.stderr.startswith("error: --tol: larger than the mechanism, about 0.5 m (got 3.0); it is in m:")
 
 
 # --- Text that is shown ----------------------------------------------------------------------------------------------

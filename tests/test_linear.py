@@ -430,10 +430,10 @@ def test_what_cannot_be_linearised_is_named(raparm_at_q):
 def test_a_pose_has_no_time_and_a_motion_no_pose():
     model = pf.load("five_bar")
     task = model.plan()
-    with pytest.raises(InputError, match="at: means nothing for a pose at rest"):
+    with pytest.raises(InputError, match="at: has no meaning for a pose at rest"):
         linearise(model, at=0.05)
     for given in ({"assembly": model.mechanism.assemblies[0].name}, {"balanced": True}):
-        with pytest.raises(InputError, match=f"{next(iter(given))}: means nothing for a motion"):
+        with pytest.raises(InputError, match=f"{next(iter(given))}: has no meaning for a motion"):
             linearise(task, **given)
 
 

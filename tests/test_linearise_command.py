@@ -41,7 +41,7 @@ def test_a_motor_that_moves_only_as_others_do_is_held_with_them():
     rigid = pf.linearise(parallelogram().rigid())
     # One of the two motors' joints is the state; either holds the mechanism.
     assert [rigid.motions([name]).poles.size for name in ("tau1", "tau2")] == [0, 0]
-    with pytest.raises(pf.InputError, match="is no motor"):
+    with pytest.raises(pf.InputError, match="is not a motor"):
         rigid.motions(["tau9"])
 
 
@@ -324,7 +324,7 @@ def test_a_run_from_equilibrium_is_made_again_from_there(tmp_path):
 def test_about_equilibrium():
     weight = ["--set", "gravity=[0,-9.81]"]
     off = paraflex("linearise", "five_bar", *weight)
-    assert "not in equilibrium: let go, the mechanism would start with 9.02 m/s^2" in off.stdout
+    assert "not in equilibrium: if released, the mechanism would start with 9.02 m/s^2" in off.stdout
     balanced = paraflex("linearise", "five_bar", *weight, "--balanced")
     assert balanced.returncode == 0
     assert "about static equilibrium" in balanced.stdout
@@ -351,7 +351,7 @@ BAD = [
     (["five_bar", "--force-at", "link1.Z"], "--force-at: unknown body"),
     (["five_bar", "--coordinates", "x"], "--coordinates: unknown first coordinates (got 'x')"),
     (["four_bar", "--coordinates", "task"], "--coordinates: needs an end-effector"),
-    (["five_bar", "--prescribed", "x"], "--prescribed: is no prescribed motion"),
+    (["five_bar", "--prescribed", "x"], "--prescribed: is not a prescribed motion"),
 ]  # fmt: skip
 
 

@@ -192,7 +192,7 @@ def test_a_modulus_in_gigapascals_is_named_by_the_error(tmp_path, monkeypatch, c
     out, err = capsys.readouterr()
     assert code in (1, 2)
     said = out + err
-    assert "is that of no solid" in said
+    assert "no solid has a modulus of" in said
     (error,) = (line for line in err.splitlines() if line.startswith("error: "))
     assert "most likely because of body." in error
     assert ".material.youngs_modulus: " in error
@@ -271,7 +271,7 @@ def test_files_that_are_no_results(tmp_path):
         ),
         (other, "a netCDF file, but not of paraflex; name a results.nc that paraflex wrote"),
         (later, "written by a later version, paraflex 99.0 (schema 1000000"),
-        (tmp_path / "sweep", "the folder of a study of many runs, whose figures are in results.parquet; it kept no"),
+        (tmp_path / "sweep", "the folder of a study of many runs, whose results are in results.parquet; it kept no"),
         (tmp_path / "empty", "no results in this folder (no results.nc"),
     ]:
         assert f"{path}: {says}" in message(lambda path=path: open_results(path))

@@ -125,5 +125,5 @@ def test_a_path_with_angles_wants_a_task_with_one(tmp_path):
     model = load(write(tmp_path, (', "angle"]', "]"), ("orientation = 1.3\n", ""), ('W = ["lower.b", "tool.a"]', ""),
                        ('wrist = "W"', ""), ('"tool.b"', '"lower.b"'), ('["+++"]', '["++"]'), ("tool = 1.5", ""),
                        (ARM[ARM.index("[body.tool]") : ARM.index("[joint]")], "")))  # fmt: skip
-    with pytest.raises(InputError, match=r"end_effector\.coordinates: the path gives angles, the task has none"):
+    with pytest.raises(InputError, match=r"end_effector\.coordinates: the path gives angles, but the task has none"):
         follow_path(model.mechanism, model.paths["turning"], [0.0, 0.1])

@@ -226,7 +226,7 @@ def test_without_sundials_the_remedy_is_named(kind, monkeypatch):
 
 
 def test_gains_that_follow_the_step_are_refused():
-    with pytest.raises(InputError, match="automatic gains follow the steps, which bdf does not show"):
+    with pytest.raises(InputError, match="automatic gains need the step sizes, which bdf does not show"):
         run(build_system(arm()), "bdf", automatic_gains=True)
 
 

@@ -90,7 +90,7 @@ TABLE = '[path.p]\ntype = "table"\n'
     ("text", "says"),
     [
         (TABLE + "motion_time = 1", "path.p.table: "),
-        (TABLE + 'table = "drawn.csv"', "path.p.max_acceleration: nothing says how fast it is passed; give max_acc"),
+        (TABLE + 'table = "drawn.csv"', "path.p.max_acceleration: its law of motion is not given; give max_acc"),
         (TABLE + 'table = "timed.csv"\nmotion_time = 1', "path.p.motion_time: its law of motion is given in two ways"),
         (TABLE + 'table = "missing.csv"\nmotion_time = 1', "path.p.table: cannot be read (no such file or directory)"),
         (TABLE + 'table = "one.csv"\nmotion_time = 1', "path.p.table: line 1 of one.csv is not two or three numbers"),
@@ -100,7 +100,7 @@ TABLE = '[path.p]\ntype = "table"\n'
         (TABLE + "table = [[0, 0], [1, 0], [1, 1]]\nmotion_time = 1", "path.p.table: not a list of points"),
         (
             TABLE + "table = [[0, 0, 0], [1, 0, 1], [1, 1, 1], [2, 0, 2]]",
-            "path.p.table: its times must ascend, that of",
+            "path.p.table: its times must ascend, but that of",
         ),
         (TABLE + "table = [[0, 0], [1, 0, 1], [1, 1, 1], [2, 0, 2]]", "path.p.table: some points have a time"),
         ('[path.p]\ntype = "sequence"\npaths = ["q", "p"]', "path.p.paths: unknown path (got 'q')"),

@@ -235,7 +235,7 @@ def test_other_mechanisms_along_their_motion(model, path, unit):
         ({"states": 12}, "states: are those of the basis, 16"),
         ({"method": "rubin"}, "method: is that of the basis"),
         ({"part": 0.5}, "part: is not between the bases"),
-        ({"mode": "++++"}, "mode: means nothing for a linear model"),
+        ({"mode": "++++"}, "mode: has no meaning for a linear model"),
         ({"basis": []}, "basis: names none"),
         ({"basis": None, "part": 0.5}, "basis: names none"),
     ],
@@ -250,9 +250,9 @@ def test_bases_that_cannot_be_taken_over():
     few, full = reduced(0.0, 0.264), pf.linearise(MECHANISM, mode="+-+-", start=start_at(0.0, 0.264))
     with pytest.raises(pf.InputError, match="basis: does not keep the motors' coordinates"):
         pf.reduce(full, basis=pf.reduce(full, method="modal"))
-    with pytest.raises(pf.InputError, match="basis: is of a mechanism with other bodies or motors than five-bar"):
+    with pytest.raises(pf.InputError, match="basis: belongs to a mechanism with other bodies or motors than five-bar"):
         pf.reduce(pf.load("five_bar"), basis=few)
-    with pytest.raises(pf.InputError, match="basis: is of a mechanism with other bodies or motors than five-bar"):
+    with pytest.raises(pf.InputError, match="basis: belongs to a mechanism with other bodies or motors than five-bar"):
         pf.reduce(pf.linearise(pf.load("five_bar")), basis=few)
     task = pf.linearise(MECHANISM, mode="+-+-", start=start_at(0.0, 0.264), coordinates="task")
     with pytest.raises(pf.InputError, match="basis: has other coordinates than the model"):

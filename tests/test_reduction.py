@@ -112,7 +112,7 @@ def test_info_complains_of_a_beam_that_is_too_stiff_under_its_motor():
     reduced = model.mechanism.with_beams(reference=PINNED, modes=2)
     (finding,) = check(replace(model, mechanism=reduced))
     assert (finding.code, finding.place) == ("modes-too-stiff", "body.beam.modes")
-    assert finding.text.startswith("2 modes miss 24 % of its turn under a moment at root, which the prescribed")
+    assert finding.text.startswith("2 modes miss 24 % of its rotation under a moment at root from the prescribed")
     assert "craig-bampton" in finding.remedy
     assert not check(replace(model, mechanism=model.mechanism.with_beams(reference=CANTILEVER, modes=2)))
 
@@ -182,7 +182,7 @@ def test_a_file_says_what_is_kept(tmp_path):
 
 
 def test_what_cannot_be_reduced_is_said():
-    with pytest.raises(InputError, match=r"body\.beam\.reduction: says nothing without modes .* modes = 2"):
+    with pytest.raises(InputError, match=r"body\.beam\.reduction: has no meaning without modes .* modes = 2"):
         clamped(PINNED, None).with_beams(reduction="craig-bampton")
     with pytest.raises(InputError, match="no such number of modes"):
         with_static_shapes(clamped(PINNED, None), -1)
@@ -191,7 +191,7 @@ def test_what_cannot_be_reduced_is_said():
     sliding = SlidingJoint("rail", PointRef("beam", "A"), PointRef("carriage", "P"))
     pose = (Assembly("straight", {"beam": 0.0, "carriage": 0.0}),)
     lever = replace(lever, bodies=(*lever.bodies, carriage), joints=(*lever.joints, sliding), assemblies=pose)
-    with pytest.raises(InputError, match=r"body\.beam\.reduction: something slides along it"):
+    with pytest.raises(InputError, match=r"body\.beam\.reduction: a joint slides along it"):
         build_system(with_static_shapes(lever, 1))
 
 

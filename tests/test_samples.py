@@ -51,7 +51,7 @@ def test_a_stress_that_samples_miss_is_found_with_the_number_that_has_it(shaper)
     # The text has the numbers of the samples, and the true ones to the same percent as its remedy.
     numbers = [float(each) for each in re.findall(r"([0-9.]+) (?:MPa|N)\b", found.text)]
     np.testing.assert_allclose(numbers, [stress, true_stress, force, true_force], rtol=0.01)
-    enough = int(re.fullmatch(r"say samples = (\d+)", found.remedy).group(1))
+    enough = int(re.fullmatch(r"give samples = (\d+)", found.remedy).group(1))
     remedied = pf.simulate_motion(model, samples=enough, balanced=True)
     np.testing.assert_allclose(largest(remedied), [true_stress, true_force], rtol=LARGER)
     assert not coarse(remedied)

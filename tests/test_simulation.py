@@ -397,7 +397,10 @@ def test_continuous_models_are_refused():
     [
         (lambda task: Simulation(task, duration=1.0), "duration: a plan says it itself"),
         (lambda task: Simulation(task, mode="+-"), "mode"),
-        (lambda task: Simulation(task, method="radau"), "method: goes on from time to time with own methods only"),
+        (
+            lambda task: Simulation(task, method="radau"),
+            "method: continues from time to time with paraflex's own methods only",
+        ),
         (lambda task: Simulation(rotor(), duration=1.0, feed_forward=True), "feed_forward: there is no plan"),
         (lambda task: Simulation(rotor()), "duration: is missing"),
         (lambda task: simulated_rotor().step([1.0, 2.0], 0.01), "torques: not 1 finite numbers"),

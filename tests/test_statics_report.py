@@ -122,7 +122,7 @@ def test_steps_until_a_failure_are_reported():
         pf.statics(pf.load("pendulum"), loads={"pivot": 3.0}, held=[], steps=4)
     page = statics_page(pf.statics_dataset(caught.value.partial))
     assert page.verdict == "failed"
-    assert page.notes[0].startswith("failed: no equilibrium with more than")
+    assert page.notes[0].startswith("failed: no equilibrium beyond load factor")
 
 
 @pytest.mark.parametrize(("width", "height"), [(1400, 1000), (390, 844)])

@@ -243,7 +243,7 @@ def test_designs_that_carry_less_than_what_is_given_fail_with_the_reason(tmp_pat
     )  # fmt: skip
     found = pf.sweep(file, tmp_path / "out")
     assert found.data["status"].values.tolist() == ["complete", "failed"]
-    assert "no equilibrium with more than" in found.data["reason"].values[1]
+    assert "no equilibrium beyond load factor" in found.data["reason"].values[1]
 
 
 def test_a_study_may_have_all_of_the_statics_and_a_mechanism_a_path(tmp_path):

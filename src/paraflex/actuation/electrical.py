@@ -150,8 +150,8 @@ def _beyond(actuator: Actuator, motor: str, current: Array, voltage: Array) -> I
         if limit is not None and most > (1.0 + _BEYOND) * limit:
             yield Finding(
                 "amplifier-beyond", f"actuator.{actuator.name}.{word}_limit",
-                f"motor {motor} takes {most:.3g} {unit} where its amplifier gives {limit:.3g} {unit}",
-                "ask for less acceleration, or choose another gear or motor",
+                f"motor {motor} needs {most:.3g} {unit}, but its amplifier supplies {limit:.3g} {unit}",
+                "reduce the acceleration, or choose another gear or motor",
             )  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def _late(actuator: Actuator, motor: str, found: Electrical, k: int) -> Iterator
     if late > _LATE * most > 0.0:
         yield Finding(
             "back-emf-late", f"actuator.{actuator.name}.inductance",
-            f"back-EMF of motor {motor} acts at once, where L/R = {1e3 * actuator.electrical_time:.3g} ms makes up to "
-            f"{late:.3g} of {most:.3g} (N m or N) come later",
-            'take results for those without inductance there, or amplifier = "current" with the bandwidth of its loop',
+            f"back-EMF of motor {motor} acts at once, but L/R = {1e3 * actuator.electrical_time:.3g} ms would delay up "
+            f"to {late:.3g} of {most:.3g} (N m or N)",
+            'read results as those without inductance, or use amplifier = "current" with the bandwidth of its loop',
         )  # fmt: skip

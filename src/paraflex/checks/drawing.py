@@ -86,7 +86,7 @@ def draw(
 
     if not _NARROWEST <= width <= _WIDEST:
         remedy = f"from {_NARROWEST:g} to {_WIDEST:g} mm"
-        raise InputError("no width of a drawing", field="width", value=width, remedy=remedy)
+        raise InputError("not a possible width of a drawing", field="width", value=width, remedy=remedy)
 
     shown = pose_of(model, assembly=assembly, path=path)
     for problem in shown.problems:

@@ -98,7 +98,7 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
     """Yield findings about the pose; `at_rest` adds whether a mechanism at rest there would stay."""
     if not seen.starts:
         yield Finding(
-            "assembly-missing", "assembly", "no assembly: it cannot be seen whether the loops close",
+            "assembly-missing", "assembly", "no assembly: it is unknown whether the loops close",
             "add an [assembly.NAME] table with an approximate angle of each body, in rad",
         )  # fmt: skip
     for start in seen.starts:
@@ -125,8 +125,8 @@ def _mobility(free: Mobility, drives: Reach) -> Iterator[Finding]:
             "special-pose", "assembly",
             f"a special pose: {free.freedoms} degrees of freedom at this instant, "
             + (f"{free.nearby_freedoms} a little further along" if free.nearby_freedoms else
-               "but no way on from it was found"),
-            "which way the mechanism goes on from there is left to rounding: start elsewhere",
+               "but no continuation from it was found"),
+            "rounding decides how the mechanism continues from there: start elsewhere",
         )  # fmt: skip
     for name, reached in drives.modes.items():
         if reached < drives.freedoms:
@@ -145,7 +145,7 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
         slowest = float(np.min(body.modes.omega, initial=math.inf)) / (2.0 * math.pi)
         if slowest < SLOWEST_LINK:
             yield Finding(
-                "frequency-low", f"body.{name}", f"it vibrates on its own at {slowest:.2g} Hz, as no link does",
+                "frequency-low", f"body.{name}", f"its natural frequency is {slowest:.2g} Hz, too low for a link",
                 f"look at Young's modulus, section and length of {name}: Pa and m",
             )  # fmt: skip
     mechanism = seen.system.mechanism
@@ -166,5 +166,5 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
         yield Finding(
             "motions-grow", "assembly",
             f"{growing} {'motion grows' if growing == 1 else 'motions grow'} about the pose{held} instead of vibrating",
-            "is it to be unstable there? look at gravity's sign, springs and loads, or start from --balanced",
+            "should it be unstable there? look at gravity's sign, springs and loads, or start from --balanced",
         )  # fmt: skip

@@ -53,7 +53,7 @@ def study_findings(
         return
     if model.mechanism.end_effector is None:
         yield Finding(
-            "end-effector-missing", "end_effector", "there is a path and no end-effector to follow it",
+            "end-effector-missing", "end_effector", "there is a path, but no end-effector to follow it",
             "add an [end_effector] table with its point",
         )  # fmt: skip
         return
@@ -177,7 +177,7 @@ def _few_samples(model: Model) -> Iterator[Finding]:
             yield Finding(
                 "samples-few", "study.samples",
                 f"{count} samples of {turns:.3g} turns of prescribed.{one.name} in {duration:.3g} s: "
-                f"{(count - 1) / turns:.2g} a turn do not show its motion",
+                f"{(count - 1) / turns:.2g} a turn do not resolve its motion",
                 "are speeds in rad/s, and the duration in s? If so, keep more samples",
             )  # fmt: skip
 
@@ -203,7 +203,7 @@ def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> It
     if not asked:
         what = "no actuation mode" if mechanism.motors else "no motor"
         yield Finding(
-            "mode-missing", "mode", f"there is a path and {what} to drive the mechanism along it",
+            "mode-missing", "mode", f"there is a path, but {what} to drive the mechanism along it",
             "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
         )  # fmt: skip
     yield from task_findings(task, asked, magnitudes=True)

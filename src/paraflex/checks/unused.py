@@ -50,7 +50,7 @@ def _unused(data: Mapping[str, Any]) -> Iterator[Finding]:
         for name in entries if isinstance(entries, Mapping) else ():
             if not is_used(name):
                 what = "no expression uses it" if table == "parameters" else "nothing in the file names it"
-                remedy = "leave it out, or look for where it was to be used: what stands there instead?"
+                remedy = "leave it out, or check which name stands where it should be used"
                 if table == "ground" and name in ModelTable.model_fields:
                     remedy = f"put it before the first table of the file, if {name} of the mechanism is meant"
                 yield Finding("unused", f"{table}.{name}", what, remedy)

@@ -163,7 +163,7 @@ def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array
         if found is not None and np.max(np.abs(found - pose) / system.units) < np.sqrt(_BARELY):
             return found, ""
     held = drives_at(system, pose, set(np.flatnonzero(away).tolist()))
-    way = "the joints bar the way from the assembly to the start of prescribed motions"
+    way = "the joints block the way from the assembly to the start of prescribed motions"
     return None, f"{way}, {held}, the limit of their reach or a change point,"
 
 

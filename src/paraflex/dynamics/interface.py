@@ -59,9 +59,9 @@ def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator
             beam = None if term.a.on_ground else mechanism.body(term.a.body)
             if isinstance(beam, FlexibleBeam) and beam.reduction is BodyReduction.CRAIG_BAMPTON:
                 raise InputError(
-                    "something slides along it, so that no static shapes are all it needs",
+                    "a joint slides along it, so that static shapes are not sufficient",
                     field=f"body.{beam.name}.reduction", value=beam.reduction.value,
-                    remedy='leave it out, or say "modal"',
+                    remedy='leave it out, or write "modal"',
                 )  # fmt: skip
         if term.kind != ANGLE:
             yield from ((term.a, place_rows), (term.b, place_rows))

@@ -90,7 +90,7 @@ def start_state(
         for name in given:
             if len(system.parts(name)) > 1:
                 raise InputError(
-                    "cannot be given of a beam in several frames", field=f"start.{field}.{name}",
+                    "cannot be given for a beam in several frames", field=f"start.{field}.{name}",
                     remedy="give velocities of points, or the beam one frame",
                 )  # fmt: skip
     if isinstance(assembly, str):
@@ -317,7 +317,7 @@ def _refuse_velocities(system: System, given: list[_Given], slip: Array, bad: ND
         f"{where}",
         field="start" if entry is None else entry.field,
         value=None if entry is None else entry.value,
-        remedy="give fewer velocities, or such as the joints allow",
+        remedy="give fewer velocities, or ones that the joints allow",
     )
 
 

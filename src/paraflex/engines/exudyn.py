@@ -68,7 +68,7 @@ class ExudynOptions:
             if not (np.isfinite(value) and value > 0.0):
                 raise InputError("must be positive", field=name, value=value, remedy=remedy)
         if self.refinement < 1:
-            raise InputError("must be at least 1", field="refinement", value=self.refinement, remedy="say 1 or 2")
+            raise InputError("must be at least 1", field="refinement", value=self.refinement, remedy="give 1 or 2")
         if not 0.0 <= self.spectral_radius <= 1.0:
             raise InputError(
                 "must be between 0 and 1", field="spectral_radius", value=self.spectral_radius, remedy="say 0.9"

@@ -43,7 +43,7 @@ _SHORTEST, _MOST_STEPS = 1e-6, 2000
 # A branch has returned if links are this close to the start [sizes of the mechanism, rad].
 _BACK = 1e-6
 _LIMIT_ITERATIONS, _AT_LIMIT = 40, 1e-9
-_LOOSE = "hold what turns or slides freely, start nearer to the equilibrium, or make links and springs stiffer"
+_LOOSE = "hold joints that turn or slide freely, start nearer to the equilibrium, or make links and springs stiffer"
 
 
 class Point(NamedTuple):
@@ -95,7 +95,7 @@ class Branch:
         try:
             found = self._solve(begin, self._only_s(begin), 0.0, longest=_LONGEST_MOVE)
             if self.equations.gap(found) > _GAP:
-                raise EquilibriumError("what is held contradicts the joints", remedy="hold fewer coordinates")
+                raise EquilibriumError("held coordinates contradict the joints", remedy="hold fewer coordinates")
             return Point(found, self._tangent(found, self._only_s(found)))
         except _Failed:
             raise EquilibriumError("no static equilibrium is found near the start", remedy=_LOOSE) from None
@@ -152,13 +152,13 @@ class Branch:
         given = self.equations.given.words
         if turned:
             cause = (
-                f"no equilibrium with more than {furthest:.6g} of what is given, {given}: the branch turns back there, "
-                "at a limit point, and does not come to more"
+                f"no equilibrium beyond load factor {furthest:.6g} ({given}): the branch turns back there, "
+                "at a limit point, and does not go further"
             )
             return LimitPointError(cause, remedy=f"give at most {furthest:.4g} of it")
         return EquilibriumError(
-            f"the branch of equilibria is followed for {_MOST_STEPS} steps and has come to {furthest:.6g} of what is "
-            f"given only, {given}", remedy="give less, or more where it is next to nothing",
+            f"the branch of equilibria is followed for {_MOST_STEPS} steps and has only reached load factor "
+            f"{furthest:.6g} ({given})", remedy="give less, or more where values are almost zero",
         )  # fmt: skip
 
     def _stopped(self, at: Unknowns) -> EquilibriumError:
@@ -167,13 +167,13 @@ class Branch:
         if stuck:
             names = ", ".join(one.name for one in stuck)
             return EquilibriumError(
-                f"no equilibrium beyond {at.s:.6g} of what is given: the travel of {names} follows from the joints and "
-                "from what else is held and moved",
+                f"no equilibrium beyond load factor {at.s:.6g}: the travel of {names} follows from the joints and "
+                "from other held and moved coordinates",
                 remedy="leave it out, or hold and move less",
             )
         return EquilibriumError(
-            f"no equilibrium is found beyond {at.s:.6g} of what is given, {self.equations.given.words}",
-            remedy="joints may not allow more, or links touch what the model has not: give less",
+            f"no equilibrium is found beyond load factor {at.s:.6g} ({self.equations.given.words})",
+            remedy="joints may not allow more, or links touch parts that the model lacks: give less",
         )
 
     def _next(self, here: Point, step: float, longest: float) -> tuple[Point, float]:

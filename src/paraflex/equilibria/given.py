@@ -67,7 +67,7 @@ def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
     if axis not in _AXES or place not in points:
         known = [*joints, *(f"{point}.{each}" for point in points for each in _AXES)]
         raise InputError("is neither a joint nor a coordinate of a point", field=field, value=name,
-                         remedy=f'{suggestion(name, known)}; of points it is "body.point.x", ".y" or ".angle"'
+                         remedy=f'{suggestion(name, known)}; for points it is "body.point.x", ".y" or ".angle"'
                          )  # fmt: skip
     return Coordinate(name, *(("rad", "N m") if axis == "angle" else ("m", "N")), PointRef.parse(place, field))
 

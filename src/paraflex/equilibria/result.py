@@ -185,7 +185,7 @@ class Statics(Shown):
         """Return the row of a named coordinate in the extended system."""
         rows = {one.name: number for one, number in self.equations.number.items()}
         if name not in rows:
-            raise InputError("is no coordinate of these equilibria", field="name", value=name,
+            raise InputError("is not a coordinate of these equilibria", field="name", value=name,
                              remedy=f"{suggestion(name, rows)}; name it in `stiffness` to have it")  # fmt: skip
         return rows[name]
 
@@ -214,9 +214,9 @@ class Statics(Shown):
         return (
             Finding(
                 "equilibrium-unstable", "",
-                f"{unstable.size} of {len(self.equilibria)} equilibria are unstable, first that with "
-                f"{first.point.at.s:.4g} of what is given: {self.moving_away(unstable[0])}",
-                "such a state is not reached by itself: give less, hold the motion that grows, or move a coordinate "
+                f"{unstable.size} of {len(self.equilibria)} equilibria are unstable, the first at load factor "
+                f"{first.point.at.s:.4g}: {self.moving_away(unstable[0])}",
+                "such a state is not reached on its own: give less, hold the motion that grows, or move a coordinate "
                 "in place of loading it",
             ),
             *stresses,

@@ -177,7 +177,7 @@ def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> 
         until = f", unstable from {lost:.4g} on" if lost < np.inf else ""
         return Buckling(
             np.full(count, np.nan), np.full_like(own.shapes[:, :count], np.nan),
-            f"the branch contradicts the linear estimate: stable up to {reached:.4g} of what is given{until}",
+            f"the branch contradicts the linear estimate: stable up to load factor {reached:.4g}{until}",
         )  # fmt: skip
     return Buckling(own.factors[:count], own.shapes[:, :count], own.reason)
 

@@ -171,7 +171,7 @@ def _basis(moving: Array, strains: Array, field: str) -> Array:
         raise InputError(
             "its shape functions are linearly dependent, or nearly so",
             field=field,
-            remedy="leave out those that others make up (powers of x nearly do from the 15th on)",
+            remedy="leave out linear combinations of others (powers of x nearly are from the 15th on)",
         )
     basis = np.linalg.inv(_triangle(moving / sizes)) / sizes[:, None]
     strained = np.linalg.svd((strains @ basis).real, compute_uv=False)
@@ -179,7 +179,7 @@ def _basis(moving: Array, strains: Array, field: str) -> Array:
         raise InputError(
             "its shape functions contain a rigid motion of the bar",
             field=field,
-            remedy="leave out what moves it as a whole: its body frame does that",
+            remedy="leave out functions that move it as a whole: its body frame does that",
         )
     return basis
 

@@ -135,7 +135,7 @@ def samples_too_few(system: System, whole: Solution, kept: Solution, samples: in
         return None
     remedy = _round_number(times_as_many * (samples - 1)) + 1
     text = f"{samples} samples are too few to show the largest loads: {'; '.join(found)}"
-    return Finding(COARSE, SAMPLES, text, f"say samples = {remedy}")
+    return Finding(COARSE, SAMPLES, text, f"give samples = {remedy}")
 
 
 def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, str, Array]]:

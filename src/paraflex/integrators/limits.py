@@ -65,8 +65,9 @@ def elements_too_few(system: System, limits: StepLimits) -> list[Finding]:
             if resolved < fastest:
                 found[name] = Finding(
                     "elements-few", f"body.{name}.elements",
-                    f"something given changes as fast as a vibration of {fastest:.2g} rad/s, and elements of {name} "
-                    f"resolve those up to {resolved:.2g} rad/s: deflections, forces and stresses may be far off",
+                    f"loads or laws change as fast as a vibration of {fastest:.2g} rad/s, but elements of {name} "
+                    f"resolve vibrations only up to {resolved:.2g} rad/s: deflections, forces and stresses may be "
+                    "far off",
                     "give it more elements",
                 )  # fmt: skip
     return list(found.values())

@@ -214,7 +214,7 @@ def own(run: Run) -> NativeRun:
     if isinstance(run, NativeRun):
         return run
     raise InputError(
-        "goes on from time to time with own methods only", field="method",
+        "continues from time to time with paraflex's own methods only", field="method",
         remedy="choose one of paraflex's own, say esdirk5 or tr-bdf2",
     )  # fmt: skip
 

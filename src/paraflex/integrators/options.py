@@ -256,7 +256,7 @@ def refuse_tolerance(tolerance: float, size: float) -> None:
     """Raise an `InputError` for a tolerance larger than the mechanism [m]: its steps would resolve nothing."""
     if tolerance > size:
         raise InputError(
-            f"more than the mechanism is large, about {size:.2g} m", field="tolerance", value=tolerance,
+            f"larger than the mechanism, about {size:.2g} m", field="tolerance", value=tolerance,
             remedy=f"it is in m: choose at most a thousandth of the size, {1e-3 * size:.0g}",
         )  # fmt: skip
 

@@ -166,7 +166,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
     """
     if options.automatic_gains:
         raise InputError(
-            f"automatic gains follow the steps, which {options.method} does not show",
+            f"automatic gains need the step sizes, which {options.method} does not show",
             field="automatic_gains", value=True,
             remedy="give alpha and beta, or choose another method",
         )  # fmt: skip

@@ -93,10 +93,9 @@ def too_slow(system: System, now: Instant, start: np.ndarray, pace: Pace, jumps:
     needed = f"about {pace.expected:.2g}" if math.isfinite(pace.expected) else "infinitely many"
     excited = _excited(system, now, jumps)
     remedy = (
-        "give beams damping, say damping = { ratios = [0.01] }, or let what jumps rise within some milliseconds; "
-        "else choose"
+        "give beams damping, say damping = { ratios = [0.01] }, or let jumps rise over some milliseconds; else choose"
         if excited
-        else "choose a motion that turns links less fast,"
+        else "choose a motion that turns links more slowly,"
     )
     return Breakdown(
         f"steps are down to {pace.step:.2g} s, and at this pace the run would need {needed} of them: "
@@ -112,7 +111,7 @@ def _excited(system: System, now: Instant, jumps: np.ndarray) -> str:
     if not before.size or not beams:
         return ""
     named = ", ".join(body.name for body in beams[:_NAMED]) + (" and others" if len(beams) > _NAMED else "")
-    return f"; loads or torques jumped at t = {before[-1]:.6g} s, and what vibrates since in {named} has no damping"
+    return f"; loads or torques jumped at t = {before[-1]:.6g} s, and the vibrations since in {named} have no damping"
 
 
 def _fastest(system: System, now: Instant) -> str:

@@ -48,5 +48,5 @@ def warn_if_stiff(form: OdeForm, problem: Problem, method: Method) -> None:
             f"{method} is explicit and this mechanism stiff: no step can be longer than about {step:.2g} s, "
             f"{steps:,.0f} steps for this run"
         )
-        remedy = "an implicit method, such as tr-bdf2, takes steps by accuracy alone"
+        remedy = "choose an implicit method, such as tr-bdf2, whose steps only accuracy limits"
         warn_of([Finding("stability", "method", text, remedy)], StiffnessWarning)

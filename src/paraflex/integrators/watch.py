@@ -39,7 +39,7 @@ def bent_too_far(system: System, q: Array) -> Breakdown | None:
             return Breakdown(
                 f"{body.name} bends to a slope of {slope:.1f} rad, beyond theories of small slopes: the motion "
                 "diverges",
-                f"look at Young's modulus (Pa), section and length (m) of {body.name}, and at what loads it",
+                f"look at Young's modulus (Pa), section and length (m) of {body.name}, and at its loads",
             )
     return None
 

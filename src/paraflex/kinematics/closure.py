@@ -236,7 +236,7 @@ def _assembled(
     closure.check_degrees_of_freedom(chosen)
     if turning_of(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
         raise InputError(
-            "the path gives angles, the task has none", field="end_effector.coordinates",
+            "the path gives angles, but the task has none", field="end_effector.coordinates",
             value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
         )  # fmt: skip
     return closure, closure.assemble(chosen)

@@ -340,7 +340,7 @@ class TabulatedPath(CheckedFields):
         given = [name for name in ("times", "motion_time", "max_acceleration") if getattr(self, name) is not None]
         if len(given) != 1:
             raise InputError(
-                "its law of motion is given in two ways" if given else "nothing says how fast it is passed",
+                "its law of motion is given in two ways" if given else "its law of motion is not given",
                 field=given[-1] if given else "max_acceleration", value=", ".join(given) or None,
                 remedy=f"drop all but {given[0]}" if given else "give max_acceleration, motion_time, or times",
             )  # fmt: skip
@@ -349,7 +349,7 @@ class TabulatedPath(CheckedFields):
                 positive(value, name, unit)
         if self.max_speed is not None and self.max_acceleration is None:
             raise InputError(
-                "a largest speed goes with a largest acceleration", field="max_speed", value=self.max_speed,
+                "a largest speed needs a largest acceleration", field="max_speed", value=self.max_speed,
                 remedy="give max_acceleration too, or leave it out",
             )  # fmt: skip
 
@@ -362,7 +362,7 @@ class TabulatedPath(CheckedFields):
         late = np.flatnonzero(np.diff(times) <= 0.0)
         if late.size:
             raise InputError(
-                f"its times must ascend, that of point {late[0] + 2} does not", field="times",
+                f"its times must ascend, but that of point {late[0] + 2} does not", field="times",
                 value=float(times[late[0] + 1]), remedy=f"it follows t = {times[late[0]]:g} s",
             )  # fmt: skip
 

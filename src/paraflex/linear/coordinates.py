@@ -325,7 +325,7 @@ def coordinates_of(
     for name in driven:
         if name not in known:
             raise InputError(
-                "is no prescribed motion", field="prescribed", value=name,
+                "is not a prescribed motion", field="prescribed", value=name,
                 remedy="choose from " + ", ".join(known) if known else "the mechanism has none",
             )  # fmt: skip
     task: tuple[str, ...] = ()

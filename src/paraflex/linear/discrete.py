@@ -151,7 +151,7 @@ def _by_name(given: Any, variables: Sequence[Variable], field: str, shape: tuple
 def _fitting(value: Any, field: str, shape: tuple[int, ...]) -> Array:
     array = np.asarray(value, dtype=float)
     if array.shape not in (shape, ()) or not np.all(np.isfinite(array)):
-        raise InputError("has not the numbers it should have", field=field, value=array.shape,
+        raise InputError("has the wrong shape, or is not finite", field=field, value=array.shape,
                          remedy=f"give {' x '.join(map(str, shape)) or 'one'} finite numbers")  # fmt: skip
     return array
 

@@ -159,7 +159,7 @@ def sought_motion(
     for name, value in others.items():
         if value is not None:
             raise InputError(
-                f"means nothing for a {'motion' if moves else 'pose at rest'}", field=name, value=value,
+                f"has no meaning for a {'motion' if moves else 'pose at rest'}", field=name, value=value,
                 remedy="leave it out, or give the mechanism" if moves else "leave it out, or give a plan or a run",
             )  # fmt: skip
     if moves:

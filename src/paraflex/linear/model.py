@@ -264,7 +264,9 @@ class LinearModel(NamedModel):
         names = [one.name for one in self.inputs if one.name in joints] if motors is None else motors
         for name in names:
             if name not in joints:
-                raise InputError("is no motor", field="motors", value=name, remedy="choose from " + ", ".join(joints))
+                raise InputError(
+                    "is not a motor", field="motors", value=name, remedy="choose from " + ", ".join(joints)
+                )
         return [joints[name] for name in names]
 
     @checked_arguments()

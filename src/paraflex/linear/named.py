@@ -99,5 +99,7 @@ def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str)
         return np.arange(len(known))
     for name in names:
         if name not in known:
-            raise InputError(f"is no {what}", field=f"{what}s", value=name, remedy="choose from " + ", ".join(known))
+            raise InputError(
+                f"is not one of the {what}s", field=f"{what}s", value=name, remedy="choose from " + ", ".join(known)
+            )
     return np.array([known.index(name) for name in names], dtype=int)

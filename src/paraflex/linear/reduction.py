@@ -144,7 +144,7 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
     """Return the full model, as given or linearised, in the coordinates of the bases if there are any."""
     if isinstance(source, LinearModel):
         for name, value in options.items():
-            raise InputError("means nothing for a linear model, which is what it is", field=name, value=str(value),
+            raise InputError("has no meaning for a linear model", field=name, value=str(value),
                              remedy="leave it out, or give the mechanism")  # fmt: skip
         if given:
             _check_alike(given[0], source)
@@ -162,7 +162,7 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
     if not describes(model.minimal, first.minimal):
         raise InputError(
             "has coordinates that do not describe the motion in this pose, which lies beyond a singular one",
-            field="basis", value=first.mechanism, remedy="give a basis of a pose nearer by",
+            field="basis", value=first.mechanism, remedy="give a basis of a nearer pose",
         )  # fmt: skip
     return model
 
@@ -181,7 +181,7 @@ def _check_alike(basis: ReducedModel, model: LinearModel) -> None:
 
 
 def _of_another(basis: ReducedModel, mechanism: str) -> InputError:
-    return InputError(f"is of a mechanism with other bodies or motors than {mechanism}", field="basis",
+    return InputError(f"belongs to a mechanism with other bodies or motors than {mechanism}", field="basis",
                       value=basis.full.mechanism, remedy="give one of the same mechanism in another pose")  # fmt: skip
 
 
@@ -206,7 +206,7 @@ def _reduced(model: LinearModel, states: int, method: ReductionMethod, feed_thro
         return _balanced(model, states)
     if states % 2:
         raise InputError(
-            "is odd, but every coordinate brings its rate", field="states", value=states, remedy=f"say {states + 1}"
+            "is odd, but every coordinate brings its rate", field="states", value=states, remedy=f"give {states + 1}"
         )
     basis, names, interface = _basis(model, states // 2, method)
     rates = tuple(Variable(f"{one.name}_rate", f"{one.unit}/s") for one in names)

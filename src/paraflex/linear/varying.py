@@ -118,7 +118,7 @@ class VaryingModel:
         """
         found = moving(run, self.ports.mode)
         if [body.all for body in found.system.bodies] != [body.all for body in self.coordinates.system.bodies]:
-            raise InputError("is of a mechanism with other bodies", field="run", value=found.system.mechanism.name,
+            raise InputError("belongs to a mechanism with other bodies", field="run", value=found.system.mechanism.name,
                              remedy="give a run of the mechanism of this model")  # fmt: skip
         return _along([found.point(k) for k in range(found.times.size)], self.coordinates, self.chosen, self.ports)
 
@@ -328,7 +328,7 @@ def _every(period: float, times: Array) -> Array:
     """Return sample times with a given period, from the first time on [s]."""
     duration = float(times[-1] - times[0])
     if not 0.0 < period <= duration * (1.0 + _SAME):
-        raise InputError("is no period of this motion", field="period", value=period,
+        raise InputError("is not a period of this motion", field="period", value=period,
                          remedy=f"give one up to {duration:.6g} s")  # fmt: skip
     periods = math.floor(duration / period + _SAME)
     return np.minimum(times[0] + period * np.arange(periods + 1), times[-1])

@@ -211,5 +211,5 @@ class Actuator(CheckedFields):
         """
         positive(inertia, "inertia", "kg m^2")
         if not self.rotor_inertia:
-            raise self._refused("rotor_inertia", "makes no gear the best", "give the rotor's moment of inertia")
+            raise self._refused("rotor_inertia", "has no optimal gear ratio", "give the rotor's moment of inertia")
         return sqrt(inertia / self.rotor_inertia)

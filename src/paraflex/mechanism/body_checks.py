@@ -51,8 +51,8 @@ def check_body(body: Body) -> None:
     static = isinstance(body, FlexibleBeam) and body.reduction is BodyReduction.CRAIG_BAMPTON
     if static and body.modes is None:
         raise InputError(
-            "says nothing without modes", field=f"{field}.reduction", value=BodyReduction.CRAIG_BAMPTON.value,
-            remedy="say how many vibrations to keep beside the static shapes: modes = 2",
+            "has no meaning without modes", field=f"{field}.reduction", value=BodyReduction.CRAIG_BAMPTON.value,
+            remedy="give the number of vibrations kept beside the static shapes: modes = 2",
         )  # fmt: skip
     if body.modes is not None and not (0 if static else 1) <= body.modes <= n:
         raise InputError(
@@ -100,7 +100,7 @@ def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
     for lump in body.lumps:
         if lump.point not in body.points:
             raise InputError(
-                "a lump on an unknown point",
+                "a lumped mass at an unknown point",
                 field=f"{field}.lumps",
                 value=lump.point,
                 remedy=suggestion(lump.point, body.points),

@@ -100,7 +100,7 @@ def check_relations(mechanism: Members) -> None:
             if len(one.joints) < 2:
                 raise InputError(
                     f"a {group.word} needs two different joints", field=f"{group.table}.{one.name}.joints",
-                    value=", ".join(one.joints), remedy="name the two whose angles or travels belong together",
+                    value=", ".join(one.joints), remedy="name the two whose angles or travels are coupled",
                 )  # fmt: skip
 
 
@@ -127,7 +127,7 @@ def _check_hung(mechanism: Members, assembly: Assembly) -> None:
     placed = placed_poses(mechanism, assembly) if hung and mechanism.cut is None else hung
     for name in (name for name in hung if name not in {GROUND, *placed}):
         raise InputError(
-            "distances alone do not give a body its place", field=f"assembly.{assembly.name}.points", value=name,
+            "distances alone do not determine a body's place", field=f"assembly.{assembly.name}.points", value=name,
             remedy=f'give the place of one of its points: points = {{"{name}.POINT" = [x, y]}}',
         )  # fmt: skip
 

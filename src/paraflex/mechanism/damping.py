@@ -41,7 +41,7 @@ def _check_ratios(ratios: tuple[float, ...], field: str) -> None:
     if not ratios:
         raise InputError("no damping ratio", field=field, value=[], remedy="give one, say [0.01]")
     for ratio in ratios:
-        not_negative(ratio, field, "parts of critical damping, say 0.01")
+        not_negative(ratio, field, "fractions of critical damping, say 0.01")
 
 
 @dataclass(frozen=True)

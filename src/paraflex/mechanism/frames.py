@@ -61,7 +61,7 @@ def _check(mechanism: Mechanism, beams: set[str]) -> None:
     for joint in mechanism.joints:
         if joint.follows_beam and joint.a.body in beams:
             raise InputError(
-                "a joint slides along it, which takes one frame", field=f"body.{joint.a.body}.frames",
+                "a joint slides along it, which requires one frame", field=f"body.{joint.a.body}.frames",
                 value=getattr(mechanism.body(joint.a.body), "frames", None), remedy="leave it out, or give it elements",
             )  # fmt: skip
     for sensor in mechanism.sensors:

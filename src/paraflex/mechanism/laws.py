@@ -193,7 +193,7 @@ class TabulatedLaw(CheckedFields):
         for row, (before, after) in enumerate(pairwise(self.times), start=2):
             if not after > before:
                 raise InputError(
-                    f"its times must ascend, row {row} does not", field="table", value=after,
+                    f"its times must ascend, but row {row} does not", field="table", value=after,
                     remedy=f"it follows t = {before:g} s",
                 )  # fmt: skip
 

@@ -254,7 +254,7 @@ def _opened(results: xr.Dataset | str | Path) -> xr.Dataset:
     if kind not in ("", RUN):
         raise InputError(
             f"holds a {kind}, not a run", field=str(results),
-            remedy="name the folder or results.nc of a run, or of a study a file of its trajectories",
+            remedy="name the folder or results.nc of a run, or a trajectory file of a study",
         )  # fmt: skip
     return open_results(results)
 

@@ -26,7 +26,7 @@ SAMPLE, INPUT, OUTPUT = "sample", "input", "output"
 # Variables of a controller, as KIND_NAME: dimension in addition to that of samples, and meaning.
 READINGS, WANTED, GIVEN = "reading", "wanted_torque", "given_torque"
 _VARIABLES = {
-    READINGS: (INPUT, "reading of a sensor as the law is given it, quantised and filtered"),
+    READINGS: (INPUT, "reading of a sensor that the law receives, quantised and filtered"),
     WANTED: (OUTPUT, "torque of the law"),
     GIVEN: (OUTPUT, "torque within the limits"),
 }

@@ -156,7 +156,9 @@ def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = Fals
     output, ending = Path(output), ENDINGS[to]
     single = output.suffix.lower() == ending
     if not single and output.suffix.lower() in ENDINGS.values():
-        raise InputError(f"does not end as {to} does", field="output", value=str(output), remedy=f"end it in {ending}")
+        raise InputError(
+            f"does not have the ending of {to}", field="output", value=str(output), remedy=f"end it in {ending}"
+        )
     if to in ("mat", "netcdf"):
         file = output if single else output / f"results{ending}"
         _refuse([file], force)
@@ -207,7 +209,7 @@ def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
     try:
         csv.write_csv(spreadsheet_table(table.rename_columns(names)), file)
     except ValueError as error:
-        raise InputError("the table holds what CSV does not", field="to", remedy='export it as "mat"') from error
+        raise InputError("CSV cannot hold all values of the table", field="to", remedy='export it as "mat"') from error
 
 
 def matlab_struct(data: xr.Dataset) -> dict[str, Any]:

@@ -143,7 +143,7 @@ def below_tolerance_line(errors: Mapping[str, float | None], tolerance: float) -
     if not small:
         return ""
     return (
-        f"tracking errors below the tolerance of {tolerance:g} m, no size and no order to be read from them: "
+        f"tracking errors below the tolerance of {tolerance:g} m, too small to be compared: "
         f"{', '.join(small)}; choose a finer tolerance (--tol)"
     )
 

@@ -36,7 +36,7 @@ def check_kind(data: xr.Dataset, *kinds: str) -> None:
     if kind not in kinds:
         raise wrong_kind(kind, kinds)
     if kind == "tracking" and "mode" not in data.coords:
-        raise InputError("no results of paraflex", field="data", remedy="give what open_results returns")
+        raise InputError("not results of paraflex", field="data", remedy="give what open_results returns")
 
 
 def wrong_kind(kind: str, kinds: Iterable[str], field: str = "data") -> InputError:

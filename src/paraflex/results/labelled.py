@@ -95,7 +95,7 @@ UNITS = (
         "gear_joint": ("joints that a gear or another relation relates, counted from 0", "1"),
         "gear_radius": ("pitch radii of wheels that mesh outside, or of a pinion and its rack, then infinite", "m"),
         "status": ("how the run ended", "1"),
-        "message": ("why it is not complete", "1"),
+        "message": ("reason why it is not complete", "1"),
         "factorisations": ("factorisations of the iteration matrix", "1"),
         "wall_time": ("wall time of the integration", "s"),
         "constraint_velocity_max": ("largest constraint violation in velocity", "m/s"),
@@ -120,15 +120,15 @@ _COMMENTS = {
     "joint_force": (
         "at the joint's point of the second body, in the ground frame: of the constraints and of motors, springs, "
         "dampers, friction, gears and prescribed motion along the joint; the opposite acts on the first body; NaN "
-        "where redundant constraints share it in any way"
+        "where redundant constraints leave it undetermined"
     ),
     "joint_moment": (
         "about the joint's point of the second body, positive anticlockwise: of the constraints and of motors, "
         "springs, dampers, friction, gears and prescribed motion that turn the joint; the opposite acts on the first "
-        "body; NaN where redundant constraints share it in any way"
+        "body; NaN where redundant constraints leave it undetermined"
     ),
     "multiplier": (
-        "stands on the left of the equations of motion: minus it acts on the joint's second body, in the ground frame, "
+        "on the left of the equations of motion: its negative acts on the joint's second body, in the ground frame, "
         "anticlockwise, or along the joint's axis or normal, of a gear at its second joint; of least norm where "
         "constraints depend on one another"
     ),
@@ -141,7 +141,7 @@ _COMMENTS = {
     "joint_coordinate": "of the joint's second body against its first: anticlockwise, or along the joint's axis",
     "drive_torque": "as `torque`: on the joint's second body",
     "drive_power": "torque or force times the rate of the joint: positive drives the mechanism, negative brakes it",
-    READING: "each in the unit that units_each has in its place; NaN of what has no meaning in the model",
+    READING: "each in the corresponding unit of units_each; NaN where it has no meaning in the model",
     "frame_force": "of all joints and springs between points that are on the ground",
 } | STRESS_COMMENTS
 

@@ -51,7 +51,7 @@ UNITS = {
     "zero_imag": ("imaginary part of a transmission zero of a mode's motors", "rad/s"),
     "response_real": ("real part of the frequency response", "unit of the output, by that of the input"),
     "response_imag": ("imaginary part of the frequency response", "unit of the output, by that of the input"),
-    "unbalanced": ("acceleration with which the mechanism would start if let go", "m/s^2"),
+    "unbalanced": ("initial acceleration of the mechanism if it were released", "m/s^2"),
     "branch_real": ("real part of a pole along the motion", "1/s"),
     "branch_imag": ("imaginary part of a pole along the motion", "rad/s"),
     "frequency": ("frequency of the response", "Hz"),

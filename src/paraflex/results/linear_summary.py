@@ -273,8 +273,8 @@ def remarks(data: xr.Dataset) -> list[str]:
     if values[largest] > BALANCED:
         of = f" (mode {largest})" if len(values) > 1 else ""
         out.append(
-            f"not in equilibrium: let go, the mechanism would start with {values[largest]:.3g} m/s^2{of}; "
-            "here forces that do not change hold it (--balanced linearises about equilibrium)"
+            f"not in equilibrium: if released, the mechanism would start with {values[largest]:.3g} m/s^2{of}; "
+            "here constant forces hold it (--balanced linearises about equilibrium)"
         )
     out += phase_sentences(data)
     if data.attrs["about"] in ("a planned motion", "a run"):

@@ -35,18 +35,18 @@ _OF_MOTION = (
 )  # fmt: skip
 UNITS = {
     "step": ("number of an equilibrium along its branch, from the start", "1"),
-    "fraction": ("fraction of all loads and travels that are given", "1"),
+    "fraction": ("load factor: fraction of the given loads and travels", "1"),
     "limit_point": ("whether the branch turns back here", "1"),
-    "stable": ("whether no small motion grows, what is held and moved kept", "1"),
+    "stable": ("whether no small motion grows, held and moved coordinates fixed", "1"),
     "place": ("value of a named coordinate", ""),
     "travel": ("change of a named coordinate since the start", ""),
     "effort": ("force or torque at a named coordinate: given, or what holds or moves it", ""),
-    "role": ("what is given of a named coordinate", "1"),
+    "role": ("role of a named coordinate: loaded, held, moved or free", "1"),
     "stiffness": ("force for a unit displacement of a named coordinate", ""),
     "compliance": ("displacement by a unit force at a named coordinate", ""),
     "natural_frequency": ("undamped natural frequency about the equilibrium, held", "Hz"),
     "free_frequency": ("undamped natural frequency about the equilibrium, free", "Hz"),
-    "buckling_factor": ("fraction of all that is given at which the mechanism buckles", "1"),
+    "buckling_factor": ("load factor at which the mechanism buckles", "1"),
     "buckling_note": ("why a step has no factor of buckling; empty where it has one, or nothing buckles", "1"),
     "buckling_shape": ("displacement of drawn points as it buckles, the largest is 1", "1"),
     "stress_step": ("step at which a beam's stress is largest", "1"),
@@ -59,9 +59,9 @@ NAMED_UNITS = {
 _COMMENTS = {
     "effort": "on the mechanism along the coordinate: of a joint on its second body",
     "stiffness": "others are held and moved as they are, the coordinate itself set free; infinite where it cannot move",
-    "natural_frequency": "zero of a motion that grows; what is held and moved stays",
-    "free_frequency": "zero of a motion that grows; what is moved is let go, under the force that moved it",
-    "buckling_factor": "that of the limit point to which stable steps lead, else a linear estimate from the stiffness "
+    "natural_frequency": "zero for a motion that grows; held and moved coordinates are fixed",
+    "free_frequency": "zero for a motion that grows; moved coordinates are released, under the force that moved them",
+    "buckling_factor": "value at the limit point to which stable steps lead, else a linear estimate from the stiffness "
     "and its change along the branch; NaN where none is, see buckling_note",
 }
 

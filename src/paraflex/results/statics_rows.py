@@ -86,7 +86,7 @@ def buckling_words(data: xr.Dataset) -> str:
     if not (factors.size and np.isfinite(factors[0, 0]) and (loaded or factors[0, 0] <= 1.0)):
         return ""
     higher = " and ".join(f"{each:.4g}" for each in factors[0, 1:] if np.isfinite(each))
-    seen = [f"{factors[0, 0]:.4g} of what is given, as seen from the start" + (f" (next {higher})" if higher else "")]
+    seen = [f"load factor {factors[0, 0]:.4g} as seen from the start" + (f" (next {higher})" if higher else "")]
     if data.sizes["step"] > 1 and np.isfinite(factors[-1, 0]):
         seen.append(f"{factors[-1, 0]:.4g} as seen from the last step")
         if abs(factors[-1, 0] / factors[0, 0] - 1.0) > _SAME:

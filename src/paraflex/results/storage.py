@@ -139,7 +139,7 @@ def results_file(path: str | Path) -> Path:
         runs = sorted(path.glob(f"{_TRAJECTORIES}/*.nc"))
         more = ", ..." if len(runs) > _MOST_NAMED else ""
         raise InputError(
-            "the folder of a study of many runs, whose figures are in results.parquet",
+            "the folder of a study of many runs, whose results are in results.parquet",
             field=str(path),
             remedy=f"name one of its runs: {', '.join(str(run.relative_to(path)) for run in runs[:_MOST_NAMED])}{more}"
             if runs

@@ -48,7 +48,7 @@ _OF_CONTACTS = {name: name for name in ("moment", "force", "area", "modulus", "s
 COMMENTS = {
     "section_moment": "E I w'' of the shape functions, with what the force of a joint that slides along adds; "
     "positive bends the beam anticlockwise from its first end on",
-    "section_force": "positive in tension; NaN of beams whose coordinates do not stretch, as those of few modes",
+    "section_force": "positive in tension; NaN for beams whose coordinates have no stretch, such as few modes",
     "stress": "|N| / A + |M| c / I in the outermost fibre; NaN where the section has no outer_fibre",
 }
 

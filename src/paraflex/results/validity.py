@@ -20,7 +20,7 @@ _INDICATORS = {
     "validity_fourth_order": "terms of fourth order over the deflection, of a beam of second-order geometry",
 }
 UNITS = {
-    "validity": ("what the model leaves out, over its limit: it holds up to 1", "1"),
+    "validity": ("size of the neglected terms over its limit: the model holds up to 1", "1"),
     "validity_verdict": ("whether the model holds", "1"),
     **{name: (meaning, "rad" if name.endswith("slope") else "1") for name, meaning in _INDICATORS.items()},
 }

@@ -80,7 +80,7 @@ def _beside(mechanism: Mechanism) -> Iterator[Finding]:
                     yield Finding(
                         "point-unused", f"joint.{free.point}",
                         f"it and another joint hold {point}, and nothing holds {free}",
-                        f"is it to hold {free}?",
+                        f"should it hold {free}?",
                     )  # fmt: skip
 
 
@@ -95,7 +95,7 @@ def _springs(mechanism: Mechanism, size: float) -> Iterator[Finding]:
         if place.get(spring.a, spring.a) == place.get(spring.b, spring.b):
             yield Finding(
                 "spring-idle", f"linear_spring.{spring.name}.points",
-                f"joints hold {spring.a} and {spring.b} together: it pulls at nothing",
+                f"joints hold {spring.a} and {spring.b} together: it has no effect",
                 "name the points that it stretches between",
             )  # fmt: skip
         if size and spring.length > LONG * size:
@@ -122,8 +122,8 @@ def _damped(mechanism: Mechanism) -> Iterator[Finding]:
         if ratio > DAMPED:
             yield Finding(
                 "damping-large", f"body.{body.name}.damping",
-                f"a damping ratio of {ratio:.3g}: no structure is damped like that, nearly without vibration",
-                f"{field} a part of one, not percent: 1 % is 0.01",
+                f"a damping ratio of {ratio:.3g}: no structure is damped so strongly that it hardly vibrates",
+                f"{field} a fraction, not a percentage: 1 % is 0.01",
             )  # fmt: skip
 
 
@@ -143,7 +143,7 @@ def _sharp(mechanism: Mechanism) -> Iterator[Finding]:
             unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
             yield Finding(
                 "friction-sharp", f"friction.{one.name}.speed",
-                f"its force turns over within {one.speed:.3g} {unit}: each change of direction takes very small steps",
+                f"its force changes sign within {one.speed:.3g} {unit}: every change of direction needs tiny steps",
                 "give the speed below which creeping does not matter, a hundredth of the joint's largest, say",
             )  # fmt: skip
 

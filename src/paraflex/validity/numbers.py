@@ -174,7 +174,7 @@ def _gravity(gravity: Place) -> Iterator[Finding]:
     if abs(strength - STANDARD_GRAVITY) > ON_EARTH:
         yield Finding("gravity", "gravity", f"{text} is {strength:.4g} m/s^2", "on Earth it is 9.81, in m/s^2")
     elif 0.0 not in gravity:
-        yield Finding("gravity", "gravity", f"{text} is along no axis", "is the mechanism to lie on a slope?")
+        yield Finding("gravity", "gravity", f"{text} is along no axis", "does the mechanism lie on a slope?")
     elif max(gravity) > 0.0:
         yield Finding("gravity", "gravity", f"{text} pulls towards positive {'xy'[gravity[1] > 0.0]}", "is it -9.81?")
 
@@ -264,7 +264,7 @@ def _section(place: str, length: float, section: Section) -> Iterator[Finding]:
     thickness = math.sqrt(12.0 * section.second_moment / section.area) if section.second_moment > 0.0 else 0.0
     if thickness > THICK * length:
         yield Finding(
-            "beam-thick", place, f"{thickness:.3g} m thick in the plane and {length:.3g} m long: no beam",
+            "beam-thick", place, f"{thickness:.3g} m thick in the plane and {length:.3g} m long: not a beam",
             "sections are in m, m^2 and m^4: is it in mm?",
         )  # fmt: skip
     elif 0.0 < thickness < THIN * length:
@@ -287,17 +287,17 @@ def _material(place: str, material: Material) -> Iterator[Finding]:
     modulus, density = material.youngs_modulus, material.density
     if not MODULUS[0] <= modulus <= MODULUS[1]:
         yield Finding(
-            "modulus", f"{place}.youngs_modulus", f"{modulus:.3g} Pa is that of no solid",
+            "modulus", f"{place}.youngs_modulus", f"no solid has a modulus of {modulus:.3g} Pa",
             "it is in Pa: steel has 210e9, aluminium 70e9",
         )  # fmt: skip
     if not DENSITY[0] <= density <= DENSITY[1]:
         yield Finding(
-            "density", f"{place}.density", f"{density:.3g} kg/m^3 is that of no solid",
+            "density", f"{place}.density", f"no solid has a density of {density:.3g} kg/m^3",
             "it is in kg/m^3: steel has 7850, aluminium 2700",
         )  # fmt: skip
     elif density > HEAVY and MODULUS[0] <= modulus < SOFT:
         yield Finding(
-            "material", place, f"a modulus of {modulus:.3g} Pa and a density of {density:.3g} kg/m^3 go with no solid",
+            "material", place, f"a modulus of {modulus:.3g} Pa and a density of {density:.3g} kg/m^3 fit no solid",
             "modulus in Pa, density in kg/m^3: steel has 210e9 and 7850",
         )  # fmt: skip
 

@@ -98,9 +98,9 @@ def stiff_modes(system: System) -> Iterator[Finding]:
     for one in missed_turns(system):
         yield Finding(
             "modes-too-stiff", f"body.{one.point.body}.modes",
-            f"{one.modes} modes miss {100.0 * one.part:.0f} % of its turn under a moment at {one.point.point}, which "
-            f"{one.cause} brings in: it is too stiff there",
-            'say reduction = "craig-bampton" beside modes, or leave modes out',
+            f"{one.modes} modes miss {100.0 * one.part:.0f} % of its rotation under a moment at {one.point.point} from "
+            f"{one.cause}: it is too stiff there",
+            'give reduction = "craig-bampton" beside modes, or leave modes out',
         )  # fmt: skip
 
 
@@ -168,10 +168,10 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
     parts = [f"{kind} {which}" for kind, which in named if which]
     if parts:
         yield Finding(
-            "loads-undetermined", "", f"{' and '.join(parts)} are not determined: redundant constraints share them in "
-            "any way, and tables have none of them",
-            "leave out what holds or drives twice, with `slot` or `revolute` joints in place of `prismatic` or `weld` "
-            "ones, or make links flexible in what they share",
+            "loads-undetermined", "", f"{' and '.join(parts)} are not determined, because constraints are redundant, "
+            "and tables omit them",
+            "leave out redundant joints or drives, with `slot` or `revolute` in place of `prismatic` or `weld` "
+            "ones, or make the links between them flexible",
         )  # fmt: skip
 
 
@@ -192,7 +192,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
     k = int(np.argmax(slopes[worst]))
     if slopes[worst][k] > STEEP:
         blame = where.blame(worst) or (
-            f"look at section and Young's modulus of {worst}, and at what moves and loads it"
+            f"look at section and Young's modulus of {worst}, and at its motion and loads"
             + _moving(where.mechanism, solution)
         )
         yield Finding(
