@@ -206,7 +206,7 @@ def test_computed_torque_drives_alone(model, task):
 def test_no_second_torque_beside_the_whole_one(model, task):
     ct = model.controllers["ct"]
     with pytest.raises(
-        InputError, match=r"ct: gives the whole torque, but the planned one also acts .*leave out feed_forward"
+        InputError, match=r"ct: gives the whole torque, but the planned one also acts.*leave out feed_forward"
     ):
         Simulation(task, mode="++++", feed_forward=True).run(ct)
     twice = [ct, replace(ct, name="again")]
