@@ -161,8 +161,8 @@ FIELDS = [
     # Expressions
     ('reach = "2.5 * base"', 'reach = "2.5 * bose"', 'parameters.reach: unknown parameter "bose"', '"base"?'),
     ('reach = "2.5 * base"', 'reach = "2.5 *"', "parameters.reach: neither a number nor an expression", "like"),
-    ('reach = "2.5 * base"', 'reach = "reach"', "parameters.reach: a circle of parameters, reach -> reach", "a number"),
-    ("base = 0.1", 'base = "reach / 2.5"', "parameters.base: a circle of parameters, base -> reach -> base", "number"),
+    ('reach = "2.5 * base"', 'reach = "reach"', "parameters.reach: a cycle of parameters, reach -> reach", "a number"),
+    ("base = 0.1", 'base = "reach / 2.5"', "parameters.base: a cycle of parameters, base -> reach -> base", "number"),
     ('reach = "2.5 * base"', 'reach = "9**9**9"', "parameters.reach: too large a number (got '9**9**9')", "check"),
     ('reach = "2.5 * base"', 'reach = "base.real"', "parameters.reach: only numbers, parameters,", "elsewhere"),
     ('reach = "2.5 * base"', 'reach = "(lambda: 1)()"', "parameters.reach: only numbers, parameters,", "elsewhere"),
@@ -183,7 +183,7 @@ FIELDS = [
     ('"left_arm.C"\n[assembly', '"ground.Q"\n[assembly', "end_effector.point: the end-effector is a", "body's"),
     ('["left.B", "left_arm.B"]', '["left.B", "left.A"]', "joint.B1: a joint needs two different bodies", "other"),
     ('["left.B", "left_arm.B"]', '["left.B", "left_arm"]', "joint.B1: not a point (got 'left_arm')", "body.point"),
-    ("[body.right_arm]", "[body.right]", "body.right: the table [body.right] stands twice", "leave one"),
+    ("[body.right_arm]", "[body.right]", "body.right: the table [body.right] appears twice", "leave one"),
     ('B1 = ["left.B"', 'A1 = ["left.B"', "file: not valid TOML: cannot overwrite a value", "only once"),
     ('B1 = ["left.B"', "B1 = [left.B", "file: not valid TOML: invalid value", "put names and expressions in quotes"),
     ("right_arm = 2.89", "right_arm = 2 * pi", "file: not valid TOML: ", "put names and expressions in quotes"),
@@ -211,7 +211,7 @@ FIELDS = [
     ("[study]", "[start.deflection]\nleft = { B = { slop = 1 } }\n[study]", "start.deflection.left.B.slop", '"slope"?'),
     ("[study]", "[start.deflection]\nleft = { B = 3 }\n[study]", "start.deflection.left.B: should be", "axial"),
     ("[study]", "[start.rates]\nright = { x = 1 }\n[study]", "start.rates.right.y: is missing", "in m/s"),
-    ("[study]", "[study]\norientation = 0.1", "study.orientation: the angle is no task coordinate (got", '"angle"'),
+    ("[study]", "[study]\norientation = 0.1", "study.orientation: the angle is not a task coordinate (got", '"angle"'),
     # Paths
     ("end = [0.03, 0.32]", "end = [0.0, 0.3]", "path.line.corners: two neighbouring corners coincide", "drop one"),
     ("max_acceleration = 5.0", "max_acceleration = -5.0", "path.line.max_acceleration: must be positive", "m/s^2"),

@@ -234,7 +234,7 @@ def test_what_they_cannot_do_is_refused_in_one_line():
             pf.simulate_motion(framed(one_beam(), 2), 0.01, samples=3, start=start)
     robot = pf.load("five_bar")
     task = pf.plan(framed(robot.mechanism.with_geometry("linear"), 2), next(iter(robot.paths.values())), samples=11)
-    with pytest.raises(pf.InputError, match="kineto-elastodynamics takes one frame a beam"):
+    with pytest.raises(pf.InputError, match="kineto-elastodynamics takes one frame per beam"):
         simulate_ked(task, "++")
 
 

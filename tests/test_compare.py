@@ -220,7 +220,7 @@ def test_the_figure_has_a_line_a_method_in_the_units_it_names():
         assert len(panel.patches) == 1
     looks = {(line.get_color(), line.get_marker()) for line in figure.axes[0].lines}
     assert len(looks) == 2
-    with pytest.raises(InputError, match="no run got to its end"):
+    with pytest.raises(InputError, match="no run reached its end"):
         plots.work_precision(replace(found, measurements=()).to_dict())
 
 

@@ -129,7 +129,7 @@ def test_controllers_that_differ_are_refused(task, runs):
 
 @pytest.mark.parametrize("name", ["a/b", "a.b", ""])
 def test_names_that_files_cannot_have(task, name):
-    with pytest.raises(InputError, match="no name of a controller"):
+    with pytest.raises(InputError, match="not a name for a controller"):
         Simulation(task).run(joint_pd(name=name))
 
 

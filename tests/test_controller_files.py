@@ -142,17 +142,17 @@ def test_a_controller_changed_in_python_is_written(tmp_path):
         ("period = 1e-3", "period = 1e-3\nlimits = [2.0, 1.0]", r"controller.pd.limits: the lowest must be below"),
         ("period = 1e-3", "period = 1e-3\nrates = 0.0", r"controller.pd.rates: must be positive"),
         ("period = 1e-3", "period = 1e-3\nquantise = { rat = 1.0 }", r"controller.pd.quantise: unknown"),
-        ("period = 1e-3", "period = 1e-3\nfilters = { hub = [[1.0], [1.0]] }", r"pd.filters.hub: is no filter"),
+        ("period = 1e-3", "period = 1e-3\nfilters = { hub = [[1.0], [1.0]] }", r"pd.filters.hub: is not a filter"),
         ("period = 1e-3", 'period = 1e-3\nreference = { hup = 1.0 }', r"controller.pd.reference: unknown sensor"),
         ("period = 1e-3", 'period = 1e-3\nreference = { hub = "2 * s" }', r"controller.pd.reference.hub: "),
         ("period = 1e-3", "period = 1e-3\ndelay = -1e-3", r"controller.pd.delay: must not be negative"),
         ('["hub", "rate"]', '["hub", "hub"]', r"controller.pd.inputs: is named twice \(got .hub.\)"),
         ("D = [[-40.0, -1.2]]", "D = [[-40.0]]", r"controller.pd.inputs: the model has 1"),
-        ("D = [[-40.0, -1.2]]", "D = [[-40.0, -1.2], [1.0]]", r"controller.pd.D: is no matrix"),
+        ("D = [[-40.0, -1.2]]", "D = [[-40.0, -1.2], [1.0]]", r"controller.pd.D: is not a matrix"),
         ("D = [[-40.0, -1.2]]", "D = [[-40.0, -1.2]]\nA = [[1.0]]", r"controller.pd.B: has 0, not 1 x 2"),
         ('"state-space"', '"lqr"', r"controller.pd.type"),
-        ("[controller.pd]", "[controller.none]", r"controller.none: is the word for no controller"),
-        ("[controller.pd]", '[controller."a.b"]', r"controller: is no name of a controller"),
+        ("[controller.pd]", "[controller.none]", r"controller.none: is reserved for open loop"),
+        ("[controller.pd]", '[controller."a.b"]', r"controller: is not a name for a controller"),
     ],
 )  # fmt: skip
 def test_what_files_cannot_say(old, new, said):
@@ -180,7 +180,7 @@ def test_what_pid_tables_cannot_say(old, new, said):
 
 def test_studies_name_controllers_with_periods_that_fit():
     more = STATE_SPACE.replace("pd", "slow").replace("1e-3", "1.5e-3")
-    with pytest.raises(InputError, match=r"controller.slow.period: is no multiple .* say 0.002"):
+    with pytest.raises(InputError, match=r"controller.slow.period: is not a multiple .* give 0.002"):
         read(STATE_SPACE + more + '[study]\ncontrollers = ["pd", "slow"]\n')
     with pytest.raises(InputError, match=r"study.controllers: unknown controller \(got .pid.\)"):
         read(STATE_SPACE + '[study]\ncontrollers = ["pid"]\n')
@@ -283,7 +283,10 @@ def test_the_study_names_controllers_and_none_is_none_of_them(robot, tmp_path):
     ("arguments", "said"),
     [
         (["--controller", "pid"], r"--controller: unknown controller \(got .pid.\); did you mean"),
-        (["--controller", "none", "--controller", "pd"], "--controller: goes with no other .*say it alone"),
+        (
+            ["--controller", "none", "--controller", "pd"],
+            "--controller: cannot be combined with others .*give it alone",
+        ),
         (["--controller", "pd", "--ked"], "--controller: has no effect with --ked"),
         (["--controller", "pd", "--after", "hold", "--duration", "0.6"], "--after: brakes are not for motors under"),
         (
@@ -373,5 +376,5 @@ def test_sweeps_vary_gains_periods_and_delays(robot, tmp_path):
 
 
 def test_derivatives_are_of_runs_without_controllers(robot):
-    with pytest.raises(InputError, match=r"study.controllers: .*derivatives are of runs without controllers"):
+    with pytest.raises(InputError, match=r"study.controllers: .*derivatives need runs without controllers"):
         check_open_and_whole(pf.load(robot, set={"study.controllers": ["pd"]}))

@@ -47,7 +47,7 @@ def test_nothing_is_written_over(tmp_path):
 def test_a_template_that_is_none(tmp_path):
     done = paraflex("new", "mine", "--from", "raparm", cwd=tmp_path)
     assert done.returncode == 2
-    assert "--from: no library mechanism (got 'raparm'); did you mean \"raparm_i\"?" in done.stderr
+    assert "--from: not a library mechanism (got 'raparm'); did you mean \"raparm_i\"?" in done.stderr
     done = paraflex("new", "no/such/folder/mine", cwd=tmp_path)
     assert done.returncode == 2
     assert "no/such/folder/mine.toml: cannot be written" in done.stderr

@@ -161,7 +161,7 @@ def test_rows_that_an_index_leaves_out_are_missed_and_found_again(study, whole):
     with connection:
         connection.execute("DELETE FROM runs WHERE run = 3")
     connection.close()
-    with pytest.raises(OutputError, match=r"journal.sqlite: damaged: 7 rows are found of 8"):
+    with pytest.raises(OutputError, match=r"journal.sqlite: damaged: 7 of 8 rows are found"):
         read_table(file)
     run = made_up(**METRICS)
     with pytest.warns(ResultWarning, match="7 rows are whole, and runs without one are made again"):

@@ -148,7 +148,7 @@ def test_a_start_and_a_duration_stay_where_mechanisms_vary():
 
 def test_a_mechanism_of_other_members_is_refused(task):
     env = pf.Environment(task, vary=lambda random: pf.load("five_bar").mechanism)
-    with pytest.raises(pf.InputError, match="vary: makes a mechanism of other members"):
+    with pytest.raises(pf.InputError, match="vary: makes a mechanism with other members"):
         env.reset(seed=0)
 
 
@@ -298,7 +298,7 @@ def test_steps_after_the_end_and_before_the_beginning(env):
         ({"accuracy": np.nan}, "accuracy: must be positive"),
         ({"effort_weight": -1.0}, "effort_weight: must not be negative"),
         ({"penalty": -1.0}, "penalty: must not be negative"),
-        ({"duration": 1.0}, "duration: a plan says it itself"),
+        ({"duration": 1.0}, "duration: is set by the plan"),
         ({"reward": 3.0}, "reward: not a function"),
     ],
 )

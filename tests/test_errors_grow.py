@@ -123,7 +123,7 @@ def test_an_interrupted_second_run_says_so(monkeypatch):
     monkeypatch.setattr(
         motion, "integrate", lambda *given, **named: replace(integrate(*given, **named), status="interrupted")
     )
-    assert found(run) == ["interrupted before it was seen whether errors grow"]
+    assert found(run) == ["interrupted before the growth of errors was checked"]
 
 
 def test_motions_that_are_given_or_under_controllers_or_in_fixed_steps_are_not_tried(monkeypatch):

@@ -83,8 +83,8 @@ def test_parameters_may_be_expressions_of_others_in_any_order():
 @pytest.mark.parametrize(
     ("table", "says"),
     [
-        ({"a": "b", "b": "c + 1", "c": "a"}, "parameters.a: a circle of parameters, a -> b -> c -> a"),
-        ({"a": "a"}, "parameters.a: a circle of parameters, a -> a"),
+        ({"a": "b", "b": "c + 1", "c": "a"}, "parameters.a: a cycle of parameters, a -> b -> c -> a"),
+        ({"a": "a"}, "parameters.a: a cycle of parameters, a -> a"),
         ({"a": "leng", "length": 1.0}, 'unknown parameter "leng" (got \'leng\'); did you mean "length"?'),
         ({"a": True}, "parameters.a: neither a number nor an expression"),
         ({"a": [1.0]}, "parameters.a: neither a number nor an expression"),

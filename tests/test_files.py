@@ -75,7 +75,7 @@ BROKEN = [
     ('["ground.A1", "link1.A1"]', '["ground.A1", "link9.A1"]', "joint.A1: unknown body (got 'link9')", "link"),
     ('["ground.A1", "link1.A1"]', '["ground.A1", "A1"]', "joint.A1: not a point (got 'A1')", "body.point"),
     ('["ground.A1", "link1.A1"]', '["link1.B1", "link1.A1"]', "joint.A1: a joint needs two different bodies", "other"),
-    ("[body.link2]", "[body.link1]", "the table [body.link1] stands twice", "line"),
+    ("[body.link2]", "[body.link1]", "the table [body.link1] appears twice", "line"),
     ('tau1 = "A1"', 'tau1 = "A3"', "motor.tau1.joint: unknown joint (got 'A3')", "A1"),
     ('"+-+-" = ["tau1", "tau5"]', '"+-+-" = ["tau1", "tau7"]', "mode.+-+-: unknown motor (got 'tau7')", "tau"),
     ('point = "link4.C"', 'point = "link4.X"', "end_effector.point: unknown point (got 'link4.X')", "C"),

@@ -138,7 +138,7 @@ def test_errors_name_the_folder_and_not_that_within(folder):
 
 
 def test_results_of_another_kind_need_force(folder):
-    with pytest.raises(InputError, match=r"^--out: the folder holds other results, a run .* or say --force"):
+    with pytest.raises(InputError, match=r"^--out: the folder holds other results, a run .* or use --force"):
         replace(folder, {"compare-methods.json": "new"}, COMPARISON, force=False, field="--out")
     with pytest.raises(InputError, match=r"^folder: the folder holds other results, a run .*; name another folder$"):
         replace(folder, {"compare-methods.json": "new"}, COMPARISON)

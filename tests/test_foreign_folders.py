@@ -111,11 +111,15 @@ def noted(folder, name, value):
 @pytest.mark.parametrize(
     ("name", "value", "says"),
     [
-        ("rows", b"many", "does not say how many rows"),
-        ("rows", b"1 2 3", "does not say how many rows"),
-        ("schema", b"", "its columns are not noted"),
-        ("schema", b"\xff" * 100, "its columns are not noted"),
-        ("schema", pa.schema([("run", pa.list_(pa.int8()))]).serialize().to_pybytes(), "what its columns do not"),
+        ("rows", b"many", "does not hold the number of rows"),
+        ("rows", b"1 2 3", "does not hold the number of rows"),
+        ("schema", b"", "its columns are not recorded"),
+        ("schema", b"\xff" * 100, "its columns are not recorded"),
+        (
+            "schema",
+            pa.schema([("run", pa.list_(pa.int8()))]).serialize().to_pybytes(),
+            "a row does not fit its columns",
+        ),
     ],
 )
 def test_notes_of_a_journal_that_hold_their_digest_and_nothing_of_ours_are_damage(whole, name, value, says):
@@ -157,7 +161,7 @@ def test_rows_that_hold_their_digest_and_no_run_are_damage(whole, content):
         connection.execute("REPLACE INTO runs VALUES (?, ?, ?, ?)", entry)
         tally(connection)
     connection.close()
-    with pytest.raises(OutputError, match="what a row holds is not of a run"), read_journal(
+    with pytest.raises(OutputError, match="a row does not describe a run"), read_journal(
         whole.folder / JOURNAL
     ) as journal:  # fmt: skip
         list(journal.rows())
@@ -240,7 +244,7 @@ def test_a_copy_by_hard_links_stays_as_it_is(whole, tmp_path):
 @posix
 def test_pipes_beside_a_journal_are_not_waited_for(whole):
     os.mkfifo(whole.folder / f"{JOURNAL}-journal")
-    with pytest.raises(OutputError, match="a link or no file, or one beside it"):
+    with pytest.raises(OutputError, match="a link or not a regular file, or one beside it"):
         read_table(whole.folder / JOURNAL)
 
 

@@ -135,7 +135,7 @@ def test_fewer_targets_than_parameters(tmp_path):
     assert found is not None
     assert found.condition == np.inf
     assert found.deviations == {"x": None, "y": None}
-    assert found.reasons["x"] == "1 targets leave nothing to judge 2 free parameters by"
+    assert found.reasons["x"] == "1 targets are too few to judge 2 free parameters"
     assert json.loads((tmp_path / "out" / "result.json").read_text())["confidence"]["condition"] is None
 
 
@@ -259,7 +259,7 @@ ONE = TARGET % ("tracking_rms", 1.0, "")
     ("old", "new", "says"),
     [
         (ONE, "", "target: is missing"),
-        ("value = 1.0", "value = 0.0", "target.0.value: nothing is relative to zero (got 0.0); say relative = false"),
+        ("value = 1.0", "value = 0.0", "target.0.value: nothing is relative to zero (got 0.0); write relative = false"),
         ("value = 1.0", "value = 1.0\nweight = 0.0", "target.0.weight: must be positive"),
         ("value = 1.0", 'value = "1 kg"', "target.0.value: a quantity in kg where one in m is asked for (got '1 kg')"),
         ("value = 1.0", 'value = "1 mn"', "target.0.value"),

@@ -126,8 +126,8 @@ def test_an_unfinished_sweep_has_no_indices(tmp_path):
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"samples": 100}, "--samples: Sobol's sequence wants a power of two, 8 at least (got 100); say 128"),
-        ({"samples": 4}, "say 8"),
+        ({"samples": 100}, "--samples: Sobol's sequence needs a power of two, 8 at least (got 100); give 128"),
+        ({"samples": 4}, "give 8"),
         ({"metrics": ["deflection_max"]}, "--metric: not a metric of the study"),
         ({"metrics": ["tracking_rm"]}, 'did you mean "tracking_rms"?'),
         ({"seed": -1}, "sampling.seed: must not be negative"),

@@ -140,15 +140,15 @@ def test_a_law_and_its_description_agree_on_the_whole_torque(model):
         ('frequency = "15 Hz"', "frequency = 0.0", r"robot.toml: controller.ct.frequency: must be positive"),
         ('frequency = "15 Hz"', 'frequency = "15 s"', r"controller.ct.frequency: a quantity in s where one in"),
         ("cutoff = 300.0", "damping = 0.7", r"controller.ct.damping: .*did you mean .damping_ratio"),
-        ("cutoff = 300.0", 'reference = "plan"', r"ct.reference: computed torque takes readings as they are"),
+        ("cutoff = 300.0", 'reference = "plan"', r"ct.reference: computed torque uses the readings themselves"),
         ("tau1 = { root1", "tau = { root1", r"controller.damp.gains: unknown motor \(got .tau.\)"),
         ("{ root1 = 0.3, A1", "{ root2 = 0.3, A1", r'damp.gains.tau1: unknown sensor'),
-        ('"100 Hz"', '"100 Hz"\ninputs = ["root1"]', r"controller.damp.inputs: are not those of the gains"),
+        ('"100 Hz"', '"100 Hz"\ninputs = ["root1"]', r"controller.damp.inputs: differ from those of the gains"),
         ("gains = {", "gains = {}\n[nothing]\nx = {", r"controller.damp.gains: no gains|nothing"),
         ("effort = 1.0", "effort = -1.0", r"controller.lq.effort: must be positive"),
         ("effort = 1.0", "effort = { tau3 = 1.0 }", r"controller.lq.effort: unknown motor \(got .tau3.\)"),
         ("effort = 1.0", "effort = {}", r"controller.lq.effort: there is no motor"),
-        ("effort = 1.0", 'effort = { tau1 = 1.0 }\noutputs = ["tau2"]', r"lq.effort: none of the motors that act"),
+        ("effort = 1.0", 'effort = { tau1 = 1.0 }\noutputs = ["tau2"]', r"lq.effort: names no active motor"),
         ("effort = 1.0", "effort = 1.0\ndisturbance = { tau1 = -1.0 }", r"lq.disturbance.tau1: must not be negative"),
         ("effort = 1.0", "effort = 1.0\nintegrators = { A9 = 1.0 }", r"controller.lq.integrators: unknown sensor"),
         ("effort = 1.0", "effort = 1.0\nintegrators = { A1 = 0.0 }", r"controller.lq.integrators.A1: must be positive"),
@@ -205,7 +205,9 @@ def test_computed_torque_drives_alone(model, task):
 
 def test_no_second_torque_beside_the_whole_one(model, task):
     ct = model.controllers["ct"]
-    with pytest.raises(InputError, match=r"ct: gives the whole torque, and the planned one acts .*leave feed_forward"):
+    with pytest.raises(
+        InputError, match=r"ct: gives the whole torque, but the planned one also acts.*leave out feed_forward"
+    ):
         Simulation(task, mode="++++", feed_forward=True).run(ct)
     twice = [ct, replace(ct, name="again")]
     for run in (lambda: Simulation(task, mode="++++").run(twice), lambda: simulate_controlled(task, "++++", twice)):
@@ -257,7 +259,7 @@ def test_gains_are_used_of_the_motors_of_a_mode(model):
     (done,) = simulate_controlled(flexible, "+-+-", [model.controllers["damp"]]).controllers
     assert (done.inputs, done.outputs, done.law) == (("root1", "A1"), ("tau1",), "rate feedback")
     damp = replace(model.controllers["damp"], law=RateFeedbackDescription({"tau2": {"root1": 1.0}}))
-    with pytest.raises(InputError, match=r"gains: none of the motors that act \(got .tau2.\); give some of tau1, tau5"):
+    with pytest.raises(InputError, match=r"gains: names no active motor \(got .tau2.\); give some of tau1, tau5"):
         simulate_controlled(flexible, "+-+-", [damp])
 
 
@@ -660,7 +662,7 @@ def test_what_a_study_cannot_shape(tmp_path):
     rotor = ROTOR + '[study]\nshaper = { type = "zv", frequencies = 5.0 }\n'
     with pytest.raises(InputError, match=r"study.shaper: is for torques planned along a path, and the model has none"):
         model_from(tomllib.loads(rotor), "rotor.toml")
-    with pytest.raises(InputError, match=r"study.shaper: derivatives are of runs whose torques are not shaped"):
+    with pytest.raises(InputError, match=r"study.shaper: derivatives need runs whose torques are not shaped"):
         check_open_and_whole(model_from(tomllib.loads(SHAPED), "robot.toml"))
     (tmp_path / "robot.toml").write_text(SHAPED, encoding="utf-8")
     ran = paraflex("run", tmp_path / "robot.toml", "--duration", "0.17", "--rigid", "--out", tmp_path / "out")

@@ -204,7 +204,7 @@ def test_feedback_of_a_rate_damps_a_rotor():
     ("make", "said"),
     [
         (lambda: JointPID(-1.0), r"stiffness: must not be negative \(got -1.0\)"),
-        (lambda: JointPID([1.0, 2.0]), "stiffness: no gains of 1 motors"),
+        (lambda: JointPID([1.0, 2.0]), "stiffness: not gains for 1 motors"),
         (lambda: JointPID({"tao": 1.0}), 'stiffness: unknown motor.*did you mean "tau"'),
         (lambda: JointPID(1.0, cutoff=0.0), "cutoff: must be positive"),
         (lambda: ComputedTorque(0.0), "frequency: must be positive"),

@@ -411,7 +411,7 @@ def test_files_give_loads_in_time_and_take_them(tmp_path, text, components):
             "load.push.pieces: the times of pieces must ascend from 0 (got 1.0)",
         ),
         (TORQUE_AT + "pieces = [{ until = 1, force = 1 }, { torque = 0 }]", "load.push.pieces.0"),
-        (FORCE_AT + 'force = [1, 0]\ninterpolation = "linear"', "load.push.interpolation: is of tables alone (got"),
+        (FORCE_AT + 'force = [1, 0]\ninterpolation = "linear"', "load.push.interpolation: is for tables only (got"),
         (FORCE_AT + 'table = "force.csv"\ninterpolation = "cubic"', "load.push.interpolation"),
     ],
 )  # fmt: skip
@@ -426,7 +426,7 @@ def test_loads_in_time_that_make_no_sense_are_refused_by_name(tmp_path, text, sa
 def test_what_a_file_has_no_words_for_is_refused(tmp_path):
     differing = (zero_until(0.1, 1.0), zero_until(0.2, 1.0))
     mechanism = pendulum(loads=(PointForce("push", PointRef("arm", "B"), differing),))
-    with pytest.raises(InputError, match=r"load\.push\.force: a model file cannot say a force whose components"):
+    with pytest.raises(InputError, match=r"load\.push\.force: a model file cannot express a force whose components"):
         mechanism.save(tmp_path / "no.toml")
     with pytest.raises(InputError, match=r"load\.push\.force: not a number or a law in time"):
         PointForce("push", PointRef("arm", "B"), ("t", 0.0))

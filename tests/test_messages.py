@@ -288,7 +288,7 @@ SWEEPS = [
     ('[sampling]\nkind = "random"\nnumber = 3', "vary: no parameter varies; add a [vary.NAME] table"),
     (
         '[vary.L]\nfields = ["body.beam.length"]\nlow = 0.5\nhigh = 1.0\nnumber = 2\nwhole = true',
-        "vary.L.whole: whole numbers have a linear range between two of them",
+        "vary.L.whole: whole numbers need a linear range with whole ends",
     ),
     ('[vary.L]\nfields = ["body.beam.lengthh"]\nvalues = [1.0]', "no such number in the mechanism's file"),
     (
@@ -355,7 +355,7 @@ def test_a_search_needs_a_start(tmp_path):
 
 def test_messages_on_expressions_name_the_culprit_and_the_cure():
     """A stranger's mistakes: a caret, a mistyped millimetre."""
-    with pytest.raises(ExpressionError, match=r'"\^" is no power here') as caught:
+    with pytest.raises(ExpressionError, match=r'"\^" is a power only in units') as caught:
         evaluate("(1 + 2)^2", {})
     assert caught.value.remedy == 'write ** for powers: "x**2"'
     with pytest.raises(ExpressionError, match="unknown unit") as caught:
@@ -381,7 +381,7 @@ def test_a_period_from_a_speed_names_its_parameter_and_the_turn(tmp_path):
     file.write_text(model_text("2 * pi / n"))
     said = message(lambda: load(file))
     assert "study.duration: a quantity in s rad^-1 where one in s" in said
-    assert "it comes of parameters.T" in said
+    assert "it depends on parameters.T" in said
     assert '"1 rev / n"' in said
 
 
@@ -397,6 +397,6 @@ def test_files_of_another_kind_are_said_to_be(tmp_path):
 def test_an_open_quote_is_not_a_name_that_stands_twice(tmp_path):
     file = tmp_path / "model.toml"
     file.write_text('name = "open\n')
-    assert message(lambda: load(file)).endswith("mend that line")
+    assert message(lambda: load(file)).endswith("correct this line")
     file.write_text('name = "one"\nname = "two"\n')
-    assert message(lambda: load(file)).endswith("mend that line; a name may stand only once")
+    assert message(lambda: load(file)).endswith("correct this line; a name may appear only once")

@@ -180,7 +180,7 @@ def test_a_metric_that_is_no_number_does_not_count(tmp_path):
     study = study_of(tmp_path, OBJECTIVE, method="nelder-mead", evaluations=40)
     run = made_up(tracking_rms=lambda mode, x, y: np.nan if x < 0.0045 else x)
     result = optimise(study, tmp_path / "out", run=run)
-    assert result.reasons == ('line, mode "++++": tracking_rms is no number',)
+    assert result.reasons == ('line, mode "++++": tracking_rms is not a number',)
     assert result.values["x"] >= 0.0045
 
 
@@ -268,7 +268,7 @@ def test_exact_gradients_are_asked_for_where_slopes_are_used(tmp_path, monkeypat
 
 def test_exact_gradients_that_cannot_be(tmp_path, monkeypatch):
     study = study_of(tmp_path, OBJECTIVE.replace("tracking_rms", "steps"), gradients="exact")
-    with pytest.raises(InputError, match=r"no exact derivatives \(metrics: has no derivative.*say \"differences\""):
+    with pytest.raises(InputError, match=r"no exact derivatives \(metrics: has no derivative.*write \"differences\""):
         optimise(study, tmp_path / "one", run=made_up(steps=bowl))
     study = study_of(tmp_path, OBJECTIVE, gradients="exact", method="optuna")
     with pytest.raises(InputError, match="optuna uses no gradients"):
@@ -375,7 +375,7 @@ def test_rows_of_a_journal_that_hold_texts_for_numbers_are_damage(tmp_path):
     for file in ("results.parquet", "manifest.json"):
         (tmp_path / "out" / file).unlink()
     forge(tmp_path / "out", tracking_rms="x")
-    with pytest.raises(OutputError, match=r"journal\.sqlite: damaged: a row holds what its columns do not"):
+    with pytest.raises(OutputError, match=r"journal\.sqlite: damaged: a row does not fit its columns"):
         optimise(study, tmp_path / "out", run=pytest.fail)
 
 

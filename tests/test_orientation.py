@@ -109,7 +109,7 @@ def test_points_may_say_how_the_tool_turns(tmp_path):
         ([("orientation = 1.3", 'orientation = "up"')], 'study.orientation: unknown parameter "up"'),
         (
             [(', "angle"]', "]")],
-            'study.orientation: the angle is no task coordinate (got 1.3); name "angle" among the coordinates',
+            'study.orientation: the angle is not a task coordinate (got 1.3); name "angle" among the coordinates',
         ),
         ([("[0.4, 0.4, 0.9]", "[0.4, 0.4]")], "path.turning.points: not a list of points"),
         ([("[0.4, 0.4, 0.9]", "[0.4, 0.4, 0.9, 1.0]")], "path.turning.points.1: list should have at most 3 items"),

@@ -61,7 +61,9 @@ def test_files_give_tables_and_sequences_and_take_them(tmp_path):
     changed.save(tmp_path / "changed.toml")
     assert load(tmp_path / "changed.toml").paths == model.paths
     assert 'table = "drawn.csv"' in (tmp_path / "changed.toml").read_text()
-    with pytest.raises(InputError, match=r"path\.tour\.paths: a model file cannot say this .*a path without a name"):
+    with pytest.raises(
+        InputError, match=r"path\.tour\.paths: a model file cannot express this .*a path without a name"
+    ):
         pf.Model(model.mechanism, {"tour": tour}).save(tmp_path / "no.toml")
 
 

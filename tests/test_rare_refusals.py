@@ -210,8 +210,13 @@ def test_a_sliding_joint_on_a_rigid_body():
 def test_samples_without_numbers(tmp_path):
     text = SWEEP.replace("values = [2.0e11, 2.1e11]", "low = 2.0e11\nhigh = 2.1e11")
     for replaced, field, problem, remedy in (
-        ('[sampling]\nkind = "random"\n', "sampling.number", "is missing", "say how many designs"),
-        ('[sampling]\nkind = "random"\nnumber = 0\n', "sampling.number", "must be positive", "say how many designs"),
+        ('[sampling]\nkind = "random"\n', "sampling.number", "is missing", "give the number of designs"),
+        (
+            '[sampling]\nkind = "random"\nnumber = 0\n',
+            "sampling.number",
+            "must be positive",
+            "give the number of designs",
+        ),
         ('[sampling]\nkind = "list"\n', "vary.arm.values", "is missing", "give a list of numbers, one per design"),
     ):
         file = tmp_path / "study.toml"
@@ -234,7 +239,7 @@ def test_derivatives_that_designs_or_runs_do_not_have(differentiated, monkeypatc
 
     with monkeypatch.context() as patch:
         patch.setattr(changes, "_moved", never)
-        problem = "has no derivative, for near it material: not a modulus"
+        problem = "has no derivative: a nearby value fails, material: not a modulus"
         refused(lambda: sensitivities(differentiated), "vary.arm", problem, "leave it out")
 
     def passing(*arguments, **options):

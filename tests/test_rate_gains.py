@@ -170,7 +170,7 @@ def test_laws_side_by_side_add_up(arm):
     assert (both.inputs, both.outputs) == (("hub", "root"), ("motor",))
     y = np.random.default_rng(2).standard_normal((20, 2))
     assert stepped(both, y) == pytest.approx(stepped(one, y[:, :1]) + stepped(other, y[:, 1:]))
-    with pytest.raises(pf.InputError, match=r"period: is another than that of a law beside it, 0.001 s \(got 0.002"):
+    with pytest.raises(pf.InputError, match=r"period: differs from that of another law, 0.001 s \(got 0.002"):
         side_by_side([one, RateFeedback({"motor": {"root": 0.3}}).sampled(2e-3)])
 
 
@@ -277,7 +277,7 @@ def test_beside_a_joint_controller(arm):
         ({"cutoff": 0.0}, "cutoff: must be positive"),
         ({"delay": -1.0}, "delay: must not be negative"),
         ({"period": "fast"}, "period: .*number"),
-        ({"beside": lambda k, t, y: y}, "controller: is no linear law"),
+        ({"beside": lambda k, t, y: y}, "controller: is not a linear law"),
     ],
 )
 def test_what_it_refuses(arm, arguments, said):

@@ -302,14 +302,14 @@ def test_what_cannot_be_reduced_is_said_in_a_line(tmp_path, reduced_file, task, 
     derived = 'mechanism = "few.toml"\npaths = ["line"]\nmetrics = ["tracking_rms"]\n[vary.thickness]\n' \
               'fields = ["section.bar.thickness"]\n'  # fmt: skip
     (reduced_file / "derived.toml").write_text(derived)
-    with pytest.raises(InputError, match=r"study.reduced: derivatives are of runs with all .*craig-bampton"):
+    with pytest.raises(InputError, match=r"study.reduced: derivatives need runs with all .*craig-bampton"):
         pf.sensitivities(reduced_file / "derived.toml")
     with pytest.raises(InputError, match="are not of one mechanism"):
         pf.reduced_mechanism([full, pf.load("five_bar").plan().simulate("++", warning=False)])
     with pytest.raises(InputError, match="modes: are those of the runs"):
         pf.reduced_mechanism(full, modes=["++++"])
     few = pf.reduced_mechanism(task, 16, modes=["++++"])
-    with pytest.raises(InputError, match=r"bases: .* say reduced = N in its \[study\]"):
+    with pytest.raises(InputError, match=r"bases: .* write reduced = N in its \[study\]"):
         few.save(tmp_path / "few.toml")
     with pytest.raises(InputError, match=r"bases\.link1: has shapes in 13 coordinates, and the body 25"):
         build_system(few.with_beams(elements=6))
@@ -322,7 +322,5 @@ def test_a_sweep_of_a_motion_without_a_path_cannot_choose(tmp_path):
         'mechanism = "own.toml"\nmetrics = ["joint_force_max"]\n[vary.width]\nfields = ["parameters.width"]\n'
         "values = [0.008]\n"
     )
-    with pytest.raises(
-        InputError, match=r"study\.reduced: few flexible coordinates are chosen from the plan of a path"
-    ):
+    with pytest.raises(InputError, match=r"study\.reduced: few flexible coordinates are chosen from a planned path"):
         pf.sweep(tmp_path / "sweep.toml", tmp_path / "out")

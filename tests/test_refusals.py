@@ -88,7 +88,7 @@ def test_files_that_figures_cannot_be_made_of(motion, tmp_path):
     refused(lambda: read_designs([table]), str(table), "not a table of designs", "results.parquet that paraflex wrote")
     cut = tmp_path / "cut.json"
     cut.write_text('{"modes": ', encoding="utf-8")
-    refused(lambda: open_source(cut), str(cut), "damaged: not JSON to its end", "make these results again")
+    refused(lambda: open_source(cut), str(cut), "damaged: not complete JSON", "make these results again")
     folder = tmp_path / "several"
     folder.mkdir()
     save_results(motion, folder / "results.nc")
@@ -158,6 +158,6 @@ def test_films_of_too_many_pictures(motion):
 def test_numbers_that_no_file_needs(tmp_path):
     file = tmp_path / "digits.toml"
     file.write_text("a = " + "9" * 5000, encoding="utf-8")
-    digits = "not valid TOML: a number of too many digits, or too many brackets in one another"
+    digits = "not valid TOML: a number of too many digits, or too many nested brackets"
     refused(lambda: pf.load(file), "file", digits, "name a model file")
     refused(lambda: pf.methods.BDF(max_order=2.5), "max_order", "not a whole number", "give a whole number")

@@ -293,11 +293,11 @@ LAW = SampledAngle(flat, flat, flat)
     [
         (
             {"prescribed": (PrescribedAngle("turn", "P", LAW),)},
-            r"^prescribed.turn.law: a model file cannot say this law \(got 'SampledAngle'\); give a Constant",
+            r"^prescribed.turn.law: a model file cannot express this law \(got 'SampledAngle'\); give a Constant",
         ),
         (
             {"prescribed": (PrescribedAngle("turn", "P", PiecewiseLaw((LAW, ConstantSpeed(0.0, 0.0)), (1.0,))),)},
-            "^prescribed.turn.law: a model file cannot say this law",
+            "^prescribed.turn.law: a model file cannot express this law",
         ),
         (
             {
@@ -322,9 +322,9 @@ def test_bodies_that_a_file_cannot_say(tmp_path):
     for body, message in [
         (
             replace(ritz, transverse=(Sine(2),)),
-            r"^body.ritz.transverse: a model file cannot say this .*give the sines from 1",
+            r"^body.ritz.transverse: a model file cannot express this .*give the sines from 1",
         ),
-        (replace(ritz, lumps=(*ritz.lumps, LumpedMass("Q", 1.0))), r"^body.ritz.lumps: .*make one lump"),
+        (replace(ritz, lumps=(*ritz.lumps, LumpedMass("Q", 1.0))), r"^body.ritz.lumps: .*combine the lumps"),
         (replace(ritz, section=Section(1.0, 1.0, Round(2.0))), r"^body.ritz.section: .*give Section.rectangle"),
     ]:
         with pytest.raises(InputError, match=message):
@@ -343,7 +343,9 @@ class Still:
 
 def test_paths_and_studies_that_a_file_cannot_say(tmp_path):
     robot = pf.library.raparm_i()
-    with pytest.raises(InputError, match=r"^path.still: a model file cannot say this \(got 'Still'\); give a Polygon"):
+    with pytest.raises(
+        InputError, match=r"^path.still: a model file cannot express this \(got 'Still'\); give a Polygon"
+    ):
         pf.Model(robot, {"still": Still()}).save(tmp_path / "not.toml")
     with pytest.raises(InputError, match=r"^study.path: unknown path \(got 'square'\)"):
         pf.Model(robot, study=StudyDefaults(path="square")).save(tmp_path / "not.toml")

@@ -96,7 +96,7 @@ def test_a_file_has_sections_by_shape_and_says_them_again(table, shape, tmp_path
 @pytest.mark.parametrize(
     ("table", "says"),
     [
-        ({"diameter": 0.01}, r'section.bar.shape: is missing; say "round" or "tube"'),
+        ({"diameter": 0.01}, r'section.bar.shape: is missing; write "round" or "tube"'),
         ({"shape": "round"}, r"section.bar.diameter: is missing; give the outer diameter in m"),
         ({"shape": "round", "diameter": 0.01, "wall": 0.001}, r"section.bar.wall: a round section has no wall"),
         ({"shape": "tube", "diameter": 0.01, "wall": 0.005}, r"section.bar.wall: as thick as half"),

@@ -351,7 +351,10 @@ def test_systems_of_another_layout_are_told_apart():
         ),
         ({"section.bar.thickness": "body.link1.elements"}, "body.link1.elements: should be a valid integer"),
         ({"section.bar.thickness": "integration.step"}, "vary.thickness: has no derivative"),
-        ({"section.bar.thickness": "integration.gamma"}, "vary.thickness.fields: no such number of the integration"),
+        (
+            {"section.bar.thickness": "integration.gamma"},
+            "vary.thickness.fields: not a numeric option of the integration",
+        ),
         ({"section.bar.thickness": "ground.A1.1"}, "vary.thickness: is zero, so steps of differences have no size"),
         ({'thickness"]': 'thickness", "section.bar.width"]'}, "vary.thickness.fields: its fields have different"),
         ({"samples = 13": 'samples = 13\nmetrics = ["steps"]'}, "metrics: has no derivative (got 'steps')"),

@@ -69,7 +69,7 @@ def test_a_model_set_is_that_of_a_file_that_says_so(tmp_path):
         ({"body.distal9.length": 0.3}, r"body.distal9.length: no such field"),
         ({"parameters.l9": 0.3}, r"parameters.l9: no such field"),
         ({"nothing": 0.3}, r"nothing: no such field"),
-        ({"body.distal1": 0.3}, r'body.distal1: a table of the model\'s file; say "body.distal1.length"'),
+        ({"body.distal1": 0.3}, r'body.distal1: a table of the model\'s file; write "body.distal1.length"'),
         ({"distal1.points": {"C": 1.0}}, r"distal1.points: a table"),
         ({"ground.A1.2": 0.3}, r"ground.A1.2: no such field"),
         ({"distal1.length": "80 kg"}, r"body.distal1.length: a quantity in kg where one in m"),

@@ -167,7 +167,10 @@ def test_studies_of_many_designs_take_all_paths_of_the_study(tmp_path):
     [
         ('paths = ["line", "line"]', "study.paths: is named twice (got 'line')"),
         ('paths = ["line", "lane"]', "study.paths: unknown path (got 'lane'); did you mean \"line\"?"),
-        ('path = "line"\npaths = ["line", "square"]', "study.paths: stands beside path; leave one of them out"),
+        (
+            'path = "line"\npaths = ["line", "square"]',
+            "study.paths: is given together with path; leave one of them out",
+        ),
     ],
 )
 def test_a_study_that_names_paths_wrongly_is_refused(tmp_path, study, says):
@@ -179,7 +182,7 @@ def test_a_study_that_names_paths_wrongly_is_refused(tmp_path, study, says):
 def test_a_study_of_python_with_both_cannot_be_saved(tmp_path):
     model = pf.load("five_bar")
     study = StudyDefaults(path="line", paths=("line", "square"))
-    with pytest.raises(InputError, match="stands beside path"):
+    with pytest.raises(InputError, match="is given together with path"):
         replace(model, study=study).save(tmp_path / "model.toml")
 
 

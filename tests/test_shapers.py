@@ -120,9 +120,9 @@ def test_the_residual_is_what_an_oscillator_does():
         (lambda: pf.shaper("zv", []), "frequencies: no frequency; give those of the modes in Hz"),
         (lambda: pf.shaper("zv", "fast"), "frequencies: not "),
         (lambda: pf.shaper("zv", [10.0] * 9), r"frequencies: too many.*\(got 512\); at most 256"),
-        (lambda: pf.shaper("zv", 10.0, 1.0), "damping: no such damping ratio .*from 0 to 1"),
-        (lambda: pf.shaper("zv", 10.0, -0.1), "damping: no such damping ratio"),
-        (lambda: pf.shaper("ei", 10.0, 0.4), "damping: no such damping ratio .*from 0 to 0.3"),
+        (lambda: pf.shaper("zv", 10.0, 1.0), "damping: not a valid damping ratio .*from 0 to 1"),
+        (lambda: pf.shaper("zv", 10.0, -0.1), "damping: not a valid damping ratio"),
+        (lambda: pf.shaper("ei", 10.0, 0.4), "damping: not a valid damping ratio .*from 0 to 0.3"),
         (lambda: pf.shaper("ei", 10.0, 0.3, 0.9), "tolerance: there is no EI shaper"),
         (lambda: pf.shaper("zv", [10.0, 20.0, 30.0], [0.1, 0.2]), "damping: there are 3 frequencies and 2 damping"),
         (lambda: pf.shaper("zvd", 10.0, tolerance=0.1), "tolerance: only an EI shaper has a tolerance"),
@@ -209,7 +209,7 @@ def test_a_file_shapes_a_path_and_is_written_again(tmp_path):
     }
     pf.Model(model.mechanism, made).save(tmp_path / "made.toml")
     assert pf.load(tmp_path / "made.toml").paths == made
-    with pytest.raises(InputError, match=r"^path.twice.shaper: a model file cannot say this .*one shaper all freq"):
+    with pytest.raises(InputError, match=r"^path.twice.shaper: a model file cannot express this .*one shaper all freq"):
         pf.Model(model.mechanism, {"twice": pf.ShapedPath(made["ei"], SHAPER)}).save(tmp_path / "no.toml")
     file = tmp_path / "path.toml"
     file.write_text('[path]\ntype = "line"\nstart = [0, 0]\nend = [1, 0]\nmax_acceleration = 1\n' + SHAPED)
@@ -225,7 +225,7 @@ def test_a_file_shapes_a_path_and_is_written_again(tmp_path):
         ('shaper = { type = "zv", frequencies = -3 }', "path.square.shaper.frequencies: must be positive (got -3"),
         ('shaper = { type = "zv", frequencies = "3 rpm" }', "path.square.shaper.frequencies: "),
         ('shaper = { type = "zv", frequencies = 3, dampin = 0 }', "path.square.shaper.dampin: unknown field"),
-        ('shaper = { type = "zv", frequencies = 3, damping = 2 }', "path.square.shaper.damping: no such damping ratio"),
+        ('shaper = { type = "zv", frequencies = 3, damping = 2 }', "path.square.shaper.damping: not a valid damping"),
         ('shaper = { type = "zv", frequencies = 3, tolerance = 0.1 }', "path.square.shaper.tolerance: only an EI"),
         ('shaper = "zv"', "path.square.shaper: "),
     ],

@@ -228,7 +228,7 @@ def test_several_periods():
 
 @pytest.mark.parametrize("period", [1.5e-3, 2.7e-3])
 def test_a_period_that_is_no_multiple(period):
-    with pytest.raises(pf.InputError, match=r"slow\.period: is no multiple of the shortest period, 0\.001 s"):
+    with pytest.raises(pf.InputError, match=r"slow\.period: is not a multiple of the shortest period, 0\.001 s"):
         simulated_rotor().run([pd(name="fast"), pd(name="slow", period=period)])
 
 
@@ -296,9 +296,9 @@ def failing(value):
     [
         ([float("nan")], 'controller "mine" returned torques that are not finite, for tau'),
         ([1.0, 2.0], 'controller "mine" returned 2 in place of 1 torques'),
-        (None, 'controller "mine" returned NoneType, no torques'),
+        (None, 'controller "mine" returned NoneType, not torques'),
         (np.zeros((1, 2)), 'controller "mine" returned 1 x 2 in place of 1 torques'),
-        ("much", 'controller "mine" returned str, no torques'),
+        ("much", 'controller "mine" returned str, not torques'),
         (ZeroDivisionError("division by zero"), 'controller "mine" raised ZeroDivisionError: division by zero'),
     ],
 )
@@ -324,12 +324,12 @@ def test_a_controller_that_fails_ends_the_run(value, said):
         ({"delay": -1e-3}, "delay: must not be negative"),
         ({"quantise": {"hab": 0.1}}, "quantise: unknown sensor"),
         ({"limits": (3.0, 1.0)}, "limits: the lowest must be below"),
-        ({"limits": (-1.0, "one")}, "limits: is no pair of numbers"),
-        ({"limits": "one"}, "limits: is no number"),
-        ({"period": True}, "period: is no number"),
+        ({"limits": (-1.0, "one")}, "limits: is not a pair of numbers"),
+        ({"limits": "one"}, "limits: is not a number"),
+        ({"period": True}, "period: is not a number"),
         ({"outputs": ["tau", "tau"]}, r"outputs: is named twice \(got 'tau'\)"),
         ({"filters": {"hub": ([1.0], [1.0, -3.0])}}, r"filters\.hub: is not stable"),
-        ({"reference": {"hub": "far"}}, r"reference\.hub: is no reference"),
+        ({"reference": {"hub": "far"}}, r"reference\.hub: is not a reference"),
         ({"reference": "plan"}, "reference: there is no planned motion"),
     ],
 )
@@ -358,9 +358,9 @@ class Bare:
     ("name", "value", "said"),
     [
         ("period", -1e-3, "controller.period: must be positive"),
-        ("period", "1 ms", "controller.period: is no number"),
+        ("period", "1 ms", "controller.period: is not a number"),
         ("delay", -1e-3, "controller.delay: must not be negative"),
-        ("inputs", "hub", "controller.inputs: is no list of names"),
+        ("inputs", "hub", "controller.inputs: is not a list of names"),
         ("outputs", ("tau", "tau"), "controller.outputs: is named twice"),
     ],
 )
@@ -369,7 +369,7 @@ def test_controllers_without_a_chain_are_checked_too(name, value, said):
     setattr(bare, name, value)
     with pytest.raises(pf.InputError, match=said):
         simulated_rotor().run(bare)
-    with pytest.raises(pf.InputError, match="law: is no control law"):
+    with pytest.raises(pf.InputError, match="law: is not a control law"):
         SampledController(Bare, period=T)
 
 
@@ -395,7 +395,7 @@ def test_continuous_models_are_refused():
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda task: Simulation(task, duration=1.0), "duration: a plan says it itself"),
+        (lambda task: Simulation(task, duration=1.0), "duration: is set by the plan"),
         (lambda task: Simulation(task, mode="+-"), "mode"),
         (
             lambda task: Simulation(task, method="radau"),
@@ -468,7 +468,7 @@ def test_threads_do_not_share_a_simulation():
 
 def test_complex_torques_of_a_law_are_none():
     law = pf.SampledController(lambda k, t, y: np.array([1.0 + 2.0j]), period=T, inputs=["hub"])
-    with pytest.raises(ControllerError, match="returned complex numbers, no torques"):
+    with pytest.raises(ControllerError, match="returned complex numbers, not torques"):
         simulated_rotor().run(law)
 
 

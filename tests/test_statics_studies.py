@@ -272,7 +272,7 @@ def test_whole_equilibria_are_kept(tmp_path):
         ("duration = 1.0\n", GIVEN, "duration", "equilibria have none"),
         ('metrics = ["tracking_rms"]\n', GIVEN, "metrics", "of runs along a path, not of statics"),
         ('metrics = ["travel"]\n', "", "metrics", "of statics, not of runs without a path"),
-        ('metrics = ["travel.stage.T.x"]\n', GIVEN, "metrics", 'say "travel"'),
+        ('metrics = ["travel.stage.T.x"]\n', GIVEN, "metrics", 'write "travel"'),
         ("", GIVEN.replace("stage.T.x", "stage.T.q"), "statics.moved.stage.T.q", "is neither a joint"),
         ("", GIVEN.replace("8 mm", "8 N"), "statics.moved.stage.T.x", "a quantity in N where one in m"),
         ("", GIVEN.replace("steps", "step"), "statics.step", "unknown field"),

@@ -263,7 +263,7 @@ def run_task_rows(file):
     [
         ("section.bar.thickness", "section.bar.thicknes", 'did you mean "section.bar.thickness"?'),
         ("section.bar.thickness", "body.link1.material", "not a number in the mechanism's file (got"),
-        ("section.bar.thickness", "ground.A1", 'say "ground.A1.0"'),
+        ("section.bar.thickness", "ground.A1", 'write "ground.A1.0"'),
         ("section.bar.thickness", "ground.A1.2", "no such number"),
         ('paths = ["line"]', 'paths = ["lin"]', "paths: unknown path (got 'lin'); did you mean \"line\"?"),
         ('"+++-"', '"+++"', "modes: not an actuation mode (got '+++')"),

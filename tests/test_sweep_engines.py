@@ -90,7 +90,7 @@ def test_a_task_that_kills_its_process_is_a_row(study, tmp_path):
     result = sweep(study, tmp_path / "out", workers=Workers("processes", 1), run=deadly)
     assert result.counts == {"complete": 10, "failed": 2}
     data = pd.read_parquet(result.table).set_index("run")
-    assert "workers died of it" in data.loc[4, "reason"]
+    assert "workers died running it" in data.loc[4, "reason"]
     assert data.loc[3, "status"] == data.loc[6, "status"] == "complete"
 
 

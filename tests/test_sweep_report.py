@@ -158,7 +158,7 @@ def test_the_best_runs_are_made_again_and_move(finished, page, html):
         error *= 1e-3
     # The rise from the start at rest is left out: nothing beside the rest.
     assert np.sqrt(np.nansum(error**2) / error.size) == pytest.approx(best["tracking_rms"], rel=1e-4)
-    assert "come out otherwise" not in html
+    assert "runs differ from the table" not in html
     # Each row of the table of best designs selects its run.
     rows = re.findall(r'<tr data-run="(\d+)"', html)
     assert [int(row) for row in rows] == list(range(len(page["runs"])))
@@ -170,7 +170,7 @@ def test_a_run_that_differs_from_its_row_is_told(finished, tmp_path):
     study = read_json(tmp_path / "study.json")
     study["study"]["mechanism"]["material"]["aluminium"]["density"] = 2600.0
     write_json(tmp_path / "study.json", study)
-    assert any("come out otherwise than the table says" in note for note in study_page(tmp_path).notes)
+    assert any("runs differ from the table" in note for note in study_page(tmp_path).notes)
 
 
 def test_failures_are_counted_and_grouped(finished, report, html):
@@ -266,7 +266,7 @@ def test_the_command_writes_it_also_of_a_part_and_again(tmp_path):
     assert done.returncode == 0, done.stderr
     assert f"report: {out / 'report.html'}" in done.stderr
     written = (out / "report.html").read_text(encoding="utf-8")
-    assert "The study is not finished: this is of the 12 of 16 runs" in written
+    assert "The study is not finished: these are 12 of 16 runs" in written
     again = paraflex("report", out)
     assert again.returncode == 2
     assert "--force" in again.stderr

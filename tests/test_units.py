@@ -251,7 +251,7 @@ def test_points_of_a_path_may_have_units(tmp_path):
         (DRAWN, "x [s], y [m]\n0,0\n1,1\n", "path.p.table: column 1 of table.csv is in s where m is"),
         (MOVED, "t [s], x [mn]\n0, 0\n1, 2\n", 'drive.table: column 2 of table.csv has the unknown unit "mn"'),
         (MOVED, "t [s], x [-]\n0, 0\n1, 2\n", 'drive.table: column 2 of table.csv has the unknown unit "-"'),
-        (MOVED, "time of run x [mm]\n0 0\n1 2\n", "the headings of table.csv do not tell to which of 2 columns"),
+        (MOVED, "time of run x [mm]\n0 0\n1 2\n", "the headings of table.csv do not show to which of 2 columns"),
     ],
 )  # fmt: skip
 def test_units_of_columns_are_those_of_the_field(tmp_path, text, table, says):

@@ -286,7 +286,7 @@ def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
 
     def take(value: Any, field: str) -> Any:
         if files and isinstance(value, str | PurePath) and "\0" in str(value):
-            raise refused(value, field, "a file name", "leave out the character of code zero")
+            raise refused(value, field, "a file name", "remove the null character")
         if (value is None and optional) or isinstance(value, plain) or type(value) in classes:
             return value
         for each in takes.values():

@@ -164,11 +164,11 @@ def _check(task: TrackingTask, step: float) -> None:
     for body in mechanism.bodies:
         if len(task.system.parts(body.name)) > 1 and task.whole is None:
             raise InputError(
-                "kineto-elastodynamics takes one frame a beam", field=f"body.{body.name}.frames",
+                "kineto-elastodynamics takes one frame per beam", field=f"body.{body.name}.frames",
                 remedy="leave frames out",
             )  # fmt: skip
     if not (math.isfinite(step) and step > 0.0):
-        raise InputError("must be positive", field="step", value=step, remedy="give a time in seconds, say 1e-4")
+        raise InputError("must be positive", field="step", value=step, remedy="give a time in seconds, such as 1e-4")
 
 
 @dataclass(frozen=True)

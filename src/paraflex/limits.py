@@ -54,7 +54,7 @@ SHAPER_IMPULSES = 256
 # Designs of a study: at ten runs per second they take twelve days, and the table of more would fill the memory.
 DESIGNS = 10_000_000
 # Remedy for numbers that lead to overflow or singular matrices.
-OUT_OF_PROPORTION = "look at lengths, masses and stiffnesses: they are in SI units"
+OUT_OF_PROPORTION = "check lengths, masses and stiffnesses: they are in SI units"
 
 
 def at_most(value: float, limit: float, field: str, problem: str = "too many") -> None:
@@ -68,14 +68,14 @@ def of_size(value: float, field: str) -> None:
     if value != value or abs(value) == math.inf:
         raise InputError("not a finite number", field=field, value=value, remedy="give a number")
     if abs(value) > LARGEST:
-        raise InputError("beyond all proportion", field=field, value=value, remedy=f"at most {LARGEST:g}, in SI units")
+        raise InputError("far out of range", field=field, value=value, remedy=f"at most {LARGEST:g}, in SI units")
 
 
 def possible(value: float, field: str, unit: str) -> None:
     """Raise an `InputError` unless the magnitude of a nonzero number is between `SMALLEST` and `LARGEST`."""
     if not SMALLEST <= abs(value) <= LARGEST:
         remedy = f"give it in {unit}, from {SMALLEST:g} to {LARGEST:g}"
-        raise InputError("beyond all proportion", field=field, value=value, remedy=remedy)
+        raise InputError("far out of range", field=field, value=value, remedy=remedy)
 
 
 @contextmanager

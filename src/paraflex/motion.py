@@ -216,7 +216,9 @@ def motion_start(
         raise InputError("is missing", field="duration", remedy="give it in seconds, or in the model's [study]")
     check_times(duration, samples)
     if isinstance(start, State) and balanced:
-        raise InputError("a state is as it is", field="balanced", value=balanced, remedy="leave one of the two out")
+        raise InputError(
+            "a given state cannot be balanced", field="balanced", value=balanced, remedy="leave one of the two out"
+        )
     system = standing_system(Mechanism.made_of(given), start)
     if isinstance(start, State):
         state = start
@@ -278,7 +280,7 @@ def _grown_errors(run: MotionRun) -> Iterator[Finding]:
             "give a smaller tolerance and compare, or end the run before",
         )  # fmt: skip
     elif second.status == "interrupted":
-        yield Finding("errors-grow", "", "interrupted before it was seen whether errors grow", "run it again")
+        yield Finding("errors-grow", "", "interrupted before the growth of errors was checked", "run it again")
 
 
 def state_at(system: System, start: Start | None, assembly: str | None, *, balanced: bool) -> State:

@@ -50,7 +50,7 @@ def whole_file(path: Path, *, remedy: str = ELSEWHERE, field: str = "", parents:
         The file cannot be written.
     """
     if not path.name:
-        raise InputError("names no file", field=field or "path", value=str(path), remedy="give a file's name")
+        raise InputError("does not name a file", field=field or "path", value=str(path), remedy="give a file's name")
     unfinished = path.with_name(path.name + ".part")
     try:
         if parents:
@@ -165,7 +165,7 @@ def read_values(file: Path, remedy: str) -> Any:
     except OSError as error:
         raise unreadable(error, file, remedy) from error
     except (ValueError, RecursionError, MemoryError) as error:
-        raise damaged(file, "not JSON to its end", remedy) from error
+        raise damaged(file, "not complete JSON", remedy) from error
     digested = isinstance(found, dict) and _DIGEST in found
     if digested and found.pop(_DIGEST) != _digest(found):
         raise damaged(file, "not as it was written", remedy)

@@ -103,7 +103,7 @@ class Journal:
         if found is None:
             return None
         if not isinstance(found[0], bytes) or found[1] != _digest(name, found[0].hex()):
-            raise sqlite3.DatabaseError(f"what is noted as {name} is not as it was written")
+            raise sqlite3.DatabaseError(f"the note {name} is not as it was written")
         return found[0]
 
     def runs(self) -> Iterator[int]:
@@ -137,14 +137,14 @@ class Journal:
             found = found.plus(digest)
             yield content
         if found != noted:
-            raise sqlite3.DatabaseError(f"{found.count} rows are found of {noted.count}")
+            raise sqlite3.DatabaseError(f"{found.count} of {noted.count} rows are found")
 
     def _tally(self) -> _Tally:
         noted = self.noted(_TALLY)
         try:
             return _Tally() if noted is None else _Tally(*map(int, noted.split()))
         except (TypeError, ValueError) as error:
-            raise sqlite3.DatabaseError("it does not say how many rows there are") from error
+            raise sqlite3.DatabaseError("it does not hold the number of rows") from error
 
     def add(self, rows: Sequence[Row]) -> None:
         """Add rows, replacing those of the same runs; they are committed in groups, about every two seconds."""
@@ -311,7 +311,7 @@ def _check_files(file: Path) -> None:
     """
     beside = [file.with_name(file.name + end) for end in ("", "-journal", "-wal", "-shm")]
     if any(each.is_symlink() or (each.exists() and not each.is_file()) for each in beside):
-        raise sqlite3.DatabaseError("it is a link or no file, or one beside it is")
+        raise sqlite3.DatabaseError("it is a link or not a regular file, or one beside it is")
     with suppress(OSError), beside[1].open("rb") as stream:
         stream.seek(-len(_NAMES_ANOTHER), 2)
         if stream.read(len(_NAMES_ANOTHER)) == _NAMES_ANOTHER:
@@ -354,7 +354,7 @@ def _row(content: str) -> Row:
         found = json.loads(content)
         if isinstance(found, dict) and isinstance(found.get("run"), int) and isinstance(found.get("id"), str):
             return found
-    raise sqlite3.DatabaseError("what a row holds is not of a run")
+    raise sqlite3.DatabaseError("a row does not describe a run")
 
 
 def _plain(number: Any) -> int | float:

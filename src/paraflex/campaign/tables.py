@@ -184,7 +184,7 @@ def _schema(journal: Journal) -> pa.Schema:
     try:
         return pa.schema([]) if noted is None else pa.ipc.read_schema(pa.py_buffer(noted))
     except (pa.ArrowException, OSError) as error:
-        raise sqlite3.DatabaseError("its columns are not noted") from error
+        raise sqlite3.DatabaseError("its columns are not recorded") from error
 
 
 def checked_rows(journal: Journal) -> Iterator[Row]:
@@ -205,5 +205,5 @@ def _batches(journal: Journal, size: int) -> Iterator[tuple[list[Row], pa.Table]
         try:
             piece = pa.Table.from_pylist(some, schema)
         except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
-            raise sqlite3.DatabaseError("a row holds what its columns do not") from error
+            raise sqlite3.DatabaseError("a row does not fit its columns") from error
         yield some, piece

@@ -250,13 +250,13 @@ def open_engine(engine: str | Engine, workers: int | None = None, cluster: str |
     if engine not in WORKER_ENGINES:
         raise InputError("unknown engine", field="--engine", value=engine, remedy=suggestion(engine, WORKER_ENGINES))
     if cluster is not None and engine != DASK:
-        remedy = "say --engine dask, or leave it out"
+        remedy = "write --engine dask, or leave it out"
         raise InputError("only the engine dask takes a cluster", field="--cluster", value=cluster, remedy=remedy)
     if cluster is not None and workers is not None:
         remedy = "leave it out with --cluster"
         raise InputError("the cluster has workers of its own", field="--workers", value=workers, remedy=remedy)
     if workers is not None and workers < 1:
-        raise InputError("must be positive", field="--workers", value=workers, remedy="say 2")
+        raise InputError("must be positive", field="--workers", value=workers, remedy="give 2")
     # Count the processors that this process may use, because batch systems assign only a part of the machine.
     own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     count = workers or own or 1
@@ -315,7 +315,7 @@ def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> I
     """Run tasks one at a time after one of them killed a worker, so that only that task is given up."""
     calls = Calls()
     for task in tasks:
-        result: R | LostWorker = LostWorker(f"{_DEATHS + 1} workers died of it: out of memory, or killed")
+        result: R | LostWorker = LostWorker(f"{_DEATHS + 1} workers died running it: out of memory, or killed")
         for _ in range(_DEATHS):
             future = calls.hand(_submit, engine, function, task)
             while future not in calls.done():

@@ -292,7 +292,7 @@ class Environment(Env[Array, NDArray[Any]]):
     def _varied(self, mechanism: Mechanism) -> Simulation:
         """Return the simulation of another mechanism with the same members."""
         if _members(mechanism) != self._members:
-            raise InputError("makes a mechanism of other members", field="vary", value=mechanism.name,
+            raise InputError("makes a mechanism with other members", field="vary", value=mechanism.name,
                              remedy="change numbers only: members keep their names")  # fmt: skip
         if self._task is not None:
             return Simulation(self._task.remodelled(mechanism), **self._settings)
@@ -319,7 +319,7 @@ def _limits(given: Any, task: TrackingTask | None, simulation: Simulation, part:
     motors = simulation.motors
     if given is None:
         if task is None:
-            raise InputError("are missing", field="limits", remedy="give the torque of an action of one in N m")
+            raise InputError("are missing", field="limits", remedy="give the torque for an action of 1 in N m")
         peak = float(np.max(np.abs(task.torques(simulation.mode).evaluate(task.motion.t))))
         if not peak:
             raise InputError("are missing", field="limits", remedy="give them in N m: the plan needs no torques")

@@ -120,7 +120,7 @@ def metrics_of(
         if name not in METRICS:
             raise InputError(
                 f"a metric of each {metric_of(name).each or 'run'} is kept of all", field="metrics", value=name,
-                remedy=f'say "{metric_of(name).name}"',
+                remedy=f'write "{metric_of(name).name}"',
             )  # fmt: skip
         if runs not in METRICS[name].runs:
             raise InputError(

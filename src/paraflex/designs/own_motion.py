@@ -97,7 +97,5 @@ def own_duration(model: Model, duration: float | None) -> float:
     """
     duration = model.study.duration if duration is None else duration
     if duration is None:
-        raise InputError(
-            "the model has no path, and nothing says how long it is to run", field="duration", remedy="give it in s"
-        )
+        raise InputError("the model has no path, and no duration is given", field="duration", remedy="give it in s")
     return duration

@@ -184,21 +184,21 @@ def _check_range(parameter: Varied, where: str) -> None:
         raise InputError("a logarithmic range must be positive", field=f"{where}.low", value=low, remedy=remedy)
     if parameter.whole and (parameter.log or low % 1.0 or high % 1.0):
         raise InputError(
-            "whole numbers have a linear range between two of them", field=f"{where}.whole", value=True,
+            "whole numbers need a linear range with whole ends", field=f"{where}.whole", value=True,
             remedy="give whole low and high",
         )  # fmt: skip
 
 
 def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> None:
     if seed < 0:
-        raise InputError("must not be negative", field="sampling.seed", value=seed, remedy="say 0")
+        raise InputError("must not be negative", field="sampling.seed", value=seed, remedy="give 0")
     if kind in (RANDOM, SOBOL):
         if not parameters:
             raise InputError("no parameter varies", field="vary", remedy="add a [vary.NAME] table")
         if number is None or number < 1:
             raise InputError(
                 "must be positive" if number is not None else "is missing", field="sampling.number", value=number,
-                remedy="say how many designs",
+                remedy="give the number of designs",
             )  # fmt: skip
         at_most(number, DESIGNS, "sampling.number", "too many designs")
     elif number is not None:

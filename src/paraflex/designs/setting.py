@@ -291,7 +291,9 @@ def _place(data: Mapping[str, Any], field: str) -> Place:
     if table != INTEGRATION:
         return find_place(data, field)
     if name not in INTEGRATION_NUMBERS:
-        raise InputError("no such number of the integration", field=field, remedy=suggestion(name, INTEGRATION_NUMBERS))
+        raise InputError(
+            "not a numeric option of the integration", field=field, remedy=suggestion(name, INTEGRATION_NUMBERS)
+        )
     return INTEGRATION, name
 
 
@@ -307,7 +309,7 @@ def _no_modes(table: SweepTable) -> tuple[str, ...]:
     """Return the single empty mode name of runs without a path; raise an InputError if the study has modes."""
     if table.modes:
         raise InputError(
-            "a mechanism without a path has no actuation modes, its torques are given", field="modes",
+            "a mechanism without a path has no actuation modes: its torques are given", field="modes",
             value=table.modes[0], remedy="leave it out, or add a [path.NAME] table to the mechanism's file",
         )  # fmt: skip
     return (NO_MODE,)
@@ -344,9 +346,9 @@ def _check(setting: Setting, model: Model) -> None:
         own_duration(model, setting.duration)
         if model.study.reduced:
             raise InputError(
-                "few flexible coordinates are chosen from the plan of a path, which there is none of",
+                "few flexible coordinates are chosen from a planned path, and there is none",
                 field="study.reduced", value=model.study.reduced, source=setting.source,
-                remedy='leave it out, or say reduction = "craig-bampton" and modes in the tables of beams',
+                remedy='leave it out, or write reduction = "craig-bampton" and modes in the tables of beams',
             )  # fmt: skip
     model.mechanism.assembly(setting.assembly)
 
@@ -357,6 +359,6 @@ def _check_columns(parameters: tuple[Varied, ...]) -> None:
     for parameter in parameters:
         if parameter.name in taken:
             raise InputError(
-                "a column of the table has that name", field=f"vary.{parameter.name}", remedy="choose another, and say "
+                "a column of the table has that name", field=f"vary.{parameter.name}", remedy="choose another; write "
                 "fields = [...]",
             )  # fmt: skip

@@ -207,7 +207,7 @@ class SweepStudy(Study["SweepResult"]):
         """
         folder, setting = kept_in(folder), self.setting
         if limit is not None and limit < 1:
-            raise InputError("must be positive", field="--limit", value=limit, remedy="say how many runs")
+            raise InputError("must be positive", field="--limit", value=limit, remedy="give the number of runs")
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
         with open_campaign(folder, account, table_schema(setting, self.members), self._has) as campaign:
             session = _Session(self, campaign, on_progress)

@@ -109,7 +109,7 @@ def read_section(name: str, table: SectionTable) -> Section:
     given = {key: value for key, value in table if value is not None}
     kind = given.pop("shape", None)
     if kind is None and "diameter" in given:
-        raise InputError("is missing", field=f"section.{name}.shape", remedy='say "round" or "tube"')
+        raise InputError("is missing", field=f"section.{name}.shape", remedy='write "round" or "tube"')
     if kind is None and not given.keys() & {"area", "second_moment"}:
         kind = "rectangle"
     made: Any = Section if kind is None else SHAPES[kind]
@@ -180,7 +180,7 @@ def _damping(table: DampingTable | None, name: str) -> Damping | None:
     if given == {"loss_factor", "frequency"}:
         return LossFactor(table.loss_factor, table.frequency)
     raise InputError(
-        "a loss factor goes with the frequency that it is meant for"
+        "a loss factor needs the frequency at which it holds"
         if given < {"loss_factor", "frequency"}
         else "ratios, a loss factor and Rayleigh's coefficients exclude one another",
         field=f"body.{name}.damping",
@@ -191,6 +191,6 @@ def _damping(table: DampingTable | None, name: str) -> Damping | None:
 
 def _functions(sines: int, polynomials: list[list[float]], field: str) -> tuple[ShapeFunction, ...]:
     if sines < 0:
-        raise InputError("must not be negative", field=field, value=sines, remedy="say 2")
+        raise InputError("must not be negative", field=field, value=sines, remedy="give 2")
     at_most(sines, SHAPE_FUNCTIONS, field)
     return (*(Sine(n) for n in range(1, sines + 1)), *(Polynomial(tuple(row)) for row in polynomials))

@@ -142,7 +142,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
             raise _unknown(name, table)
         if name in open_names:
             circle = " -> ".join([*open_names[open_names.index(name) :], name])
-            raise ExpressionError(f"a circle of parameters, {circle}", "give one of them a number")
+            raise ExpressionError(f"a cycle of parameters, {circle}", "give one of them a number")
         if len(open_names) >= PARAMETER_CHAIN:
             remedy = f"at most {PARAMETER_CHAIN}; give one of them a number"
             raise ExpressionError("a chain of too many parameters", remedy)
@@ -272,7 +272,7 @@ def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
             return _call(name, [_value(argument, value_of) for argument in arguments])
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
-        raise ExpressionError('"^" is no power here, but behind units only', 'write ** for powers: "x**2"')
+        raise ExpressionError('"^" is a power only in units', 'write ** for powers: "x**2"')
     raise ExpressionError(
         "only numbers, parameters, + - * / ** and brackets may stand in an expression, and functions like sin(...)",
         "compute the value elsewhere and write the number",

@@ -144,10 +144,10 @@ def check_unit(
     asked = f"one in {' or '.join(units)}" if units else "a number without a unit"
     remedy = f"give {description}"
     if named := sorted(names_in(text) & parameters.keys()):
-        remedy += f"; it comes of {', '.join(f'parameters.{name}' for name in named)}"
+        remedy += f"; it depends on {', '.join(f'parameters.{name}' for name in named)}"
     # The dimensions differ in the angle only, as for a period computed from a speed, 2 * pi / n.
     if any(given[:3] == unit_named(unit).dimension[:3] for unit in units or ()):
-        remedy += '; an angle is a quantity of its own: of a speed n in rpm the period is "1 rev / n"'
+        remedy += '; an angle has a dimension of its own: the period of a speed n in rpm is "1 rev / n"'
     raise InputError(f"a quantity in {spelt(given)} where {asked} is asked for", field=field, value=text, remedy=remedy)
 
 

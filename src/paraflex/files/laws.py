@@ -173,7 +173,7 @@ def read_components(
         )  # fmt: skip
     if entry.interpolation is not None and entry.table is None:
         raise InputError(
-            "is of tables alone", field="interpolation", value=entry.interpolation, remedy="drop it, or give a table"
+            "is for tables only", field="interpolation", value=entry.interpolation, remedy="drop it, or give a table"
         )
     if entry.table is not None:
         times, *columns = zip(*entry.table, strict=True) if entry.table else ((), ())
@@ -270,7 +270,7 @@ def law_parameters(laws: Iterable[tuple[str, AngleLaw]]) -> dict[str, float]:
                 if found.setdefault(name, value) != value:
                     raise InputError(
                         f'a file has one value of the parameter "{name}", and laws have {found[name]!r} and {value!r}',
-                        field=place, remedy="call one of them something else",
+                        field=place, remedy="rename one of them",
                     )  # fmt: skip
     return found
 
@@ -287,14 +287,14 @@ def _piece(law: InTime) -> float | str:
 
 def _no_words(law: AngleLaw) -> InputError:
     return InputError(
-        "a model file cannot say this law", field="law", value=type(law).__name__,
+        "a model file cannot express this law", field="law", value=type(law).__name__,
         remedy="give a ConstantSpeed, an ExpressionLaw, a PiecewiseLaw of these, or a TabulatedLaw of its values",
     )  # fmt: skip
 
 
 def _unlike(components: Sequence[InTime]) -> InputError:
     return InputError(
-        "a model file cannot say a force whose components change at different times",
+        "a model file cannot express a force whose components change at different times",
         field="force", value=", ".join(type(law).__name__ for law in components),
         remedy="give both pieces with the same ends, or tables of the same times and interpolation",
     )  # fmt: skip

@@ -38,5 +38,5 @@ def library_text(name: str) -> str:
         return generated_text(name)
     if name not in library_names():
         known = [*library_names(), *generator_names()]
-        raise InputError("no library mechanism", field="mechanism", value=name, remedy=suggestion(name, known))
+        raise InputError("not a library mechanism", field="mechanism", value=name, remedy=suggestion(name, known))
     return library_file(name).read_text(encoding="utf-8")

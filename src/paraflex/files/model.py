@@ -142,7 +142,10 @@ class Model(CheckedFields):
             return ()
         if NONE in wanted:
             raise InputError(
-                "goes with no other", field="controllers", value=NONE, remedy="say it alone, or leave it out"
+                "cannot be combined with others",
+                field="controllers",
+                value=NONE,
+                remedy="give it alone, or leave it out",
             )
         for name in wanted:
             known(name, self.controllers, "controllers", "controller")
@@ -420,7 +423,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
     if table.study.orientation is not None and not turns:
         raise InputError(
-            "the angle is no task coordinate", field="study.orientation", value=table.study.orientation,
+            "the angle is not a task coordinate", field="study.orientation", value=table.study.orientation,
             remedy='name "angle" among the coordinates of [end_effector], or leave it out',
         )  # fmt: skip
     start = None if table.start is None else read_start(table.start, mechanism)
@@ -478,5 +481,5 @@ def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     wanted, found = (model_tables(one) for one in (model, model_from(data, model.source)))
     for key, value in wanted.items():
         if not same(value, found.get(key)):
-            raise unsayable(key, value, "make it of what a file has")
+            raise unsayable(key, value, "build it from parts that a file can hold")
     return data

@@ -38,7 +38,7 @@ def check_outside(folder: Path, name: str, field: str) -> None:
     if not may_be_outside() and is_outside(folder, name):
         raise InputError(
             "lies outside the folder of the model", field=field, value=name,
-            remedy="copy it there, or say --allow-outside (in Python: `with pf.allowing_outside()`)",
+            remedy="copy it there, or use --allow-outside (in Python: `with pf.allowing_outside()`)",
         )  # fmt: skip
 
 

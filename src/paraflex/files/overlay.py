@@ -213,7 +213,7 @@ def _parts(field: str) -> list[str]:
         at = found.end()
         if found[4] == "":
             return parts
-    raise InputError("not the name of a field", field=field, remedy='say "body.link1.length"')
+    raise InputError("not the name of a field", field=field, remedy='write "body.link1.length"')
 
 
 def _is_number(value: Any, data: Mapping[str, Any]) -> bool:
@@ -234,7 +234,7 @@ def _is_number(value: Any, data: Mapping[str, Any]) -> bool:
 def _below(data: Mapping[str, Any], field: str) -> str:
     inside = _spelt(_followed(data, _in_full(data, field)))
     near = [name for name in map(_spelt, number_places(data)) if name.startswith(f"{inside}.")]
-    return f'say "{near[0]}"' if near else "name a number"
+    return f'write "{near[0]}"' if near else "name a number"
 
 
 def _spelt(place: Place) -> str:

@@ -116,7 +116,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         except tomllib.TOMLDecodeError as error:
             raise _not_toml(str(error), text) from error
         except (ValueError, RecursionError):
-            problem = "not valid TOML: a number of too many digits, or too many brackets in one another"
+            problem = "not valid TOML: a number of too many digits, or too many nested brackets"
             raise InputError(problem, field="file", remedy="name a model file") from None
         _check_names(data)
         return data
@@ -140,7 +140,7 @@ def _not_toml(reason: str, text: str) -> InputError:
     """Build the error of invalid TOML: the parser's reason or the duplicate table, with a likely remedy."""
     twice = re.match(r"Cannot declare \((.*?),?\) twice \((.*)\)", reason)
     if twice is None:
-        problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "mend that line"
+        problem, remedy = f"not valid TOML: {reason[0].lower()}{reason[1:]}", "correct this line"
         at = re.search(r"at line (\d+)", reason)
         number = int(at[1]) if at else text.count("\n") + 1
         line = text.split("\n")[number - 1][:500]
@@ -152,10 +152,10 @@ def _not_toml(reason: str, text: str) -> InputError:
             problem += f", opened in line {opened}"
             remedy = "close it there"
         if re.search("overwrite|mutate|uplicate", reason):
-            remedy += "; a name may stand only once"
+            remedy += "; a name may appear only once"
         return InputError(problem, field="file", remedy=remedy)
     table = ".".join(part.strip(" '") for part in twice[1].split(","))
-    return InputError(f"the table [{table}] stands twice ({twice[2]})", field=table, remedy="leave one of them out")
+    return InputError(f"the table [{table}] appears twice ({twice[2]})", field=table, remedy="leave one of them out")
 
 
 def _opened(text: str, last: int) -> int:

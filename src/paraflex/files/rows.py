@@ -108,14 +108,14 @@ def _read_rows(
 ) -> list[list[float]]:
     """Read the rows of a file in SI units; errors do not quote the content of files outside the model's folder."""
     field = _field(place)
-    unread, wrong = "name a file, seen from the model file's folder", f"save {_COUNTS[columns]} columns as CSV"
+    unread, wrong = "name a file, relative to the model file's folder", f"save {_COUNTS[columns]} columns as CSV"
     lines = text_of(folder / name, field, name, unread=unread, wrong=wrong).splitlines()
     try:
         return _rows_of(data, place, lines, name, columns)
     except InputError as error:
         if error.value is None or not is_outside(folder, name):
             raise
-        remedy = "copy it into the folder of the model file, where errors say more"
+        remedy = "copy it into the folder of the model file, where errors give details"
         problem = f"not {_COUNTS[columns]} columns of numbers below headings"
         raise InputError(problem, field=error.field, value=name, remedy=remedy) from None
 
@@ -181,7 +181,7 @@ def _units(headings: str, count: int, file: str, field: str) -> list[tuple[str, 
         return [(part, _unit_in(part)) for part in parts]
     if given and len(given) != count:
         raise InputError(
-            f"the headings of {file} do not tell to which of {count} columns their units belong", field=field,
+            f"the headings of {file} do not show to which of {count} columns their units belong", field=field,
             value=headings.strip(), remedy="separate headings by commas",
         )  # fmt: skip
     return [(f"[{unit}]", unit) for unit in given]

@@ -55,4 +55,4 @@ def check_fields(
 
 def unsayable(field: str, value: object, remedy: str) -> InputError:
     """Return the error for a part of a model that cannot be expressed in a file."""
-    return InputError("a model file cannot say this", field=field, value=value, remedy=remedy)
+    return InputError("a model file cannot express this", field=field, value=value, remedy=remedy)

@@ -127,7 +127,7 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
     if study.path is not None:
         known(study.path, paths, "study.path", "path")
         if study.paths:
-            raise InputError("stands beside path", field="study.paths", remedy="leave one of them out")
+            raise InputError("is given together with path", field="study.paths", remedy="leave one of them out")
     for name in study.paths:
         known(name, paths, "study.paths", "path")
         if study.paths.count(name) > 1:
@@ -148,7 +148,7 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
     if study.reduced is not None and study.reduced < 0:
         raise InputError(
             "no such number of flexible coordinates", field="study.reduced", value=study.reduced,
-            remedy="say how many to keep, 0 or nothing for all",
+            remedy="give the number to keep, 0 or nothing for all",
         )  # fmt: skip
     with within("study"):
         check_times(study.duration, study.samples)

@@ -71,8 +71,8 @@ def model_tables(
     mechanism, study = model.mechanism, model.study
     if mechanism.bases:
         raise InputError(
-            "a file has no words for flexible coordinates that a reduction has chosen", field="bases",
-            remedy="save the mechanism before it, and say reduced = N in its [study]",
+            "a file cannot hold flexible coordinates that a reduction has chosen", field="bases",
+            remedy="save the mechanism before it, and write reduced = N in its [study]",
         )  # fmt: skip
     shared = {} if each else _agreed(mechanism)
     names = {kind: _Names(kind, mechanism, file or {}, before) for kind in _NAMED_TABLES}
@@ -160,7 +160,7 @@ def _text(text: str, field: str) -> str:
     try:
         text.encode()
     except UnicodeEncodeError:
-        raise InputError("not text in UTF-8", field=field, value=ascii(text), remedy="write it otherwise") from None
+        raise InputError("not text in UTF-8", field=field, value=ascii(text), remedy="use other characters") from None
     return text
 
 
@@ -211,7 +211,7 @@ def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
         if kind == "lump":
             for lump in given:
                 if (body.name, lump.point) in out:
-                    raise unsayable(f"body.{body.name}.lumps", lump.point, "make one lump of those at a point")
+                    raise unsayable(f"body.{body.name}.lumps", lump.point, "combine the lumps at a point")
                 out[body.name, lump.point] = (lump.mass, lump.inertia)
         else:
             for k, each in enumerate(given if isinstance(given, tuple) else (given,)):
@@ -317,7 +317,7 @@ def _torques(study: StudyDefaults) -> dict[str, Any]:
 
 def _assembly(assembly: Assembly) -> dict[str, Any]:
     if "points" in assembly.angles:
-        raise unsayable(f"assembly.{assembly.name}", "points", 'call the body "points" something else')
+        raise unsayable(f"assembly.{assembly.name}", "points", 'rename the body "points"')
     return {**assembly.angles} | ({"points": assembly.points} if assembly.points else {})
 
 

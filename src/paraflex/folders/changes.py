@@ -32,7 +32,7 @@ def finish_moves(folder: Path) -> None:
     ready = folder / READY
     if not ready.is_dir():
         return
-    remedy = "look at what is in it and who made it; without it, the results before are read"
+    remedy = "check its contents and its owner; without it, the previous results are read"
     if ready.is_symlink():
         raise OutputError("is a link, not results that paraflex prepared", field=str(ready), remedy=remedy)
     if hasattr(os, "getuid") and ready.stat().st_uid != os.getuid():

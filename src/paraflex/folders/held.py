@@ -145,7 +145,7 @@ def hold_folder(
             if there not in ("", kind) and not force:
                 raise InputError(
                     f"the folder holds other results, a {there}", field=field, value=str(path),
-                    remedy=f"name another folder{'' if force is None else ', or say --force to replace them'}",
+                    remedy=f"name another folder{'' if force is None else ', or use --force to replace them'}",
                 )  # fmt: skip
             try:
                 with uninterrupted():  # otherwise an empty folder could remain

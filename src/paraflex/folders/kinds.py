@@ -85,7 +85,7 @@ class ResultKind:
 
 
 _NOTHING_MOVES = (
-    "these are no run, and nothing moves in them",
+    "these results are not a run and show no motion",
     "paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
 )
 _STUDY = ("study.json", "journal.sqlite", "results.parquet")

@@ -191,7 +191,7 @@ def _check(options: FilmOptions) -> None:
                 f"not between {_SMALLEST_PICTURE} and {_LARGEST_PICTURE} pixels",
                 field="size",
                 value=side,
-                remedy="say 1280x720",
+                remedy="give 1280x720",
             )
 
 

@@ -43,7 +43,7 @@ def work_precision(figures: Mapping[str, Any]) -> Figure:
     """
     lines = _lines(figures["methods"])
     if not lines:
-        raise InputError("no run got to its end", field="figures", remedy="see the reasons in `methods`")
+        raise InputError("no run reached its end", field="figures", remedy="see the reasons in `methods`")
     figure, axes = panels(1, 2)
     for panel, key, label in zip(
         axes[0], ("wall_time", "steps"), (axis_label("wall_time"), "accepted steps"), strict=True

@@ -48,7 +48,7 @@ def controller_tables(data: xr.Dataset) -> list[tuple[str, str]]:
         ])
         for mode, name, one in rows
     ]  # fmt: skip
-    note = "Limited: samples at which a limit of torques or of their rates was met."
+    note = "Limited: samples at which a limit of torques or of their rates was reached."
     known = [f"{most}{f' in mode {mode}' if several else ''}" for mode, most in _internal(figures)]
     if known:
         note += f" Largest internal torque, which only strains links: {', '.join(known)}."
@@ -94,7 +94,7 @@ def _charts(one: ControllerData, runs: Sequence[str]) -> Iterator[Chart]:
     every = max(1, -(-one.data.sizes[SAMPLE] // MOST_SAMPLES))
     few = one.data.isel({SAMPLE: slice(None, None, every)})
     times = few[SAMPLE].values
-    note = "Solid as they act, after the delay and until the next sample; dotted those of the law."
+    note = "Solid: torques as they act, after the delay and until the next sample; dotted: those of the law."
     label = f"torque [{', '.join(dict.fromkeys(one.units[name] for name in names_of(few, OUTPUT)))}]"
     torques = Chart(f"torques-{one.name}", f"Controller {one.name}: torques", label, note=note)
     given, wanted = (few[name].transpose(..., SAMPLE, OUTPUT).values for name in (GIVEN, WANTED))

@@ -27,7 +27,7 @@ ERRORS = Chart(
 STRAIN = Chart("strain", "Strain energy", "strain energy")
 TIPS = Chart(
     "deflections", "Displacements of the links' ends across them", "transverse displacement",
-    choosing="link", note="Of a link's last end from the tangent at its first end.",
+    choosing="link", note="Distance of a link's last end from the tangent at its first end.",
 )  # fmt: skip
 
 

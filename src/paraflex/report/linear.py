@@ -170,7 +170,7 @@ def _frequencies(data: xr.Dataset) -> str:
     heads = [("", ""), *((str(k + 1), "Hz") for k in range(_OSCILLATIONS))]
     return table(
         heads, [(name, cells(poles)) for name, poles in rows], caption="Frequencies and damping ratios",
-        note="Of the poles |s| / 2π and, below, the damping ratio where there is one. Motions without a frequency are "
+        note="Poles: |s| / 2π and, below it, the damping ratio if there is one. Motions without a frequency are "
         "left out.",
     )  # fmt: skip
 
@@ -190,7 +190,7 @@ def _zero_tables(data: xr.Dataset) -> list[tuple[str, str]]:
             rows.append((mode, [texts + more, phase if found else NO_VALUE]))
         html = table(
             [("mode", ""), ("lowest zeros", ""), ("minimum phase", "")], rows, caption=f"Zeros of {MAP_WORDS[name]}",
-            note="On the imaginary axis as frequencies [Hz]; * in the right half plane.",
+            note="Those on the imaginary axis as frequencies [Hz]; * marks the right half plane.",
         )  # fmt: skip
         out.append((f"Zeros: {MAP_WORDS[name]}", html))
     return out

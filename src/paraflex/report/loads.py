@@ -60,7 +60,7 @@ def _of_modes(modes: Sequence[str], selected: str, rows: int, html: Callable[[st
         return html(modes[0])
     if rows <= _MOST_ROWS_OF_MODES:
         return by_run([(f"mode {mode}", html(mode)) for mode in modes])
-    note = f"Of mode {selected}. All {len(modes)} modes have {rows} rows: they are in summary.json."
+    note = f"Mode {selected} only. All {len(modes)} modes have {rows} rows: they are in summary.json."
     return f'{html(selected)}<p class="note">{note}</p>'
 
 
@@ -105,7 +105,7 @@ def _stresses(figures: Mapping[str, Mapping[str, Any]]) -> str:
         for row in rows:
             if row[0] not in worst or (row[2]["stress_max"] or 0.0) > (worst[row[0]][2]["stress_max"] or 0.0):
                 worst[row[0]] = row
-        rows, note = list(worst.values()), f"{note} Of each mode the beam with the largest stress."
+        rows, note = list(worst.values()), f"{note} For each mode, the beam with the largest stress."
     if not rows:
         return ""
     if any(one["stress_max"] is None for _, _, one in rows):
@@ -225,7 +225,7 @@ def load_panel(data: xr.Dataset, runs: Sequence[str], selecting: str = "mode") -
     if "motor_power" in data and data.sizes["motor"]:
         add(Chart("powers", "Motor powers", "power", choosing="motor"), data["motor_power"])
     if "frame_force" in data:
-        note = "Of all joints and springs that are on the ground: the shaking force."
+        note = "Sum over all joints and springs on the ground: the shaking force."
         add(Chart("frame", "Force on the ground", "force", choosing="direction", note=note), data["frame_force"])
     loads = [Panel("Loads", charts)] if charts else []
     return [*loads, *_sensor_panel(data, runs)]

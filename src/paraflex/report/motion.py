@@ -194,7 +194,7 @@ def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:
                 choices.append(choice)
     return Chart(
         "coordinates", "Generalised coordinates", "coordinate", curves, choices=choices, choosing="body",
-        note="Flexible ones are mass-normalised modes." if len(choices) > len(bodies[:_MOST_CHOICES]) else "",
+        note="Flexible coordinates are mass-normalised modes." if len(choices) > len(bodies[:_MOST_CHOICES]) else "",
     )  # fmt: skip
 
 

@@ -153,5 +153,5 @@ def summary_beside(file: Path) -> dict[str, Any]:
     numbers = read_json(file)
     check_listed(file, "run the command again")
     if not isinstance(numbers.get("modes"), dict):
-        raise InputError("is no summary that paraflex wrote", field=str(file), remedy="run the command again")
+        raise InputError("is not a summary that paraflex wrote", field=str(file), remedy="run the command again")
     return numbers

@@ -95,7 +95,7 @@ def _frequencies(data: xr.Dataset) -> str:
                 if np.isfinite(values).any():
                     rows.append((f"{mode}, {HELD_WORDS[holding]}", [name, *cells]))
     heads = [("", ""), ("model", ""), *((str(k + 1), "Hz") for k in range(count))]
-    note = "Above zero; below, how far those of reduced models are off."
+    note = "Frequencies above zero; below, the errors of reduced models."
     return table(heads, rows, caption="Frequencies", note=note)
 
 

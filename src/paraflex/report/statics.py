@@ -174,7 +174,7 @@ def _last_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
         return
     title = "At the last step" if data.sizes["step"] > 1 else "At rest"
     heads = [("coordinate", ""), ("", ""), ("travel", ""), ("force", ""), ("stiffness", ""), ("compliance", "")]
-    note = "A force acts on the mechanism along its coordinate. Stiffness: all that is held and moved as it is."
+    note = "A force acts on the mechanism along its coordinate. Stiffness: with all held and moved coordinates fixed."
     yield title, table(heads, rows, caption=title, note=note)
 
 
@@ -184,7 +184,7 @@ def _step_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
     found = step_table(data)
     heads = [("", ""), *((name, f"[{unit}]" if unit else "") for name, unit in found.heads)]
     rows = [(kind, [cell.replace("nan", NO_VALUE).replace("-", "−") for cell in cells]) for kind, *cells in found.rows]
-    note = "Frequencies are those of small vibrations about each equilibrium, what is held and moved kept."
+    note = "Frequencies are those of small vibrations about each equilibrium, held and moved coordinates fixed."
     yield found.title, table(heads, rows, caption="Steps", note=note)
 
 

@@ -122,7 +122,7 @@ def _frequency_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
         curves = [curve for k in range(values.shape[1])
                   for curve in _branch(data, str(k + 1), over.values, values[:, k], look(k))]  # fmt: skip
         yield Chart("frequencies", "Natural frequencies", "frequency [Hz]", curves, x=over.label, over_time=False,
-                    note="What is held and moved stays.")  # fmt: skip
+                    note="Held and moved coordinates are fixed.")  # fmt: skip
 
 
 def _stress_chart(data: xr.Dataset, over: _Abscissa) -> Iterator[Chart]:
@@ -168,7 +168,7 @@ def _buckling_chart(data: xr.Dataset) -> Iterator[Chart]:
         title = "How it buckles" if several else f"How it buckles {choices[0]}"
         yield Chart(
             "buckling", title, "y [mm]", curves, x="x [mm]", equal=True, over_time=False,
-            choices=choices if several else (), choosing="factor", note="Displacements are of no size of their own.",
+            choices=choices if several else (), choosing="factor", note="The size of the displacements is arbitrary.",
         )  # fmt: skip
 
 

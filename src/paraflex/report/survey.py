@@ -14,7 +14,9 @@ from paraflex.report.designs import is_wide
 from paraflex.report.page import Chart, Curve, DesignColumn, Designs, Look, Panel, Picker
 from paraflex.report.text import count
 
-LOWER = "Less is taken as better; a safety factor, a stiffness and others of which more may be better choose no design."
+LOWER = (
+    "Less is taken as better; metrics for which more may be better, as safety factor and stiffness, select no design."
+)
 
 
 class Step(NamedTuple):
@@ -62,14 +64,16 @@ def survey(
         charts.append(Chart(
             "parallel", "All numbers of each run", "metrics", x="parameters", over_time=False, drawer="parallel",
             pickers=[Picker("coloured by", metrics)],
-            note="A line a run. Drag along an axis to keep the runs that pass there; drag names to reorder.",
+            note="One line per run. Drag along an axis to keep the runs that pass there; drag names to reorder.",
         ))  # fmt: skip
     return [Panel(_drawn(designs, rows), charts)] if charts else []
 
 
 def _responses(parameters: Sequence[int], metrics: Sequence[int]) -> list[Chart]:
     """Return two response charts: of the first two parameters, or of two metrics if there is only one parameter."""
-    note = "A mark a run; thick, the median over the other parameters." if len(parameters) > 1 else "A mark a run."
+    note = (
+        "One mark per run; thick, the median over the other parameters." if len(parameters) > 1 else "One mark per run."
+    )
     starts = [(0, 0), (0, 1)] if len(parameters) > 1 else [(k, 0) for k in range(min(2, len(metrics)))]
     return [
         Chart(

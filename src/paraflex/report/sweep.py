@@ -269,7 +269,7 @@ def _best_table(
             keys[row].append(float(values[row]))
     selects = {names[row]: k for k, row in enumerate(shown)}
     if shown:
-        note = f"{note} A row chosen is shown in motion below and ringed in the charts.".lstrip()
+        note = f"{note} A selected row is shown in motion below and ringed in the charts.".lstrip()
     return title, table(
         heads, [(names[row], cells[row]) for row, _ in picked], caption=title, note=note, runs=selects,
         keys={names[row]: keys[row] for row, _ in picked},
@@ -301,7 +301,7 @@ def _unfinished(designs: DesignTable, account: StudyAccount) -> list[str]:
     done = designs.run.size
     if account.total is None or done >= account.total:
         return []
-    return [f"The study is not finished: this is of the {count(done)} of {count(account.total)} runs that are done."]
+    return [f"The study is not finished: these are {count(done)} of {count(account.total)} runs."]
 
 
 def _panels(data: xr.Dataset, runs: list[str], account: StudyAccount) -> list[Panel]:

@@ -147,7 +147,7 @@ def mode_table(data: xr.Dataset, failed: Mapping[str, str]) -> str:
             note += "Settling: until within 5 % of the largest error; overshoot: beyond the end of the path. "
     note += f"{kind}: peak and, below it, RMS. Deflection: from a link's chord. Strain energy: peak."
     if not whole:
-        note += " Of a mode that did not get to its end: until then."
+        note += " For a mode that stopped early: until then."
     selects = {name: r for r, name in enumerate(runs)}
     return table(heads, rows, caption="What every mode came to", note=note, runs=selects)
 
@@ -209,8 +209,8 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
 
     condition = Chart(
         "condition", "Condition number of the actuation matrix", "condition number", log=True,
-        note="Of the matrix from motor torques to forces along the path: it grows without bound towards positions "
-             "where the active motors lose control of a direction.",
+        note="Condition of the matrix from motor torques to forces along the path: it grows without bound towards "
+             "positions where the active motors lose control of a direction.",
     )  # fmt: skip
     links = [
         of_links("angles", "Link angles", "angle", "angle"),

@@ -111,7 +111,7 @@ class ComparisonStudy(WholeStudy[MethodComparison], CheckedFields):
     parameters: dict[str, Any] | None = None
 
     def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], MethodComparison]:
-        no_workers(workers, "runs come one after the other")
+        no_workers(workers, "runs are made one after another")
         return self._run
 
     def _run(self, on_progress: OnProgress | None) -> MethodComparison:

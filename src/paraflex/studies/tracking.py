@@ -135,10 +135,10 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
 
     def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
         if self.method is not None and not callable(self.method):
-            remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in a way of its own"
+            remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in its own way"
             raise refused(self.method, "method", "a function", remedy)
         if self.method is not None and self.controllers:
-            raise InputError("a function runs modes in a way of its own, without controllers", field="controllers",
+            raise InputError("a function runs modes in its own way, without controllers", field="controllers",
                              remedy="leave one of the two out")  # fmt: skip
         workers = workers or Workers()
         if workers.engine != THREADS:

@@ -95,7 +95,7 @@ class VerificationStudy(WholeStudy[Verification], CheckedFields):
     error: ErrorSpan | str = ErrorSpan.MOTION
 
     def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], Verification]:
-        no_workers(workers, "runs come one after the other")
+        no_workers(workers, "runs are made one after another")
         models = tuple(dict.fromkeys(self.models))
         for name in models:
             check_model(name, self.task.mechanism)

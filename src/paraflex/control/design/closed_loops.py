@@ -220,7 +220,7 @@ def law_of(controller: Any) -> StateSpace:
     own = controller if inner is None or callable(inner) else inner
     own = getattr(own, "state_space", own)
     if not is_model(own) and not all(hasattr(own, name) for name in ("A", "B", "C", "D")):
-        raise InputError("is no linear law", field="controller", value=controller,
+        raise InputError("is not a linear law", field="controller", value=controller,
                          remedy="give a design of pf.lqg, or a discrete state space")  # fmt: skip
     if hasattr(own, "dt"):
         check_discrete(own.dt, controller, "controller", "controller")

@@ -72,8 +72,8 @@ def deviation_and_filter(name: str, given: Any) -> tuple[float, StateSpace]:
         deviation = float(deviation)
     except (TypeError, ValueError):
         raise InputError(
-            "is no pair", field=field, value=given,
-            remedy="give (standard deviation, cut-off frequency in Hz), say (0.5, 10.0)",
+            "is not a pair", field=field, value=given,
+            remedy="give (standard deviation, cut-off frequency in Hz), such as (0.5, 10.0)",
         ) from None  # fmt: skip
     positive(deviation, field, "N m or N")
     return deviation, StateSpace(*scipy.signal.tf2ss(*transfer_function(through, field)))

@@ -127,7 +127,7 @@ def rate_feedback_gains(
     """
     positive(period, "period", "s")
     if not (np.isfinite(margin) and margin >= 1.0):
-        raise InputError("must be at least 1", field="margin", value=margin, remedy="say 2, or 1 for none")
+        raise InputError("must be at least 1", field="margin", value=margin, remedy="give 2, or 1 for none")
     if largest is not None:
         positive(largest, "largest", "N m s by the sensor's unit")
     plant = as_sampled(model, period, delay)

@@ -136,7 +136,7 @@ def lqg(
     given = numbers_by_name(noise, measured, "noise", "the unit of the reading")
     missing = [name for name in measured if name not in given]
     if missing:
-        raise InputError("has no noise", field="noise", value=missing[0], remedy="give its standard deviation, say "
+        raise InputError("has no noise", field="noise", value=missing[0], remedy="give its standard deviation, such as "
                          "pf.quantisation_noise(resolution)")  # fmt: skip
     check_reach(plant, C.T, "measured", "is not seen by the readings", "measure more outputs", transposed=True)
     process = _disturbances(plant, regulator, disturbance, effort) + _padded(state_noise, plant, "state_noise")
@@ -188,9 +188,9 @@ def _regulator(
         P = riccati(A, B, Q, R)
     except (np.linalg.LinAlgError, ValueError):
         raise InputError(
-            "no feedback is the best one", field="deviations",
-            remedy="let deviations see all that moves freely or vibrates undamped, and integrate no more outputs than "
-            "there are motors, none of which follows from others",
+            "there is no optimal feedback", field="deviations",
+            remedy="choose deviations that show all free and undamped motion, and integrate no more outputs than "
+            "there are motors, each independent of the others",
         ) from None  # fmt: skip
     gain = scipy.linalg.solve(R + B.T @ P @ B, B.T @ P @ A, assume_a="pos")
     poles = np.linalg.eigvals(A - B @ gain)
@@ -250,12 +250,12 @@ def _padded(given: ArrayLike | None, plant: SampledPlant, field: str) -> Array:
         return whole
     matrix = np.asarray(numbers_in(given, field), dtype=float)
     if matrix.shape not in ((plant.own, plant.own), (size, size)) or not np.all(np.isfinite(matrix)):
-        raise InputError("has not the numbers it should have", field=field, value=matrix.shape,
+        raise InputError("has the wrong shape, or is not finite", field=field, value=matrix.shape,
                          remedy=f"give {plant.own} x {plant.own} finite numbers")  # fmt: skip
     largest = float(np.max(np.abs(matrix), initial=0.0))
     least = float(np.min(np.linalg.eigvalsh(matrix), initial=0.0))
     if np.max(np.abs(matrix - matrix.T), initial=0.0) > 1e-12 * largest or least < -1e-9 * largest:
         raise InputError("is not symmetric and positive semidefinite", field=field, value=matrix,
-                         remedy="give such a matrix, say X.T @ X")  # fmt: skip
+                         remedy="give such a matrix, for example X.T @ X")  # fmt: skip
     whole[: len(matrix), : len(matrix)] = matrix
     return whole

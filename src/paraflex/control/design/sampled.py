@@ -162,7 +162,7 @@ def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
     # Delayed inputs: those of samples k - d, ..., k - 1, and that of k - d - 1 if it acts in this period or is read.
     oldest = whole + (1 if part or feeds else 0)
     size = n + m * oldest
-    at_most(size, PLANT_STATES, "delay", "too long for the period: torques under way are too many states")
+    at_most(size, PLANT_STATES, "delay", "too long for the period: pending torques add too many states")
     A, B, C, G = np.zeros((size, size)), np.zeros((size, m)), np.zeros((p, size)), np.zeros((size, m))
     A[:n, :n] = back @ over[0] @ np.linalg.inv(back) if n else over[0]
     C[:, :n], G[:n] = named.matrices.C, back @ over[1]
@@ -209,7 +209,7 @@ def named_matrices(model: Any) -> NamedMatrices:
         return model
     given = model if isinstance(model, tuple | list) else [getattr(model, name, None) for name in ("A", "B", "C", "D")]
     if len(given) != 4 or any(each is None for each in given):
-        raise InputError("is no linear model", field="model", value=model,
+        raise InputError("is not a linear model", field="model", value=model,
                          remedy="give one that pf.linearise makes, a state space, or (A, B, C, D)")  # fmt: skip
     dt = getattr(model, "dt", None)
     if dt is not None and (dt is True or dt > 0.0):
@@ -217,7 +217,9 @@ def named_matrices(model: Any) -> NamedMatrices:
     try:
         A, B, C, D = matrices = StateSpace.of(*given)
     except (TypeError, ValueError):
-        raise InputError("has matrices that are none", field="model", value=model, remedy="give numbers") from None
+        raise InputError(
+            "has matrices that are not numeric", field="model", value=model, remedy="give numbers"
+        ) from None
     n, m, p = len(A), D.shape[1], D.shape[0]
     fits = A.shape == (n, n) and B.shape == (n, m) and C.shape == (p, n)
     if not fits or not all(np.all(np.isfinite(each)) for each in matrices):

@@ -71,7 +71,7 @@ class ComputedTorque:
         joints = [motor.joint for motor in mechanism.motors]
         for name in plant.inputs:
             if name not in joints:
-                raise InputError("is no encoder of a motor", field="inputs", value=name,
+                raise InputError("is not an encoder of a motor", field="inputs", value=name,
                                  remedy=f"choose from {', '.join(dict.fromkeys(joints))}")  # fmt: skip
         self._joints = plant.inputs
         self._motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in plant.outputs]

@@ -151,7 +151,7 @@ def check_controllers(controllers: Mapping[str, ControllerDescription], mechanis
         with renamed(TABLE):
             check_name(name)
         if name == NONE:
-            raise InputError("is the word for no controller", field=f"{TABLE}.{name}", remedy="call it otherwise")
+            raise InputError("is reserved for open loop", field=f"{TABLE}.{name}", remedy="choose another name")
         one.check(mechanism)
 
 

@@ -149,7 +149,7 @@ class StateSpaceDescription(DescribedLaw):
             if found.size != shape[0] * shape[1] or (found.size and found.shape != shape):
                 raise InputError(
                     f"has {_size(found.shape)}, not {_size(shape)}", field=name,
-                    remedy="give A of n rows of n numbers, B with a row a state, C and D with a row a motor",
+                    remedy="give A of n rows of n numbers, B with one row per state, C and D with one per motor",
                 )  # fmt: skip
         for name in ("A", "B", "C", "D"):
             rows = tuple(tuple(map(float, row)) for row in getattr(self, name))
@@ -226,7 +226,7 @@ class RateFeedbackDescription(DescribedLaw):
         law = self.made(names.motors, 1.0)
         for field_name, given, own in (("inputs", names.inputs, law.inputs), ("outputs", names.outputs, law.outputs)):
             if given and set(given) != set(own):
-                raise InputError("are not those of the gains", field=field_name, value=", ".join(given),
+                raise InputError("differ from those of the gains", field=field_name, value=", ".join(given),
                                  remedy="leave it out")  # fmt: skip
 
     def made(self, outputs: Sequence[str], period: float) -> RateFeedback:
@@ -283,7 +283,7 @@ class LQGDescription(DescribedLaw):
         all_known(self.coloured, places, "coloured", "motor or point")
         used = self.made(names.outputs or names.motors, 1.0).outputs
         if names.outputs and used and set(used) != set(names.outputs):
-            raise InputError("are not those of effort", field="outputs", value=", ".join(names.outputs),
+            raise InputError("differ from those of effort", field="outputs", value=", ".join(names.outputs),
                              remedy="leave it out, or give the effort of each")  # fmt: skip
 
     def made(self, outputs: Sequence[str], period: float) -> DesignedLQG:
@@ -319,7 +319,7 @@ def _some_of(given: Any, names: Sequence[str], field: str) -> Any:
     """Return the entries of a mapping for some names, and check that there is at least one."""
     found = of_names(given, names)
     if isinstance(given, Mapping) and given and not found:
-        raise InputError("none of the motors that act", field=field, value=", ".join(given),
+        raise InputError("names no active motor", field=field, value=", ".join(given),
                          remedy=f"give some of {', '.join(names)}")  # fmt: skip
     return found
 
@@ -330,7 +330,7 @@ def _matrix(rows: Any, name: str) -> np.ndarray:
     except (TypeError, ValueError):
         found = np.full(1, np.nan)
     if not np.all(np.isfinite(found)) or (found.size and found.ndim != 2) or (name == "D" and not found.size):
-        raise InputError("is no matrix of numbers", field=name, value=rows,
+        raise InputError("is not a matrix of numbers", field=name, value=rows,
                          remedy="give a list of rows, all of one length")  # fmt: skip
     return found
 

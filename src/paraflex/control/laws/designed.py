@@ -85,7 +85,9 @@ class DesignedLQG:
             deviation_and_filter(name, each)
         finite(at or 0.0, "at")
         if states is not None and states < 1:
-            raise InputError("no such number of states", field="states", value=states, remedy="say 16, or leave it out")
+            raise InputError(
+                "no such number of states", field="states", value=states, remedy="give 16, or leave it out"
+            )
         self.outputs: tuple[str, ...] = tuple(effort) if isinstance(effort, Mapping) else ()
         self._weights = {"deviations": deviations, "effort": effort, "disturbance": disturbance}
         self._integrators: Mapping[str, float] = integrators or {}

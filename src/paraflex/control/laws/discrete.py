@@ -117,7 +117,7 @@ def side_by_side(laws: Sequence[DiscreteModel]) -> DiscreteModel:
     period = laws[0].period
     for one in laws:
         if one.period is not None and period is not None and not same_period(one.period, period):
-            raise InputError(f"is another than that of a law beside it, {period:g} s", field="period",
+            raise InputError(f"differs from that of another law, {period:g} s", field="period",
                              value=one.period, remedy="design both for one period")  # fmt: skip
     inputs, outputs = (tuple(dict.fromkeys(name for one in laws for name in getattr(one, what)))
                        for what in ("inputs", "outputs"))  # fmt: skip
@@ -142,7 +142,7 @@ def check_discrete(dt: Any, given: Any, field: str, name: str) -> None:
         # The method that discretises a continuous model has one name in SciPy, the other in python-control.
         method = "to_discrete" if hasattr(given, "to_discrete") else "sample"
         raise InputError("is a continuous model", field=field, value=given,
-                         remedy=f"discretise it, say {name}.{method}(1e-3)")  # fmt: skip
+                         remedy=f"discretise it with {name}.{method}(1e-3)")  # fmt: skip
 
 
 def matrices_of(model: Any) -> StateSpace:

@@ -203,7 +203,7 @@ def internal_torques(task: TrackingTask, mode: str | ActuationMode, torques: Arr
     columns = [names.index(name) for name in active]
     P = torque_projectors(task.effort, active)[: len(torques) if torques.ndim else 0]
     if torques.shape != (len(P), len(names)):
-        raise InputError("has not one row a sample, a column a motor", field="torques", value=torques.shape,
+        raise InputError("needs one row per sample, one column per motor", field="torques", value=torques.shape,
                          remedy=f"give at most {len(task.motion.t)} x {len(names)} numbers")  # fmt: skip
     out = np.zeros_like(torques)
     out[:, columns] = torques[:, columns] - np.einsum("kij,kj->ki", P, torques[:, columns])
@@ -278,9 +278,9 @@ def gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
     except (TypeError, ValueError):
         gains = np.full(1, np.nan)
     if not np.all(np.isfinite(gains)):
-        raise InputError(f"no gains of {len(motors)} motors", field=field, value=given,
+        raise InputError(f"not gains for {len(motors)} motors", field=field, value=given,
                          remedy="give one number, one for each motor, or numbers by motor")  # fmt: skip
     if np.any(gains < 0.0):
         raise InputError("must not be negative", field=field, value=float(gains.min()),
-                         remedy="give a gain from zero on: the law acts against errors by itself")  # fmt: skip
+                         remedy="give zero or more: the sign of the law already opposes errors")  # fmt: skip
     return gains

@@ -193,8 +193,8 @@ class LQGLaw:
         pairs = (("inputs", self.inputs, plant.inputs), ("outputs", self.outputs, plant.outputs))
         for field, wanted, have in pairs:
             if tuple(have) != wanted:
-                raise InputError("are not those of the design, in its order", field=field, value=", ".join(have),
-                                 remedy=f"leave them out, or say {', '.join(wanted)}")  # fmt: skip
+                raise InputError("differ from those of the design in name or order", field=field, value=", ".join(have),
+                                 remedy=f"leave them out, or give {', '.join(wanted)}")  # fmt: skip
         for field, wanted, have in (("period", self.period, plant.period), ("delay", self.delay, plant.delay)):
             if abs(have - wanted) > SAME * self.period:
                 raise InputError(f"the design is for {wanted:g} s", field=field, value=have,

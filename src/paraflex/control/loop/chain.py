@@ -126,7 +126,7 @@ class SampledController:
         reference = getattr(self.law, "reference", None) if reference is None else reference
         self.reference: Mapping[str, Any] | TrackingRun | MotionRun | str | None = reference
         if self.reference and getattr(self.law, "absolute", False):
-            raise InputError(f"{self.title} takes readings as they are", field="reference", value=reference,
+            raise InputError(f"{self.title} uses the readings themselves", field="reference", value=reference,
                              remedy="leave it out")  # fmt: skip
         self.quantise: Any = quantise
         self.filters: Mapping[str, Any] = filters or {}
@@ -254,7 +254,7 @@ def as_law(given: Any) -> Any:
     if callable(given) and not inspect.isclass(given):
         return _Function(given)
     raise InputError(
-        "is no control law", field="law", value=given,
+        "is not a control law", field="law", value=given,
         remedy="give a function of (k, t, y), an object with a method step, or a discrete model",
     )  # fmt: skip
 
@@ -287,7 +287,7 @@ def _range(value: Any, field: str) -> tuple[float, float]:
         most = checked_number(value, field, "N m or N")
         return -most, most
     if len(value) != 2 or not all(is_number(one) for one in value):
-        raise InputError("is no pair of numbers", field=field, value=value, remedy="give the lowest and the highest")
+        raise InputError("is not a pair of numbers", field=field, value=value, remedy="give the lowest and the highest")
     low, high = float(value[0]), float(value[1])
     if not low < high:
         raise InputError("the lowest must be below the highest", field=field, value=value, remedy="exchange them")

@@ -45,7 +45,7 @@ def transfer_function(value: Any, field: str) -> tuple[Array, Array]:
     proper = 0 < numerator.size <= denominator.size and denominator.size > 1
     if not proper or not np.all(np.isfinite([*numerator, *denominator])):
         raise InputError(
-            "is no filter", field=field, value=value,
+            "is not a filter", field=field, value=value,
             remedy="give a cut-off frequency in Hz, or coefficients (numerator, denominator) in descending powers of s",
         )  # fmt: skip
     if np.any(np.roots(denominator).real >= 0.0):

@@ -48,7 +48,7 @@ class CompiledLaw:
     @checked_arguments()
     def __init__(self, function: Callable[..., None], states: int = 0) -> None:
         if not (is_jitted(function) or isinstance(function, FunctionType)):
-            raise InputError("is no function", field="function", value=function,
+            raise InputError("is not a function", field="function", value=function,
                              remedy="give one of (k, t, y, x, torques)")  # fmt: skip
         if not 0 <= states <= MOST_STATES:
             raise InputError("is out of range", field="states", value=states,

@@ -69,5 +69,5 @@ def unstable_loop(
         return ()
     several = ", ".join(f'"{one.name}"' for one in records)
     text = f"controller {several}: the sampled loop is unstable about the start: {growing}"
-    remedy = "lower the gains, sample sooner, delay less; give links damping, motors their rotors, designs more noise"
+    remedy = "lower the gains, sample faster, reduce the delay; add link damping, rotor inertia, or noise in designs"
     return (Finding("loop-unstable", place, text, remedy),)

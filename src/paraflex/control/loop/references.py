@@ -47,8 +47,8 @@ def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, 
         if given == OPEN_LOOP:
             return list(readings_in(open_loop(plant), plant))
         if given != PLAN:
-            remedy = f'say "{PLAN}" or "{OPEN_LOOP}", or give a run, or numbers or functions of time by sensor'
-            raise InputError("is no reference", field="reference", value=given, remedy=remedy)
+            remedy = f'write "{PLAN}" or "{OPEN_LOOP}", or give a run, or numbers or functions of time by sensor'
+            raise InputError("is not a reference", field="reference", value=given, remedy=remedy)
         return list(planned_readings(plant))
     if isinstance(given, TrackingRun | MotionRun):
         return list(readings_in(given, plant))
@@ -63,7 +63,7 @@ def _reference(given: Any, field: str) -> Reference:
     if isinstance(given, int | float | np.floating) and np.isfinite(given):
         value = float(given)
         return lambda t: value
-    raise InputError("is no reference", field=field, value=given, remedy="give a number or a function of time")
+    raise InputError("is not a reference", field=field, value=given, remedy="give a number or a function of time")
 
 
 class AtSamples:

@@ -241,7 +241,7 @@ class Loop:
         torques = None if given is None else real_numbers(given)
         if torques is None:
             kind = "complex numbers" if given is not None and np.iscomplexobj(given) else type(given).__name__
-            raise LawFailure(f'controller "{name}" returned {kind}, no torques')
+            raise LawFailure(f'controller "{name}" returned {kind}, not torques')
         torques = np.atleast_1d(torques)
         if torques.shape != (len(outputs),):
             count = "one" if torques.size == 1 else " x ".join(map(str, torques.shape))
@@ -360,7 +360,7 @@ def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -
     for field_name, among, what in (("inputs", sensors, "sensor"), ("outputs", motors, "motor")):
         names = getattr(controller, field_name)
         if not isinstance(names, tuple | list):
-            raise InputError("is no list of names", field=f"{name}.{field_name}", value=names, remedy="give a tuple")
+            raise InputError("is not a list of names", field=f"{name}.{field_name}", value=names, remedy="give a tuple")
         check_distinct(names, among, f"{name}.{field_name}", what)
     return controller
 

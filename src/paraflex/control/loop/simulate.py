@@ -54,7 +54,7 @@ def simulate_controlled(
     """
     if task.holds:
         raise InputError("brakes are not for motors under control", field="after", value=task.after.value,
-                         remedy='say "free": controllers act after the path as well')  # fmt: skip
+                         remedy='write "free": controllers act after the path as well')  # fmt: skip
     planned = not any(getattr(one, "whole_torque", False) for one in controllers)
     sim = Simulation(task, mode=mode, feed_forward=planned, balanced=balanced, options=options)
     return _run(sim, controllers, on_progress)

@@ -141,7 +141,7 @@ class Simulation:
         if isinstance(source, TrackingTask):
             for name, value in (("duration", duration), ("start", start)):
                 if value is not None:
-                    raise InputError("a plan says it itself", field=name, value=value, remedy="leave it out")
+                    raise InputError("is set by the plan", field=name, value=value, remedy="leave it out")
             # Brakes do not apply to motors under control.
             task = replace(source, after=Ending.FREE)
             self.task = task.balanced(self.mode) if balanced else task
@@ -153,7 +153,7 @@ class Simulation:
                 planned = task.torques(self.mode)
         else:
             if feed_forward:
-                raise InputError("there is no plan whose torques could act", field="feed_forward", value=True,
+                raise InputError("there is no plan with torques to feed forward", field="feed_forward", value=True,
                                  remedy="give the task that pf.plan makes, or leave it out")  # fmt: skip
             begun = motion_start(source, duration, samples, start, balanced=balanced)
             self.system, self._initial, self._times = begun
@@ -342,7 +342,7 @@ class Simulation:
         except LawFailure as failure:
             cause, moment = str(failure), Moment(self.time, self._integration.run.attempts)
             partial = self._made(replace(self._integration.solution(), status="failed", message=f"{cause} at {moment}"))
-            raise ControllerError(cause, moment, partial, "mend the controller") from failure.__cause__
+            raise ControllerError(cause, moment, partial, "correct the controller") from failure.__cause__
         made = self.result()
         if warning:
             warn(made.validity, "" if self.task is None else f"mode {self.mode.name}")
@@ -357,8 +357,8 @@ class Simulation:
         start = self._initial.time
         loop = Loop(several, self._plant, self.sensors_read, self.motors, start) if several else None
         if loop is not None and loop.whole and self._fed_forward:
-            raise InputError("gives the whole torque, and the planned one acts besides", field=loop.whole[0],
-                             remedy="leave feed_forward of the simulation out")  # fmt: skip
+            raise InputError("gives the whole torque, but the planned one also acts", field=loop.whole[0],
+                             remedy="leave out feed_forward of the simulation")  # fmt: skip
         if loop is not None and np.any(loop.acting):
             self._torques.begin(self._torques.of_all(loop.acting.sum(axis=0)), self.state)
             self._integration.start()

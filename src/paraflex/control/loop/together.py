@@ -44,7 +44,7 @@ def checked_number(value: Any, field: str, unit: str, check: Callable[..., None]
         A value that is missing, is not a number, or does not pass the check.
     """
     if value is None or not is_number(value):
-        raise InputError("is missing" if value is None else "is no number", field=field, value=value,
+        raise InputError("is missing" if value is None else "is not a number", field=field, value=value,
                          remedy=f"give it in {unit}")  # fmt: skip
     check(float(value), field, unit)
     return float(value)
@@ -122,8 +122,8 @@ def multiple_of(name: str, period: float, shortest: float) -> int:
     times = period / shortest
     if abs(times - round(times)) > SAME * times:
         raise InputError(
-            f"is no multiple of the shortest period, {shortest:g} s", field=f"{name}.period", value=period,
-            remedy=f"say {round(times) * shortest:g}",
+            f"is not a multiple of the shortest period, {shortest:g} s", field=f"{name}.period", value=period,
+            remedy=f"give {round(times) * shortest:g}",
         )  # fmt: skip
     return round(times)
 
@@ -137,7 +137,7 @@ def check_name(name: Any) -> None:
         A name that is not a text, is empty, or contains dots or slashes.
     """
     if not isinstance(name, str) or not name or set(name) & set("./"):
-        raise InputError("is no name of a controller", field="name", value=name,
+        raise InputError("is not a name for a controller", field="name", value=name,
                          remedy="give a text without dots and slashes")  # fmt: skip
 
 

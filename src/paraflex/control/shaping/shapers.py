@@ -101,7 +101,7 @@ class Shaper(CheckedFields):
         _check_fraction(self.tolerance)
         _ = self._impulses
         at_most((_ORDERS.get(self.kind, 2) + 1) ** len(self.frequencies), SHAPER_IMPULSES, "frequencies",
-                "too many: the shaper has so many impulses")  # fmt: skip
+                "too many: the shaper would have this many impulses")  # fmt: skip
 
     def _check_modes(self) -> None:
         if not self.frequencies:
@@ -112,7 +112,7 @@ class Shaper(CheckedFields):
         for ratio in self.damping:
             if not (0.0 <= ratio < 1.0 and ratio <= most):
                 raise InputError(
-                    "no such damping ratio", field="damping", value=ratio,
+                    "not a valid damping ratio", field="damping", value=ratio,
                     remedy=f"give a number from 0 to {most:g}; shapers are for modes that vibrate",
                 )  # fmt: skip
         if len(self.damping) not in (1, len(self.frequencies)):

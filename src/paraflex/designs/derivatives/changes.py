@@ -167,7 +167,7 @@ class Change:
             except ParaflexError as error:
                 trouble = trouble or error
         raise InputError(
-            f"has no derivative, for near it {trouble}", field=f"vary.{self.name}", value=task.values[k],
+            f"has no derivative: a nearby value fails, {trouble}", field=f"vary.{self.name}", value=task.values[k],
             remedy="leave it out",
         )  # fmt: skip
 

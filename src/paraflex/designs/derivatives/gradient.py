@@ -95,7 +95,7 @@ def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] |
     if planned.holds:
         raise InputError(
             "derivatives do not go through the engagement of brakes", field="study.after", value=planned.after.value,
-            remedy='say after = "free", or a duration that ends with the path',
+            remedy='write after = "free", or a duration that ends with the path',
         )  # fmt: skip
     sizes = [None] * len(setting.names) if sizes is None else sizes
     sizes = [size_of(setting, task, k, size) for k, size in enumerate(sizes)]

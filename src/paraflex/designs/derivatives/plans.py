@@ -103,7 +103,7 @@ def check_has_path(setting: Setting) -> None:
     if not setting.has_path:
         why = "not of statics" if setting.statics else "which the mechanism does not have"
         raise InputError(
-            f"derivatives are of runs along a path, {why}", field="mechanism", value=setting.source,
+            f"derivatives need runs along a path, {why}", field="mechanism", value=setting.source,
             remedy="take a sweep, or an optimisation with differences",
         )  # fmt: skip
 
@@ -112,18 +112,18 @@ def check_open_and_whole(model: Model) -> None:
     """Check that runs of a design have only planned torques, unshaped and without controllers, and unreduced bodies."""
     if model.acting():
         raise InputError(
-            "derivatives are of runs without controllers", field="study.controllers",
+            "derivatives need runs without controllers", field="study.controllers",
             value=", ".join(model.study.controllers), remedy="leave them out",
         )  # fmt: skip
     if model.study.shaper is not None:
         raise InputError(
-            "derivatives are of runs whose torques are not shaped", field="study.shaper",
+            "derivatives need runs whose torques are not shaped", field="study.shaper",
             value=model.study.shaper.kind.value, remedy="leave it out, or shape the path",
         )  # fmt: skip
     if model.study.reduced:
         raise InputError(
-            "derivatives are of runs with all flexible coordinates", field="study.reduced", value=model.study.reduced,
-            remedy='leave it out, or say reduction = "craig-bampton" and modes in the tables of beams',
+            "derivatives need runs with all flexible coordinates", field="study.reduced", value=model.study.reduced,
+            remedy='leave it out, or write reduction = "craig-bampton" and modes in the tables of beams',
         )  # fmt: skip
 
 
@@ -173,7 +173,7 @@ def _nominal(setting: Setting, name: str, places: tuple[Place, ...]) -> float:
         raise InputError(
             "its fields have different values in the mechanism's file, so that there is no nominal one",
             field=f"vary.{name}.fields",
-            value=values, remedy=f"say --at {name}=VALUE, or give each a parameter of its own",
+            value=values, remedy=f"write --at {name}=VALUE, or give each a parameter of its own",
         )  # fmt: skip
     return values[0]
 

@@ -138,7 +138,7 @@ def confidence(
         spread = np.sqrt(np.diag(covariance))
         found = replace(found, correlation=covariance / np.outer(spread, spread))
     if freedom <= 0:
-        return found.withheld(f"{len(targets)} targets leave nothing to judge {len(free)} free parameters by")
+        return found.withheld(f"{len(targets)} targets are too few to judge {len(free)} free parameters")
     if not found.telling:
         return found.withheld("the targets cannot tell the parameters apart")
     left = _standard_deviation(targets, design, freedom)

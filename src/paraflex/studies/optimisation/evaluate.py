@@ -55,7 +55,7 @@ class Evaluated:
                 return f"{whose}{row['reason']}"
             for column in self.counting:
                 if row.get(column) is None or not math.isfinite(row[column]):
-                    return f"{whose}{column} is no number"
+                    return f"{whose}{column} is not a number"
         return ""
 
     @property

@@ -167,7 +167,7 @@ def _target(entry: TargetTable, number: int, base: SweepStudy) -> Target:
     mode = _one(f"{field}.mode", entry.mode, setting.modes)
     if entry.relative and entry.value == 0.0:
         raise InputError(
-            "nothing is relative to zero", field=f"{field}.value", value=0.0, remedy="say relative = false"
+            "nothing is relative to zero", field=f"{field}.value", value=0.0, remedy="write relative = false"
         )
     if not entry.weight > 0.0:
         raise InputError("must be positive", field=f"{field}.weight", value=entry.weight, remedy="leave the target out")

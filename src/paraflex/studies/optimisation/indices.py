@@ -154,8 +154,8 @@ def load_indices(
     number = samples if samples is not None else table.sampling.number or _BASE_SAMPLES
     if number < _FEWEST_BASE_SAMPLES or number & (number - 1):
         raise InputError(
-            f"Sobol's sequence wants a power of two, {_FEWEST_BASE_SAMPLES} at least", field="--samples", value=number,
-            remedy=f"say {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
+            f"Sobol's sequence needs a power of two, {_FEWEST_BASE_SAMPLES} at least", field="--samples", value=number,
+            remedy=f"give {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
         )  # fmt: skip
     at_most(number * (len(base.parameters) + 2), DESIGNS, "--samples", "too many designs")
     wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].each]
@@ -219,7 +219,7 @@ def _analysed(
     if count < _FEWEST_BASE_SAMPLES:
         raise InputError(
             f"only {count} of {study.samples} base samples are complete{names[1] and f' in {names[1]}'}", field="vary",
-            remedy="narrow the ranges: reasons stand in the table",
+            remedy="narrow the ranges: the table gives the reasons",
         )  # fmt: skip
     values = values.reshape(study.samples, -1)[kept].ravel()
     mean, deviation = float(np.mean(values)), float(np.std(values))

@@ -54,7 +54,7 @@ def minimise(problem: DesignProblem, method: str | None, start: Array) -> str:
             "the method takes no limits (at_most)",
             field="search.method",
             value=name,
-            remedy=f'say "{SLSQP}" or "{TRUST}", or drop at_most',
+            remedy=f'write "{SLSQP}" or "{TRUST}", or drop at_most',
         )
     with warnings.catch_warnings():
         # SciPy warns of quasi-Newton updates whose gradients do not change, as at bounds and near failures.

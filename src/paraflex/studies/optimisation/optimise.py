@@ -124,7 +124,7 @@ def load_optimisation(file: str | Path) -> OptimisationStudy:
     """
     with study_table(StudyTable, file) as (table, folder):
         if table.objective is None:
-            remedy = "say [objective] minimise = { tracking_rms = 1.0 }"
+            remedy = "write [objective] minimise = { tracking_rms = 1.0 }"
             raise InputError("is missing", field="objective", remedy=remedy)
         columns = {f"objective.minimise.{name}": name for name in table.objective.minimise}
         columns |= {f"objective.at_most.{k}.metric": each.metric for k, each in enumerate(table.objective.at_most)}
@@ -162,7 +162,7 @@ def optimise(
 
 def _objective(table: ObjectiveTable, members: Members) -> Objective:
     if not table.minimise:
-        raise InputError("nothing to minimise", field="objective.minimise", remedy="say { tracking_rms = 1.0 }")
+        raise InputError("nothing to minimise", field="objective.minimise", remedy="write { tracking_rms = 1.0 }")
     for column, weight in table.minimise.items():
         if not weight > 0.0:
             raise InputError(

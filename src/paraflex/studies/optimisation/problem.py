@@ -53,8 +53,8 @@ class DesignProblem:
         for column, scale in self.scales.items():
             if scale == 0.0:
                 raise InputError(
-                    "the metric is zero at the start, and nothing can be relative to it",
-                    field=f"objective.minimise.{column}", remedy="say relative = false",
+                    "the metric is zero at the start, so nothing can be relative to it",
+                    field=f"objective.minimise.{column}", remedy="write relative = false",
                 )  # fmt: skip
         self.start: Array = study.unit(study.start)
         # The gradient at a failed design points away from the last successful one.

@@ -35,7 +35,7 @@ class ObjectiveTable(Table):
     over: Literal["worst", "mean"] = Field(
         default="worst", description='"worst" or "mean" of all paths and modes, of each metric'
     )
-    relative: Yes = Field(default=True, description="false for metrics as they are, not divided by those of the start")
+    relative: Yes = Field(default=True, description="false for metrics not divided by those of the start")
     at_most: list[AtMostTable] = Field(default=[], description="limits, [[objective.at_most]]")
 
 
@@ -43,10 +43,10 @@ class TargetTable(Table):
     """A number to be reproduced."""
 
     metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
-    value: NumberOfFields = Field(description="what it should be, in the unit of the metric")
+    value: NumberOfFields = Field(description="its target value, in the unit of the metric")
     mode: Text | None = Field(default=None, description="the actuation mode, where the study has several")
     path: Text | None = Field(default=None, description="the path, where the study has several")
-    weight: Number = Field(default=1.0, description="a factor of its residual")
+    weight: Number = Field(default=1.0, description="weight of its residual")
     relative: Yes = Field(default=True, description="false for the difference itself, not divided by the value")
 
 
@@ -57,10 +57,10 @@ class SearchTable(Table):
         default=None,
         description='"slsqp", "trust-constr", "l-bfgs-b", "nelder-mead", "differential-evolution" or "optuna"',
     )
-    evaluations: Count = Field(default=200, description="designs at most")
-    samples: Count = Field(default=0, description="Sobol samples looked at first; the search starts from the best")
-    seed: Count = Field(default=0, description="a whole number from 0 on")
-    tolerance: Number | None = Field(default=None, description="the relative change at which it ends")
+    evaluations: Count = Field(default=200, description="largest number of designs")
+    samples: Count = Field(default=0, description="Sobol samples evaluated first; the search starts from the best")
+    seed: Count = Field(default=0, description="a whole number, 0 or more")
+    tolerance: Number | None = Field(default=None, description="the relative change at which the search ends")
     gradients: GradientsName | None = Field(
         default=None,
         description='"differences" or "exact"; an identification takes exact ones where its metrics have them',

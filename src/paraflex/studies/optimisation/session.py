@@ -168,7 +168,7 @@ def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | No
     reason = no_exact_slopes(study)
     if reason and asked == EXACT:
         raise InputError(
-            f"no exact derivatives ({reason})", field="search.gradients", value=EXACT, remedy='say "differences"'
+            f"no exact derivatives ({reason})", field="search.gradients", value=EXACT, remedy='write "differences"'
         )
     sizes = tuple(high - low for low, high in (p.ends for p in study.parameters))
     return None if reason else partial(run_slopes, study.columns, sizes)

@@ -178,7 +178,7 @@ def _check_range(field: str, entry: ParameterTable) -> None:
                 "only sweeps have it",
                 field=f"{field}.{key}",
                 value=getattr(entry, key),
-                remedy="give low and high alone",
+                remedy="give only low and high",
             )
     if entry.low is not None and entry.low == entry.high:
         raise InputError("low and high are equal", field=f"{field}.high", value=entry.high, remedy="leave it out")
@@ -196,7 +196,7 @@ def _check_column(field: str, column: str, members: Members) -> None:
         )
     if column not in known:
         raise InputError(
-            "not a metric per motor, drive or joint", field=field, value=column, remedy=f'say "{metric.name}"'
+            "not a metric per motor, drive or joint", field=field, value=column, remedy=f'write "{metric.name}"'
         )
 
 
@@ -257,6 +257,6 @@ def read_search(table: SearchTable) -> Search:
     at_most(table.samples, DESIGNS, "search.samples", "too many designs")
     if table.difference is not None and table.difference > 0.1:
         raise InputError(
-            "too large for a derivative", field="search.difference", value=table.difference, remedy="say 1e-3"
+            "too large for a derivative", field="search.difference", value=table.difference, remedy="give 1e-3"
         )
     return Search(**{name: getattr(table, name) for name in SearchTable.model_fields})

@@ -211,7 +211,7 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
         return digest([*asked, dict(self.at)])
 
     def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], Sensitivities]:
-        no_workers(workers, "one path is differentiated after the other")
+        no_workers(workers, "paths are differentiated one after another")
         return self._run
 
     def _run(self, on_progress: OnProgress | None) -> Sensitivities:

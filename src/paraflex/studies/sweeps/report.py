@@ -145,7 +145,7 @@ def _facts(study: StudyFolder, found: Mapping[str, Any]) -> list[tuple[str, str]
 def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> list[str]:
     notes = []
     if not designs.complete.any():
-        notes.append("No run is complete: there is nothing to draw. The reasons stand below.")
+        notes.append("No run is complete: there is nothing to draw. The reasons are given below.")
     notes += doubt_lines(study.setting.verdict())
     beyond = int(np.sum(designs.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
     if beyond:
@@ -156,7 +156,7 @@ def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> l
     if differ:
         why = "" if study.same_versions else " The versions of the packages are not those of the study."
         names = ", ".join(designs.label(row) for row in differ)
-        notes.append(f"Simulated again, these runs come out otherwise than the table says: {names}.{why}")
+        notes.append(f"Simulated again, these runs differ from the table: {names}.{why}")
     return notes
 
 
