@@ -15,7 +15,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure
+from paraflex.figures.catalogue import Figure as CatalogueFigure
+from paraflex.plots.catalogue import CATALOGUE
 from paraflex.plots.planned import drawings, figures_of
 from paraflex.plots.save import write_figures
 from paraflex.plots.sources import Source, open_source

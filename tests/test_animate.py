@@ -18,13 +18,14 @@ from typer.testing import CliRunner
 import paraflex as pf
 from paraflex.cli.app import app, main
 from paraflex.errors import InputError, OutputError
+from paraflex.figures.shapes import figure_of
 from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
 from paraflex.plots import film_files, mechanism_drawing
 from paraflex.plots.film import FilmOptions, animate, plan_film
 from paraflex.plots.film_files import find_encoder
 from paraflex.plots.marks import block, ground_of, is_guide, moving_marks, zigzag
-from paraflex.plots.scene import ARROW, figure_of, scale_bar, scene, select
+from paraflex.plots.scene import ARROW, scale_bar, scene, select
 from paraflex.report.film import animation
 from paraflex.results import motion_dataset
 from processes import run, started

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from scipy.interpolate import CubicSpline
 
 from colours import APART, colour_distance
+from paraflex.figures.selection import moving_directions
 from paraflex.plots.labels import three_digits
 from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.runs import draw_curves
 from paraflex.plots.scene import MAGNIFICATIONS, default_magnification, followed_station
-from paraflex.plots.selection import moving_directions
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import THEMES
 from paraflex.results.outlines import Hold, Outline, stiff_shape

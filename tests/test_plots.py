@@ -17,8 +17,10 @@ from matplotlib.lines import Line2D
 
 from paraflex import plots
 from paraflex.errors import InputError, OutputError
-from paraflex.plots.labels import DisplayUnit, display_unit, plain, symbol, three_digits
-from paraflex.plots.selection import default_mode
+from paraflex.figures.selection import default_mode
+from paraflex.formatting import display_unit
+from paraflex.plots.labels import plain, symbol, three_digits
+from paraflex.units import DisplayUnit
 
 FULL, PARTIAL = "++", "+-"
 STOP = 25  # Samples of the partial run.

@@ -12,6 +12,7 @@ import pytest
 import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.fem import mesh_beam
+from paraflex.figures.selection import one_run, select_model
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
@@ -21,7 +22,6 @@ from paraflex.plots.driving import mode_conditions
 from paraflex.plots.film import FilmOptions, plan_film
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.scene import check_shapes, scene, select
-from paraflex.plots.selection import one_run, select_model
 from paraflex.plots.sources import open_source
 from paraflex.plots.time_series import link_deflections
 from paraflex.plots.workspace import deviated_paths

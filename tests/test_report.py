@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 
 from paraflex.errors import InputError, OutputError
+from paraflex.formatting import text_symbol as symbol
 from paraflex.plots.catalogue import CATALOGUE
-from paraflex.plots.labels import text_symbol as symbol
 from paraflex.report import (
     Chart,
     Curve,

@@ -8,7 +8,7 @@ from html import unescape
 
 import pytest
 
-from paraflex.plots.labels import display_unit
+from paraflex.formatting import display_unit
 from paraflex.report.choice import best_runs
 from paraflex.report.search import search_tables, search_tiles
 from paraflex.report.sweep import StudyAccount, sweep_page

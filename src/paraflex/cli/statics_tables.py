@@ -8,18 +8,17 @@ import numpy as np
 import xarray as xr
 from rich.console import Console
 
-from paraflex.cli.tables import plain_table, print_titled
-from paraflex.results.statics_data import statics_summary
-from paraflex.results.statics_rows import (
+from paraflex.cli.tables import print_table
+from paraflex.figures.equilibria import (
     buckling_words,
-    four_digits,
     is_stressed,
-    last_rows,
+    last_tables,
     lowest_frequencies,
     no_buckling,
     step_table,
 )
-from paraflex.units import STRESS
+from paraflex.formatting import number, quantity
+from paraflex.results.statics_data import statics_summary
 
 
 def print_statics(out: Console, data: xr.Dataset) -> None:
@@ -29,13 +28,9 @@ def print_statics(out: Console, data: xr.Dataset) -> None:
     also = f", {points} limit point{'s' * (points > 1)}" if points else ""
     out.print(f"{data.attrs['mechanism']}: {data.sizes['step']} equilibria{also}", soft_wrap=True)
     if data.sizes["step"] > 1:
-        found = step_table(data)
-        heads = [f"{name}\n[{unit}]" if unit else name for name, unit in found.heads]
-        print_titled(out, found.title, plain_table("", numbers=heads, rows=found.rows))
-    if rows := list(last_rows(data)):
-        title = "At the last step" if data.sizes["step"] > 1 else "At rest"
-        numbers = ("travel", "force", "stiffness", "compliance")
-        print_titled(out, title, plain_table("coordinate", "", numbers=numbers, rows=rows))
+        print_table(out, step_table(data))
+    for table in last_tables(data):
+        print_table(out, table)
     for line in _lines(data, summary):
         out.print(line, soft_wrap=True)
 
@@ -46,7 +41,7 @@ def _lines(data: xr.Dataset, summary: dict) -> list[str]:
     for name, word in lowest_frequencies(data).items():
         kept = "moved coordinates released" if word == "free" else "held and moved coordinates fixed"
         values = last[name].values[np.isfinite(last[name].values)]
-        known = ", ".join(map(four_digits, values))
+        known = ", ".join(map(number, values))
         kept += ", 0 for growing motions" if np.any(values == 0.0) else ""
         lines.append(f"{'free ' if word == 'free' else ''}frequencies: {known} Hz, {kept}")
     if words := buckling_words(data):
@@ -57,10 +52,10 @@ def _lines(data: xr.Dataset, summary: dict) -> list[str]:
         body = int(np.nanargmax(data["stress_max"].values))
         one = data.isel(body=body)
         safety = float(one["safety_factor"])
-        also = "" if math.isnan(safety) else f"; safety factor {safety:.3g}"
+        also = "" if math.isnan(safety) else f"; safety factor {number(safety, 3)}"
         lines.append(
-            f"largest stress {STRESS.factor * float(one['stress_max']):.4g} {STRESS.name} in {one['body'].item()} at "
-            f"{float(one['stress_place']):.3g} m, step {int(one['stress_step'])}{also}"
+            f"largest stress {quantity(float(one['stress_max']), 'Pa', digits=4)} in {one['body'].item()} at "
+            f"{quantity(float(one['stress_place']), 'm')}, step {int(one['stress_step'])}{also}"
         )
     if data.sizes["step"] > 1 and summary["validity"] is not None and summary["validity"]["holds"]:
         lines.append(f"validity: {summary['validity']['verdict']}")

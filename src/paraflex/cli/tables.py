@@ -16,6 +16,8 @@ from paraflex.findings import DONE_STATUSES, Finding
 from paraflex.units import STRESS
 
 if TYPE_CHECKING:
+    from paraflex.figures.tables import Table as Described
+
     # Their import takes as long as all of `paraflex info`.
     from paraflex.studies import StudyResult
     from paraflex.tracking import TrackingTask
@@ -181,6 +183,19 @@ def framed_table(title: str, headings: Iterable[str], right: Container[int] = ()
     for k, heading in enumerate(headings):
         table.add_column(heading, justify="right" if k in right else "left")
     return table
+
+
+def print_table(console: Console, shown: Described, title: str | None = None) -> None:
+    """Print a described table below its title; nothing if it has no rows."""
+    if shown:
+        heads = [f"{name}\n[{unit}]" if unit and column.is_numeric else "\n".join(filter(None, (name, unit)))
+                 for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
+        table = plain_table()
+        for head, column in zip(heads, shown.columns, strict=True):
+            table.add_column(head, justify="right" if column.is_numeric else "left", no_wrap=True)
+        for row in shown.texts():
+            table.add_row(*row)
+        print_titled(console, shown.title if title is None else title, table)
 
 
 def print_titled(console: Console, title: str, table: Table) -> None:

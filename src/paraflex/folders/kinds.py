@@ -43,6 +43,10 @@ class ResultKind:
         Function of `paraflex.report` for the report of a dataset, "module.function"; empty if there is none.
     with_folder : bool
         Whether that function also takes the folder, for the summary in it.
+    figures : tuple of str
+        Modules of `paraflex.figures` with the charts and tables of the results.
+    drawings : tuple of str
+        Names of the figures of the results that Matplotlib draws without charts.
     refusals : mapping of str to (str, str)
         Problem and remedy for what the results do not offer: "motion" (nothing moves), "page", "table".
     marks : mapping of str to Any
@@ -59,6 +63,8 @@ class ResultKind:
     along: tuple[str, str] | None = ("time", "time_series")
     page: str = ""
     with_folder: bool = False
+    figures: tuple[str, ...] = ()
+    drawings: tuple[str, ...] = ()
     refusals: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     marks: Mapping[str, Any] = field(default_factory=dict)
     listed: bool = False
@@ -88,41 +94,64 @@ _NOTHING_MOVES = (
     "these results are not a run and show no motion",
     "paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
 )
+_DESIGN_DRAWINGS = ("response_curves", "response_map", "parallel_coordinates", "pareto_front")
+_RUN_DRAWINGS = (
+    "mechanism_drawing", "energies", "joint_forces", "beam_stresses", "stress_envelope", "joint_motions",
+    "drive_efforts", "frame_loads", "sensors", "controllers", "link_deflections", "point_motions", "link_phases",
+)  # fmt: skip
 _STUDY = ("study.json", "journal.sqlite", "results.parquet")
 RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
-    ResultKind("sweep", STUDY_OF_RUNS, _STUDY),
-    ResultKind("optimisation", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "optimisation"}),
-    ResultKind("identification", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "identification"}),
-    ResultKind("indices", STUDY_OF_RUNS, _STUDY, "indices.json", marks={"kind": "indices"}),
+    ResultKind("sweep", STUDY_OF_RUNS, _STUDY,
+               drawings=_DESIGN_DRAWINGS),
+    ResultKind("optimisation", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "optimisation"},
+               drawings=("convergence", *_DESIGN_DRAWINGS)),
+    ResultKind("identification", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "identification"},
+               drawings=("convergence", "targets_reached", *_DESIGN_DRAWINGS)),
+    ResultKind("indices", STUDY_OF_RUNS, _STUDY, "indices.json", marks={"kind": "indices"},
+               drawings=("sobol_bars", *_DESIGN_DRAWINGS)),
     ResultKind("verification", VERIFICATION, ("verify.json", "verify.nc"), "verify.nc", "Verification.dataset",
-               page="verification.report_of_folder", with_folder=True),
+               page="verification.report_of_folder", with_folder=True,
+               drawings=("compared_links", "compared_paths", "model_distances", "compared_deflections")),
     ResultKind("methods", COMPARISON, ("compare-methods.json",), "compare-methods.json",
-               marks={"methods": ..., "reference": ..., "fastest": ...}),
+               marks={"methods": ..., "reference": ..., "fastest": ...},
+               drawings=("work_precision", "numerical_damping")),
     ResultKind("laws", LAW_COMPARISON, ("laws.json", "laws.nc", "laws.csv"), "laws.nc", "compare_laws", None, refusals={
         "motion": ("a comparison of control laws keeps no motions",
                    "paraflex plot draws law_comparison; paraflex run --controller NAME keeps the motion of one law"),
         "page": ("a comparison of control laws has no report",
                  "laws.csv has its table, and paraflex plot draws law_comparison"),
-    }),
+    },
+               drawings=("law_comparison",)),
     ResultKind("runs", RUN_COMPARISON, ("compare.json",)),
     ResultKind("sensitivity", SENSITIVITY, ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
-               "sensitivity.json", marks={"parameters": ..., "units": ..., "runs": ...}),
+               "sensitivity.json", marks={"parameters": ..., "units": ..., "runs": ...},
+               drawings=("elasticities",)),
     ResultKind("linear", LINEAR_MODELS, ("linear.json", "linear.nc"), "linear.nc", "linear_dataset", None,
                "linear.linear_page", refusals={
         "motion": ("these are linear models, not a run",
                    "their report.html shows mode shapes in motion, paraflex plot draws mode_shapes"),
         "table": ("linear models are matrices, not a table",
                   'export them as "mat" or "netcdf"; linear.json has poles and zeros'),
-    }),
+    },
+               drawings=("singular_values", "bode", "pole_zero_map", "mode_shapes", "poles_along_path")),
     ResultKind("statics", EQUILIBRIA, ("statics.json", "statics.nc"), "statics.nc", "statics_dataset",
-               ("step", "steps"), "statics.statics_page", refusals={"motion": _NOTHING_MOVES}),
+               ("step", "steps"), "statics.statics_page", figures=("equilibria",), refusals={"motion": _NOTHING_MOVES},
+               drawings=("deformed_shapes", "buckling_shapes")),
     ResultKind("reduction", REDUCED_MODELS, ("reduced.json", "reduced.nc"), "reduced.nc", "reduction_dataset",
-               ("frequency", "frequencies"), "reduction.reduction_page", refusals={"motion": _NOTHING_MOVES}),
+               ("frequency", "frequencies"), "reduction.reduction_page", refusals={"motion": _NOTHING_MOVES},
+               drawings=("reduced_responses", "reduction_errors", "held_frequency_by_states", "bases_along_path")),
     ResultKind("motion", RUN, ("summary.json", "results.nc"), "results.nc", "motion_dataset",
-               page="motion.motion_page"),
+               page="motion.motion_page",
+               drawings=("motion_overview", "coordinates", "point_paths", *_RUN_DRAWINGS)),
     ResultKind("tracking", RUN, ("summary.json", "results.nc"), "results.nc", "tracking_dataset or run_study",
-               page="tracking.report_of_folder", with_folder=True),
-    ResultKind("modes", "", marks={"mode": ..., "motors": ...}, listed=True),
+               page="tracking.report_of_folder", with_folder=True,
+               drawings=(
+        "desired_path", "motor_torques", "tip_deflections", "link_motions", "end_effector_path", "end_effector_motion",
+        "phase_diagrams", "tracking_errors", "tracking_distance", "mode_comparison", "actuation_condition",
+        *_RUN_DRAWINGS,
+    )),
+    ResultKind("modes", "", marks={"mode": ..., "motors": ...}, listed=True,
+               drawings=("mode_conditions",)),
 )}  # fmt: skip
 # Files by which a folder without a manifest, from an earlier release, is recognised, by the kind of the folder.
 FOLDER_FILES: dict[str, tuple[str, ...]] = {kind.folder: kind.files for kind in RESULT_KINDS.values() if kind.folder}

@@ -18,6 +18,18 @@ model, run or metric.
 The names below are imported on first use: most commands need one or two of them.
 """
 
+from typing import Any
+
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_attached, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> Any:
+    try:
+        return _attached(name)
+    except AttributeError:
+        # A figure of the catalogue that the stub does not list.
+        from paraflex.plots import charts
+
+        return getattr(charts, name)

@@ -5,6 +5,13 @@ from .agreement import (
     compared_paths as compared_paths,
     model_distances as model_distances,
 )
+from .charts import (
+    force_travel as force_travel,
+    free_travels as free_travels,
+    joint_force_travel as joint_force_travel,
+    stiffness_travel as stiffness_travel,
+    stress_travel as stress_travel,
+)
 from .controlled import controllers as controllers
 from .derivatives import elasticities as elasticities
 from .drawing import mechanism_drawing as mechanism_drawing
@@ -15,12 +22,7 @@ from .driving import (
     tracking_distance as tracking_distance,
 )
 from .energy import energies as energies
-from .equilibria import (
-    buckling_shapes as buckling_shapes,
-    deformed_shapes as deformed_shapes,
-    force_travel as force_travel,
-    stiffness_travel as stiffness_travel,
-)
+from .equilibria import buckling_shapes as buckling_shapes, deformed_shapes as deformed_shapes
 from .free_motion import (
     coordinates as coordinates,
     motion_overview as motion_overview,

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
-from paraflex.plots.catalogue import CatalogueFigure
-from paraflex.plots.labels import ROUNDING, display_unit, peak, plain, symbol
+from paraflex.figures.catalogue import Figure as CatalogueFigure
+from paraflex.figures.selection import one_run
+from paraflex.formatting import ROUNDING, display_unit, peak
+from paraflex.plots.labels import plain, symbol
 from paraflex.plots.layout import label_outer_time, lay_out, panels
 from paraflex.plots.planned import PlannedFigure
 from paraflex.plots.save import write_figures
-from paraflex.plots.selection import one_run
 from paraflex.plots.style import PAIR, journal_style
 from paraflex.results.comparison import MotionPair, RunComparison
 
@@ -77,7 +78,7 @@ def save_overlays(comparison: RunComparison, folder: Path) -> list[Path]:
     """Write figures of all compared motions in all modes as PNG and return the files."""
     drawn = []
     for name, mode in dict.fromkeys((pair.name, pair.mode) for pair in comparison.motions):
-        listed = CatalogueFigure(f"overlaid_{name}", "compare", "curves of two runs")
+        listed = CatalogueFigure(f"overlaid_{name}", "curves of two runs")
         drawn.append(PlannedFigure(listed, mode, partial(overlaid_motion, comparison, name, mode)))
     return write_figures(drawn, folder, ("png",), dpi=200.0, force=True)
 

@@ -11,10 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import names_of, one_run
+from paraflex.formatting import display_unit
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import display_unit, symbol
+from paraflex.plots.labels import symbol
 from paraflex.plots.runs import finish_over_time, largest_columns, listed_panels
-from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import BLACK, COLOURS, look_of
 from paraflex.results.controllers import GIVEN, INPUT, OUTPUT, READINGS, SAMPLE, WANTED, ControllerData, controllers_of
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
-from paraflex.plots.labels import display_unit, metric_name
-from paraflex.plots.selection import place_of
+from paraflex.figures.selection import place_of
+from paraflex.formatting import display_unit
+from paraflex.plots.labels import metric_name
 from paraflex.results.metrics import JOINT, METRICS, MOTOR
 from paraflex.seals import damaged
 

@@ -16,21 +16,12 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.figures.shapes import figure_of
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain, three_digits
 from paraflex.plots.layout import MM, page_width
 from paraflex.plots.marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
-from paraflex.plots.scene import (
-    Limits,
-    Scene,
-    default_magnification,
-    figure_of,
-    is_plate,
-    run_times,
-    scale_bar,
-    scene,
-    select,
-)
+from paraflex.plots.scene import Limits, Scene, default_magnification, is_plate, run_times, scale_bar, scene, select
 from paraflex.plots.themes import Theme, theme
 
 Array = NDArray[np.float64]

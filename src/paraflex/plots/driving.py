@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import names_of, select_run
+from paraflex.formatting import display_unit
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, display_unit, effort_label, plain
+from paraflex.plots.labels import axis_label, effort_label, plain
 from paraflex.plots.layout import ONE_COLUMN, lay_out, panels
 from paraflex.plots.runs import draw_curves, finish_over_time
 from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
-from paraflex.plots.selection import names_of, select_run
 from paraflex.plots.style import BLUE, GREEN, VERMILLION
 from paraflex.results.following import headline, ranked_by_motion
 

@@ -6,12 +6,13 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.figures.selection import one_run
+from paraflex.formatting import peak
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, peak
+from paraflex.plots.labels import axis_label
 from paraflex.plots.layout import panels
 from paraflex.plots.runs import draw_curves, finish_over_time
 from paraflex.plots.scales import mark_powers
-from paraflex.plots.selection import one_run
 from paraflex.plots.style import ZERO
 
 # Names of the curves, in every figure of energies.

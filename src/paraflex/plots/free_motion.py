@@ -8,12 +8,13 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.figures.selection import names_of, one_run, point_number
+from paraflex.formatting import ROUNDING, peak
 from paraflex.plots.energy import ENERGIES
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import ROUNDING, axis_label, peak, plain, symbol
+from paraflex.plots.labels import axis_label, plain, symbol
 from paraflex.plots.layout import panels
 from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time
-from paraflex.plots.selection import names_of, one_run, point_number
 from paraflex.plots.style import COLOURS, DASHES, keep_flat, look_of
 from paraflex.plots.workspace import finish_workspace, workspace_panel
 

@@ -1,30 +1,23 @@
-"""Texts and units of figures and pages: symbols of names, signs of modes, prefixes of units."""
+"""Texts of printed figures: mathematics of symbols, labels of axes."""
 
 from __future__ import annotations
 
-import math
 import re
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import ArrayLike
-
+from paraflex.formatting import GREEK, LONGEST, ROUNDING, printable, text_symbol
 from paraflex.results.metrics import metric_label
-from paraflex.units import STRESS, DisplayUnit
+from paraflex.units import STRESS
 
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-_GREEK = {
-    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ",
-    "omega": "ω",
-}  # fmt: skip
-
-
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
-# Longest name or unit that is shown whole.
-_LONGEST = 200
-# Values of a figure below this, in any unit, are rounding errors.
-ROUNDING = 1e-12
+# Letters of symbols in mathematics; η is that of modal coordinates.
+_LETTERS = {letter: rf"\{name}" for name, letter in GREEK.items()} | {"φ": r"\varphi", "η": r"\eta"}
+_DOTS = {"\u0307": r"\dot ", "\u0308": r"\ddot ", "": ""}
+_RAISED_BACK = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
+# A Greek letter, or a Latin one with dots or a number or alone, as a symbol within a text.
+_SYMBOL = re.compile(
+    rf"(?<![^\W\d_])(?:([{''.join(_LETTERS)}])([\u0307\u0308]?)([₀-₉]*)|([A-Za-z])(?:([\u0307\u0308])([₀-₉]*)|()([₀-₉]+)))"
+    r"(?![^\W\d_])"
+)
 
 
 class Quantity(NamedTuple):
@@ -82,7 +75,7 @@ def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", s
     mark = described.symbol.replace("{}", direction)
     text = " ".join(part for part in ("" if short and mark else described.name, mark) if part)
     unit = described.unit if unit is None else unit
-    return text if unit == "1" else f"{text} [{unit[:_LONGEST]}]"
+    return text if unit == "1" else f"{text} [{unit[:LONGEST]}]"
 
 
 def metric_name(metric: str) -> str:
@@ -97,100 +90,31 @@ def effort_label(units: str) -> str:
     return f"torque, force [{units}]"
 
 
-_PREFIXES = {
-    "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
-    "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
-    "Pa": (DisplayUnit("GPa", 1e-9), STRESS),
-    "N/m": (DisplayUnit("kN/mm", 1e-6), DisplayUnit("N/mm", 1e-3), DisplayUnit("N/m", 1.0)),
-    "m/N": (DisplayUnit("mm/N", 1e3), DisplayUnit("µm/N", 1e6), DisplayUnit("nm/N", 1e9)),
-}
-# Smallest peak for which a unit is used; GPa, with a bound of its own, is for moduli, stresses are in MPa.
-_LEAST, _LEAST_OF = 0.1, {"GPa": 2.0}
-
-
-def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
-    """Return the unit in which the largest length, angle, stress, stiffness or compliance has few digits.
-
-    Other units are returned unchanged.
-    """
-    largest, choices = peak(values), display_units(unit)
-    if largest == 0.0:
-        return next(choice for choice in choices if choice.name not in _LEAST_OF)
-    fits = (one for one in choices if largest * one.factor >= _LEAST_OF.get(one.name, _LEAST))
-    return next(fits, choices[-1])
-
-
-def display_units(unit: str) -> tuple[DisplayUnit, ...]:
-    """Return all units in which a quantity of an SI unit may be shown, the largest first."""
-    return _PREFIXES.get(unit, (DisplayUnit(unit[:_LONGEST], 1.0),))
-
-
-def peak(values: ArrayLike) -> float:
-    """Return the largest finite magnitude; zero if there is none."""
-    magnitudes = np.abs(np.asarray(values, dtype=float))
-    return float(np.max(magnitudes, initial=0.0, where=np.isfinite(magnitudes)))
-
-
 def three_digits(value: float) -> str:
     """Format a value with three significant digits: 48.0, 0.377, 120; zero and rounding errors give 0."""
     return f"{value:#.3g}".rstrip(".") if not abs(value) < ROUNDING else "0"
 
 
-def power_of_ten(value: float) -> str:
-    """Format a power of ten with superscripts, "10⁻⁵", and any other value as a plain number."""
-    exponent = round(math.log10(value)) if value > 0.0 else 0
-    if not math.isclose(value, 10.0**exponent, rel_tol=1e-9):
-        return f"{value:g}"
-    return f"10{raised(exponent)}"
-
-
-def raised(exponent: int) -> str:
-    """Return an exponent in superscripts: "⁻⁵"."""
-    return str(exponent).translate(_RAISED)
-
-
-def logarithmic_number(value: float) -> str:
-    """Format a number of a logarithmic axis: plain from 0.001 up to below 10⁴, else as "10⁻⁵" or "2·10⁻⁵"."""
-    if value <= 0.0 or 0.999e-3 <= value < 0.999e4:
-        return f"{value:g}"
-    exponent = math.floor(math.log10(value) + 1e-9)
-    digits = f"{value / 10.0**exponent:.3g}"
-    return ("" if digits == "1" else f"{digits}·") + f"10{raised(exponent)}"
-
-
 def symbol(name: str) -> str:
     """Return a name as shown in figures: "A1" and "tau1" as symbols with a subscript, others unchanged."""
-    letters, number = _parted(name)
-    if len(letters) != 1 and letters not in _GREEK:
-        return plain(text_symbol(name))
-    letter = letters if len(letters) == 1 else rf"\{letters}"
-    return rf"${letter}_{{{number}}}$" if number else f"${letter}$"
+    return mathematics(text_symbol(name))
 
 
-def text_symbol(name: str) -> str:
-    """Return a name as shown on pages: "τ₁" for "tau1", "A₁" for "A1", others unchanged."""
-    letters, number = _parted(name)
-    if len(letters) == 1 or letters in _GREEK:
-        return _GREEK.get(letters, letters) + number.translate(_LOWERED)
-    return name
+def mathematics(text: str) -> str:
+    """Return a text with its symbols as mathematics: "travel of A₁ [mm]", "τ₁", "φ̇", and a single letter "x"."""
+    if len(text) == 1 and text.isascii() and text.isalpha():
+        return f"${text}$"
+    return _SYMBOL.sub(_mathematics, plain(text))
 
 
-def _parted(name: str) -> tuple[str, str]:
-    """Split a name into its letters and its number; both are empty if it has another form."""
-    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
-    return (parts[1], parts[2]) if parts else ("", "")
-
-
-def printable(text: str) -> str:
-    """Return a text without control characters, which no SVG may hold, and cut if it is endless."""
-    return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", text if len(text) <= _LONGEST else f"{text[:_LONGEST]}...")
+def _mathematics(found: re.Match[str]) -> str:
+    groups = found.groups(default="")
+    letter, dots, number = groups[:3] if groups[0] else (groups[3], groups[4], groups[5] or groups[7])
+    lower = number.translate(_RAISED_BACK)
+    inner = _DOTS[dots] + _LETTERS.get(letter, letter)
+    return f"${inner}_{{{lower}}}$" if lower else f"${inner}$"
 
 
 def plain(name: str) -> str:
     """Return a printable name that Matplotlib does not parse as mathematics."""
     return printable(name).replace("$", r"\$")
-
-
-def is_signs(name: str) -> bool:
-    """Return whether the name of a mode consists of the signs of its motors ("+-+-")."""
-    return bool(name) and set(name) <= {"+", "-"}

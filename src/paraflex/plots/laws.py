@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import names_of
+from paraflex.formatting import display_unit
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import display_unit, metric_name, plain
+from paraflex.plots.labels import metric_name, plain
 from paraflex.plots.layout import is_narrow, lay_out, panels
 from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
-from paraflex.plots.selection import names_of
 from paraflex.plots.style import BLACK, COLOURS
 from paraflex.results.metrics import METRICS, VALIDITY
 

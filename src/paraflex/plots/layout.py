@@ -19,8 +19,9 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from paraflex.formatting import ROUNDING
 from paraflex.mechanism.quantities import known
-from paraflex.plots.labels import ROUNDING, axis_label
+from paraflex.plots.labels import axis_label
 from paraflex.plots.style import STYLE
 
 ONE_COLUMN, TWO_COLUMNS = 84.0, 174.0  # Widths of a journal's columns [mm].

@@ -13,11 +13,12 @@ from matplotlib.ticker import FuncFormatter, NullLocator, SymmetricalLogLocator
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import default_mode, names_of, place_of, select_run
+from paraflex.formatting import logarithmic_number
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import logarithmic_number, plain, symbol
+from paraflex.plots.labels import plain, symbol
 from paraflex.plots.layout import TWO_COLUMNS, is_narrow, label_outer_time, lay_out, panel_grid, panels
 from paraflex.plots.scales import mark_powers
-from paraflex.plots.selection import default_mode, names_of, place_of, select_run
 from paraflex.plots.style import BLACK, COLOURS, DASHES, ZERO, look_of
 from paraflex.results.linear_data import HOLDINGS
 from paraflex.results.linear_summary import (

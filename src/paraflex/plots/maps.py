@@ -14,9 +14,9 @@ from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.formatting import logarithmic_number, peak
 from paraflex.plots.designs import DesignTable
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import logarithmic_number, peak
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
 from paraflex.plots.scales import round_scale, scaled_label
 

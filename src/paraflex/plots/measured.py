@@ -6,10 +6,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import names_of, one_run
+from paraflex.formatting import display_unit
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import display_unit, symbol
+from paraflex.plots.labels import symbol
 from paraflex.plots.runs import draw_curves, finish_over_time, largest_columns, listed_panels
-from paraflex.plots.selection import names_of, one_run
 from paraflex.results.sensors import sensor_groups
 
 

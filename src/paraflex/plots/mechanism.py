@@ -11,11 +11,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from paraflex.figures.selection import names_of, samples
+from paraflex.figures.shapes import figure_of
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import symbol
 from paraflex.plots.marks import still_marks
-from paraflex.plots.scene import DrawnGear, DrawnJoint, Limits, Scene, figure_of, limits_of, run_times, scene
-from paraflex.plots.selection import names_of, samples
+from paraflex.plots.scene import DrawnGear, DrawnJoint, Limits, Scene, limits_of, run_times, scene
 from paraflex.plots.style import BLACK
 from paraflex.plots.themes import theme
 from paraflex.results.outlines import figure_order

@@ -9,12 +9,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import default_mode, names_of, place_of
 from paraflex.plots.drawing import Sketch, bare
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain
 from paraflex.plots.layout import MM, TWO_COLUMNS, is_narrow, page_width
 from paraflex.plots.scene import Scene, common_limits, scene
-from paraflex.plots.selection import default_mode, names_of, place_of
 from paraflex.plots.themes import theme
 from paraflex.results.linear_data import HOLDINGS
 from paraflex.results.linear_motion import SWING, DrawnMode, drawn_modes, modal_motion

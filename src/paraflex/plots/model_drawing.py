@@ -12,15 +12,17 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
+from paraflex.figures.shapes import figure_of
+from paraflex.formatting import printable
 from paraflex.mechanism import GROUND, Mechanism
 from paraflex.plots.drawing import Sketch
-from paraflex.plots.labels import printable, three_digits
+from paraflex.plots.labels import three_digits
 from paraflex.plots.layout import MM, TWO_COLUMNS, page_width
 from paraflex.plots.marks import moving_marks, still_marks
 from paraflex.plots.model_acting import Acting, acting_arrows, load_places
 from paraflex.plots.model_sensors import SENSOR, SensorMark, sensor_marks
 from paraflex.plots.named import Name, place_names
-from paraflex.plots.scene import Limits, Scene, common_limits, figure_of, limits_of, scene
+from paraflex.plots.scene import Limits, Scene, common_limits, limits_of, scene
 from paraflex.plots.signs import arrow_sign, draw_arrow, joint_sign, sign_legend
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import Theme, theme

@@ -10,11 +10,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from paraflex.figures.selection import names_of, samples, select_run
+from paraflex.formatting import ROUNDING, display_unit, peak
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import ROUNDING, axis_label, display_unit, effort_label, peak, plain, symbol, three_digits
+from paraflex.plots.labels import axis_label, effort_label, plain, symbol, three_digits
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, panel_grid
 from paraflex.plots.runs import draw_actual, finish_over_time
-from paraflex.plots.selection import names_of, samples, select_run
 from paraflex.plots.style import BLUE, VERMILLION, ZERO, keep_flat, look_of
 from paraflex.results.following import headline, ranked_by_motion
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.figures.selection import moving_directions, names_of, of_point, one_run, point_label, select_run
+from paraflex.formatting import peak
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, peak, symbol
+from paraflex.plots.labels import axis_label, symbol
 from paraflex.plots.layout import is_narrow, lay_out, panel_grid, panels
 from paraflex.plots.runs import END_EFFECTOR, START, draw_actual, draw_desired
-from paraflex.plots.selection import moving_directions, names_of, of_point, one_run, point_label, select_run
 from paraflex.plots.style import BLUE, keep_flat
 
 # Largest number of bodies with a panel.

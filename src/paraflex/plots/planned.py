@@ -8,8 +8,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from paraflex.errors import InputError, suggestion
-from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure, homes
-from paraflex.plots.selection import default_mode, names_of, place_of, point_number, prototype_pair
+from paraflex.figures.catalogue import Figure as CatalogueFigure
+from paraflex.figures.selection import default_mode, names_of, place_of, point_number, prototype_pair
+from paraflex.plots.catalogue import CATALOGUE, figure_names, plotting_function
 from paraflex.results.controllers import controller_names
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def find_figure(source: Source, name: str) -> CatalogueFigure:
     names = [figure.name for figure in there]
     near = suggestion(name, names)
     listed = "" if near.startswith("choose from") else f" There are: {', '.join(names)}"
-    elsewhere = "" if name not in homes() else f", of results of kind {source.kind}"
+    elsewhere = "" if name not in figure_names() else f", of results of kind {source.kind}"
     raise InputError(f"no such figure{elsewhere}", field="FIGURE", value=name, remedy=near + listed)
 
 
@@ -142,7 +143,7 @@ def _of_modes(
     """Plan a figure of some results: one drawing, or one for each mode or run."""
 
     def planned(of: str, *given: Any) -> PlannedFigure:
-        return PlannedFigure(figure, of, partial(figure.function, *given))
+        return PlannedFigure(figure, of, partial(plotting_function(figure), *given))
 
     data, shown = source.data, ",".join(modes)
     if figure.takes == "nothing":
@@ -171,8 +172,7 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
         return source.designs is not None and bool(source.designs.series)
     if figure.takes == "models":
         return prototype_pair(source.data) is not None
-    there = all(name in source.data for name in figure.variables)
-    return there and (figure.name not in _DRAWABLE or _DRAWABLE[figure.name](source.data))
+    return figure.can_show(source.data) and (figure.name not in _DRAWABLE or _DRAWABLE[figure.name](source.data))
 
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:

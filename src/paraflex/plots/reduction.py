@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import names_of, one_run
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain, symbol
 from paraflex.plots.layout import is_narrow, lay_out, panel_grid, panels
 from paraflex.plots.scales import mark_powers
-from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import BLACK, COLOURS, DASHES
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS

@@ -11,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from paraflex.plots.labels import peak, symbol
+from paraflex.figures.selection import names_of, run_label, samples
+from paraflex.formatting import peak
+from paraflex.plots.labels import symbol
 from paraflex.plots.layout import figure_width, is_narrow, label_outer_time, lay_out, panel_grid, panels
-from paraflex.plots.selection import names_of, run_label, samples
 from paraflex.plots.style import BLACK, BLUE, SHADE, look_of
 
 DESIRED: dict[str, Any] = {

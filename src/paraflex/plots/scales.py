@@ -14,7 +14,8 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from paraflex.plots.labels import logarithmic_number, peak, plain, power_of_ten
+from paraflex.formatting import logarithmic_number, peak, power_of_ten
+from paraflex.plots.labels import plain
 
 # Height of a line in a list of names [mm].
 LIST_LINE = 5.5

@@ -15,9 +15,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError, suggestion
+from paraflex.figures.selection import names_of, point_number, select_run
+from paraflex.figures.shapes import figure_of
 from paraflex.folders import RESULT_KINDS
-from paraflex.plots.labels import display_unit, printable
-from paraflex.plots.selection import names_of, point_number, select_run
+from paraflex.formatting import display_unit, printable
 from paraflex.results.acting import sized
 from paraflex.results.kinds import kind_of
 
@@ -534,13 +535,6 @@ def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
         trail=None if shown.trail is None else shown.trail[chosen],
         loads=tuple(DrawnLoad(load.name, *(each[chosen] for each in load[1:])) for load in shown.loads),
     )
-
-
-def figure_of(places: Array) -> Array:
-    """Return the stations (..., s, 2) of a body that are joined by lines; a closed figure ends where it closes."""
-    first = places.reshape(-1, *places.shape[-2:])[0]
-    back = np.flatnonzero(np.all(first[1:] == first[0], axis=1))
-    return places[..., : back[0] + 2, :] if back.size and back[0] > 1 else places
 
 
 def is_plate(places: Array) -> bool:

@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import names_of, one_run
+from paraflex.formatting import peak
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import axis_label, effort_label, peak, symbol
+from paraflex.plots.labels import axis_label, effort_label, symbol
 from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.runs import MOST_LINES, draw_curves, finish_over_time, largest_columns, largest_over_time, shown_of
-from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import ZERO, look_of
 from paraflex.results.loads import sliding_joints
 from paraflex.results.stress import CONTACT, stresses_of

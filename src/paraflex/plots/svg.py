@@ -9,10 +9,11 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.figures.shapes import figure_of
+from paraflex.formatting import printable
 from paraflex.mechanism import Mechanism
-from paraflex.plots.labels import printable
 from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
-from paraflex.plots.scene import Limits, Scene, figure_of, is_plate, scene
+from paraflex.plots.scene import Limits, Scene, is_plate, scene
 from paraflex.plots.themes import PAGE, Theme
 from paraflex.results.drawing import assembled_data
 

@@ -9,11 +9,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import moving_directions, of_point, one_run, point_label, run_label, select_run
+from paraflex.formatting import display_unit, peak
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import QUANTITIES, axis_label, display_unit, peak, symbol
+from paraflex.plots.labels import QUANTITIES, axis_label, symbol
 from paraflex.plots.layout import is_narrow, panels
 from paraflex.plots.runs import END_EFFECTOR, draw_actual, draw_desired, finish_over_time, largest_over_time
-from paraflex.plots.selection import moving_directions, of_point, one_run, point_label, run_label, select_run
 from paraflex.plots.style import keep_flat
 
 # Ratio of peak tip displacements above which bodies count as twins of a symmetric mechanism and are shown once.

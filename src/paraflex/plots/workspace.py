@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.figures.selection import of_point, point_label, select_run
+from paraflex.formatting import peak
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import peak
 from paraflex.plots.layout import ONE_COLUMN, equal_scales_height, is_narrow, lay_out, panels
 from paraflex.plots.mechanism import draw_mechanism
 from paraflex.plots.runs import START, draw_actual, draw_desired
-from paraflex.plots.selection import of_point, point_label, select_run
 from paraflex.plots.style import BLUE
 
 # Margin around the drawing as a share of its size, and smallest and largest ratio of a panel's height to its width.

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.plots.labels import display_unit, text_symbol
-from paraflex.plots.selection import names_of
+from paraflex.figures.selection import names_of
+from paraflex.formatting import display_unit, text_symbol
 from paraflex.report.curves import DOTTED, MOST_SAMPLES, look
 from paraflex.report.page import Chart, Curve, Look, Panel
 from paraflex.report.text import NO_VALUE, count, number, table

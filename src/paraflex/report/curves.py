@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.plots.labels import display_unit, text_symbol
-from paraflex.plots.selection import names_of
+from paraflex.figures.selection import names_of
+from paraflex.formatting import display_unit, text_symbol
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.page import Chart, Curve, Look
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.formatting import display_unit, text_symbol
 from paraflex.plots.designs import DesignTable
-from paraflex.plots.labels import display_unit, text_symbol
 from paraflex.report.page import DesignColumn
 from paraflex.results.metrics import metric_label
 

@@ -12,17 +12,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.figures.shapes import figure_of
 from paraflex.plots.marks import DOT, LOOKS, Mark, key_arrow, moving_marks, still_marks
-from paraflex.plots.scene import (
-    JOINT_BASES,
-    Limits,
-    Scene,
-    common_limits,
-    default_magnification,
-    figure_of,
-    is_plate,
-    scene,
-)
+from paraflex.plots.scene import JOINT_BASES, Limits, Scene, common_limits, default_magnification, is_plate, scene
 from paraflex.report.packing import packed
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.plots.selection import default_mode, names_of
+from paraflex.figures.selection import default_mode, names_of
 from paraflex.report.curves import DOTTED, look
 from paraflex.report.film import Animation, animation
 from paraflex.report.page import PLAIN_LOOK, Chart, Curve, Page, Panel

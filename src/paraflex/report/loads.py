@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.plots.labels import text_symbol
-from paraflex.plots.selection import names_of
+from paraflex.figures.selection import names_of
+from paraflex.formatting import text_symbol
 from paraflex.report.curves import followed
 from paraflex.report.page import Chart, Panel
 from paraflex.report.text import NO_VALUE, by_run, number, table

@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.selection import names_of
 from paraflex.findings import DONE_STATUSES
-from paraflex.plots.labels import DisplayUnit, text_symbol
-from paraflex.plots.selection import names_of
+from paraflex.formatting import text_symbol
 from paraflex.report.controllers import controller_panels, controller_tables
 from paraflex.report.curves import (
     TIPS,
@@ -34,6 +34,7 @@ from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
+from paraflex.units import DisplayUnit
 
 _ALONE = ("",)
 # Largest number of points, bodies or joints that a chart offers for choice; results.nc has all.

@@ -15,11 +15,15 @@ from pathlib import Path
 from string import Template
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError
+from paraflex.figures import charts as described
+from paraflex.figures.charts import Panel
 from paraflex.folders import added_to
+from paraflex.formatting import typeset
 from paraflex.plots.themes import THEMES
 from paraflex.report.film import Animation
 from paraflex.report.packing import Series
@@ -197,14 +201,6 @@ class Designs:
     shown: ArrayLike
 
 
-@dataclass(frozen=True)
-class Panel:
-    """Charts under one heading."""
-
-    title: str
-    charts: Sequence[Chart]
-
-
 @given_as("a page", "what tracking_page or motion_page returns")
 @dataclass(frozen=True)
 class Page:
@@ -368,7 +364,50 @@ def _designs(designs: Designs, series: Series) -> dict[str, Any]:
     }
 
 
-def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
+def _described(chart: described.Chart, series: Series, time: int) -> dict[str, Any]:
+    """Return a described chart for the scripts, in the units in which it is shown."""
+    units = chart.shown_units()
+    labels = [axis.label(unit) for axis, unit in zip(chart.axes, units.y, strict=False)]
+
+    def curve(one: described.Curve) -> dict[str, Any]:
+        x = time if one.x is None else series.add(units.x.factor * np.asarray(one.x, dtype=float))
+        y = series.add(units.of(one.choice).factor * np.asarray(one.y, dtype=float))
+        return _fields(one, "look", "desired", "stopped") | one.look._asdict() | {"x": x, "y": y}
+
+    ys, xs = (described.joined(each) for each in (
+        (one.y for one in chart.curves), (one.x for one in chart.curves if one.x is not None)
+    ))  # fmt: skip
+    return {
+        "identity": chart.identity, "title": chart.title, "y": labels, "x": chart.x.label(units.x),
+        "curves": [curve(one) for one in chart.curves], "choices": list(chart.choices), "choosing": chart.choosing,
+        "log": described.is_logarithmic(chart.axis(None), ys), "log_x": described.is_logarithmic(chart.x, xs),
+        "equal": chart.equal, "over_time": chart.over_time, "note": chart.note, "layout": _layout(chart, units),
+        "figure": None, "drawer": "", "pickers": [],
+    }  # fmt: skip
+
+
+def _layout(chart: described.Chart, units: described.ShownUnits) -> dict[str, Any]:
+    """Return additional parts of Plotly's layout: shaded ranges and levels."""
+    shade = {"type": "rect", "xref": "x", "yref": "paper", "y0": 0.0, "y1": 1.0, "fillcolor": "rgba(128,128,128,0.14)",
+             "line": {"width": 0}, "layer": "below"}  # fmt: skip
+    level = {
+        "type": "line",
+        "xref": "paper",
+        "x0": 0.0,
+        "x1": 1.0,
+        "line": {"width": 1, "dash": "dash", "color": "grey"},
+    }
+    shapes = [shade | {"x0": units.x.factor * span.low, "x1": units.x.factor * span.high} for span in chart.spans]
+    shapes += [level | {"y0": units.of(None).factor * y, "y1": units.of(None).factor * y} for y in chart.levels]
+    out: dict[str, Any] = {"shapes": shapes} if shapes else {}
+    if names := chart.axis(None).names:
+        out["yaxis"] = {"tickvals": list(range(len(names))), "ticktext": list(names), "range": [len(names) - 0.4, -0.6]}
+    return out
+
+
+def _chart(chart: Chart | described.Chart, series: Series, time: int) -> dict[str, Any]:
+    if isinstance(chart, described.Chart):
+        return _described(chart, series, time)
     return _fields(chart) | {
         "pickers": [picker._asdict() for picker in chart.pickers],
         "choices": list(chart.choices),
@@ -432,8 +471,8 @@ def _verdict(word: str) -> str:
 
 def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
     tiles = "".join(
-        f'<div class="tile"><span>{escape(name)}</span><strong>{escape(value)}</strong>'
-        f"<small>{escape(of)}</small></div>"
+        f'<div class="tile"><span>{escape(name)}</span><strong>{escape(typeset(value))}</strong>'
+        f"<small>{escape(typeset(of))}</small></div>"
         for name, value, of in figures
     )
     return f'<div class="tiles">{tiles}</div>' if tiles else ""

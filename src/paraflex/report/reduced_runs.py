@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import xarray as xr
 
-from paraflex.plots.labels import display_unit
-from paraflex.plots.selection import names_of
+from paraflex.figures.selection import names_of
+from paraflex.formatting import display_unit
 from paraflex.report.text import number, table
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.reduced_runs import COUNTS, DISTANCE, FULL

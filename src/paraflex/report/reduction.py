@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.plots.labels import text_symbol
-from paraflex.plots.selection import names_of
+from paraflex.figures.selection import names_of
+from paraflex.formatting import text_symbol
 from paraflex.report.curves import look
 from paraflex.report.page import PLAIN_LOOK, Chart, Curve, Look, Page, Panel
 from paraflex.report.text import NO_VALUE, number, table

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -12,31 +11,20 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.plots.labels import peak, text_symbol
-from paraflex.plots.selection import names_of
+from paraflex.figures import equilibria
+from paraflex.figures.catalogue import page_panels
+from paraflex.figures.charts import Panel
+from paraflex.figures.equilibria import quantity_word, unit_of
+from paraflex.formatting import NO_VALUE, number, quantity, text_symbol
 from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, model_words, repeated, verdict_word
-from paraflex.report.statics_charts import statics_panels
-from paraflex.report.text import NO_VALUE, number, table
+from paraflex.report.text import sections
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import check_kind
-from paraflex.results.statics_data import as_samples, statics_summary, step_kinds
-from paraflex.results.statics_rows import (
-    buckling_words,
-    four_digits,
-    given_coordinates,
-    is_stressed,
-    last_rows,
-    lowest_frequencies,
-    no_buckling,
-    quantity_word,
-    shown_unit,
-    step_table,
-    unit_of,
-)
+from paraflex.results.statics_data import statics_summary
+from paraflex.results.statics_steps import as_samples, step_kinds
 from paraflex.results.validity import validity_line
-from paraflex.units import STRESS
 
 Array = NDArray[np.float64]
 
@@ -44,8 +32,6 @@ Array = NDArray[np.float64]
 _DURATION = 5.0
 # Largest numbers of tiles of given coordinates and of stiffnesses.
 _TILES = 2
-# Ratio of internal terms, stiffness times length, to the forces that are their differences: the scale for rounding.
-_PARTS = 1e5
 
 
 @checked_arguments()
@@ -63,8 +49,8 @@ def statics_page(data: xr.Dataset) -> Page:
         facts=[("steps", str(summary["steps"])), ("paraflex", str(data.attrs["paraflex_version"]))],
         command=_command(asked(data)),
         figures=_tiles(data, summary),
-        more=[*_last_table(data), *_step_table(data), *_stress_table(data), *_reactions(data)],
-        panels=statics_panels(data),
+        more=sections(equilibria.tables(data)),
+        panels=_panels(data),
         time=_times(data.sizes["step"]),
         runs=("",),
         film=film,
@@ -73,8 +59,15 @@ def statics_page(data: xr.Dataset) -> Page:
             *([] if summary["status"] == "complete" else [f"{summary['status']}: {summary['message']}"]),
             *doubt_lines(verdict_of(data)),
         ],
-        remarks=list(filter(None, [validity_line({"": summary["validity"]}), no_buckling(data)])),
+        remarks=list(filter(None, [validity_line({"": summary["validity"]}), equilibria.no_buckling(data)])),
     )
+
+
+def _panels(data: xr.Dataset) -> list[Panel]:
+    """Return the charts along the travel and of buckling, or else of the shape."""
+    buckling = list(equilibria.buckling_chart(data))
+    panels = [*page_panels("statics", data), *([Panel("Buckling", buckling)] if buckling else [])]
+    return panels or [Panel("Shape", [equilibria.shape_chart(data)])]
 
 
 def _times(steps: int) -> Array:
@@ -89,7 +82,7 @@ def _film(data: xr.Dataset) -> Animation | None:
         return None
     kept = frames_of(steps.sizes["step"])
     kinds, fraction = step_kinds(steps), steps["fraction"].values
-    names = [f"{kinds[k]} with {fraction[k]:.3g} of what is given" for k in kept]
+    names = [f"{kinds[k]} at load factor {number(fraction[k], 3)}" for k in kept]
     return replace(film, time=_times(steps.sizes["step"])[kept], magnify=1.0, moments=names)
 
 
@@ -119,104 +112,39 @@ def _command(run: dict[str, Any]) -> str:
     return shlex.join(words)
 
 
-# Tiles and tables
-
-
 def _tiles(data: xr.Dataset, summary: dict[str, Any]) -> list[tuple[str, str, str]]:
     tiles = []
-    for k in given_coordinates(data)[:_TILES]:
+    for k in equilibria.given_coordinates(data)[:_TILES]:
         one = data.isel(named=k)
         name, role = text_symbol(str(one["named"].item())), str(one["role"].item())
-        wanted = "effort" if role == "moved" else "travel"
-        value = one[wanted].values[-1]
-        given = _shown(one, "travel" if role == "moved" else "effort", -1)
-        tiles.append((f"{quantity_word(one, wanted)} of {name}", _text(one, wanted, value), f"{role}: {given}"))
+        found, given = ("effort", "travel") if role == "moved" else ("travel", "effort")
+        tiles.append(
+            (f"{quantity_word(one, found)} of {name}", _text(one, found, -1), f"{role}: {_text(one, given, -1)}")
+        )
     for k in np.flatnonzero(np.isfinite(data["stiffness"].values).any(axis=0))[:_TILES]:
         one = data.isel(named=k)
-        before = f"{_shown(one, 'stiffness', 0)} at the start" if data.sizes["step"] > 1 else ""
-        tiles.append((f"stiffness of {text_symbol(str(one['named'].item()))}", _shown(one, "stiffness", -1), before))
-    for name, word in lowest_frequencies(data).items():
+        before = f"{_text(one, 'stiffness', 0)} at the start" if data.sizes["step"] > 1 else ""
+        tiles.append((f"stiffness of {text_symbol(str(one['named'].item()))}", _text(one, "stiffness", -1), before))
+    for name, word in equilibria.lowest_frequencies(data).items():
         lowest = data[name].values[:, 0]
-        before = f"{lowest[0]:.4g} Hz at the start" if len(lowest) > 1 else ""
+        before = f"{number(lowest[0])} Hz at the start" if len(lowest) > 1 else ""
         tiles.append(
-            (f"{'lowest' if word == 'lowest' else f'lowest {word}'} frequency", f"{lowest[-1]:.4g} Hz", before)
+            (f"{'lowest' if word == 'lowest' else f'lowest {word}'} frequency", f"{number(lowest[-1])} Hz", before)
         )
-    if words := buckling_words(data):
-        factor, _, rest = words.partition(" of what")
-        tiles.append(("buckling", f"{factor} ×", f"of what{rest}"))
+    if words := equilibria.buckling_words(data):
+        factor, _, rest = words.removeprefix("load factor ").partition(" ")
+        tiles.append(("buckling", factor, f"load factor, {rest}"))
     if summary["limit_points"]:
-        tiles.append(("first limit point", f"{summary['limit_points'][0]:.4g} ×", "of what is given"))
-    if is_stressed(data):
+        tiles.append(("first limit point", number(summary["limit_points"][0]), "load factor"))
+    if equilibria.is_stressed(data):
         worst = data.isel(body=int(np.nanargmax(data["stress_max"].values)))
         safety = float(worst["safety_factor"])
         more = "" if np.isnan(safety) else f", safety factor {number(safety)}"
-        where = f"{text_symbol(str(worst['body'].item()))} at {number(float(worst['stress_place']))} m{more}"
-        tiles.append(("largest stress", f"{number(float(worst['stress_max']), STRESS.factor)} {STRESS.name}", where))
+        where = f"{text_symbol(str(worst['body'].item()))} at {quantity(float(worst['stress_place']), 'm')}{more}"
+        tiles.append(("largest stress", quantity(float(worst["stress_max"]), "Pa"), where))
     return tiles
 
 
-def _shown(one: xr.Dataset, quantity: str, step: int) -> str:
-    return _text(one, quantity, one[quantity].values[step])
-
-
-def _text(one: xr.Dataset, quantity: str, value: float) -> str:
-    unit = shown_unit(unit_of(one, quantity))
-    return NO_VALUE if np.isnan(value) else f"{four_digits(unit.factor * value)} {unit.name}".replace("-", "−")
-
-
-def _last_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
-    rows = [
-        # Role of the coordinate, then values with their units below.
-        (text_symbol(name), [role, *(cell.replace("-", "−").replace(" ", "\n", 1) or NO_VALUE for cell in cells)])
-        for name, role, *cells in last_rows(data)
-    ]
-    if not rows:
-        return
-    title = "At the last step" if data.sizes["step"] > 1 else "At rest"
-    heads = [("coordinate", ""), ("", ""), ("travel", ""), ("force", ""), ("stiffness", ""), ("compliance", "")]
-    note = "A force acts on the mechanism along its coordinate. Stiffness: with all held and moved coordinates fixed."
-    yield title, table(heads, rows, caption=title, note=note)
-
-
-def _step_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
-    if data.sizes["step"] < 2:
-        return
-    found = step_table(data)
-    heads = [("", ""), *((name, f"[{unit}]" if unit else "") for name, unit in found.heads)]
-    rows = [(kind, [cell.replace("nan", NO_VALUE).replace("-", "−") for cell in cells]) for kind, *cells in found.rows]
-    note = "Frequencies are those of small vibrations about each equilibrium, held and moved coordinates fixed."
-    yield found.title, table(heads, rows, caption="Steps", note=note)
-
-
-def _stress_table(data: xr.Dataset) -> Iterator[tuple[str, str]]:
-    if not is_stressed(data):
-        return
-    heads = [("beam", ""), ("stress", f"[{STRESS.name}]"), ("safety", "factor"), ("at", "[m]"), ("step", "")]
-    rows = []
-    for name in names_of(data, "body"):
-        one = data.sel(body=name)
-        if np.isfinite(one["stress_max"].item()):
-            cells = [number(one["stress_max"].item(), STRESS.factor), number(one["safety_factor"].item()),
-                     number(one["stress_place"].item()), f"{one['stress_step'].item():.0f}"]  # fmt: skip
-            rows.append((text_symbol(name), cells))
-    note = "Bending and axial together, the largest of all steps."
-    yield "Stresses of beams", table(heads, rows, caption="Largest stresses of the beams", note=note)
-
-
-def _reactions(data: xr.Dataset) -> Iterator[tuple[str, str]]:
-    """Yield the table of forces and moments of joints at the last step."""
-    if not data.sizes.get("joint"):
-        return
-    force, moment = data["joint_force"].values[-1], data["joint_moment"].values[-1]
-    places = data["joint_position"].values[-1]
-    wide = float(np.max(np.nan_to_num(np.ptp(places, axis=0)), initial=0.0))
-    size = max(peak(force), 1.0)
-    turn = max(peak(moment), size * wide)
-    rows = [
-        (text_symbol(name), [*(number(x, beside=_PARTS * size) for x in force[j]),
-                             number(moment[j], beside=_PARTS * turn)])
-        for j, name in enumerate(names_of(data, "joint"))
-    ]  # fmt: skip
-    heads = [("joint", ""), ("force x", "[N]"), ("force y", "[N]"), ("moment", "[N m]")]
-    note = "On the joint's second body, in the ground frame, at the last step."
-    yield "Reactions", table(heads, rows, caption="Forces and moments of joints", note=note)
+def _text(one: xr.Dataset, quantity_name: str, step: int) -> str:
+    value = float(one[quantity_name].values[step])
+    return NO_VALUE if np.isnan(value) else quantity(value, unit_of(one, quantity_name), digits=4, padded=False)

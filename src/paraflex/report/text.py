@@ -9,7 +9,8 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from paraflex.plots.labels import display_unit, display_units, raised
+from paraflex.figures.tables import Table
+from paraflex.formatting import display_unit, display_units, raised, text_symbol, typeset
 from paraflex.units import DisplayUnit
 
 # Range of magnitudes written without powers of ten.
@@ -115,6 +116,26 @@ def table(
         f'<caption class="unseen">{escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{below}"
     )
+
+
+def table_html(shown: Table) -> str:
+    """Return the HTML of a table, with its numbers typeset and the units below the headings."""
+    heads = [(text_symbol(name), f"[{unit}]" if unit and column.is_numeric else unit)
+             for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
+    rows = [
+        (text_symbol(name), ["\n".join(typeset(text_symbol(line)) for line in cell.split("\n")) for cell in cells])
+        for name, *cells in shown.texts()
+    ]
+    return table(heads, rows, caption=shown.title, note=shown.note, runs=shown.runs)
+
+
+def sections(tables: Iterable[Table]) -> list[tuple[str, str]]:
+    """Return titles and HTML of the tables that have rows, those of one title together."""
+    found: dict[str, str] = {}
+    for one in tables:
+        if one:
+            found[one.title] = found.get(one.title, "") + table_html(one)
+    return list(found.items())
 
 
 def by_run(tables: Sequence[tuple[str, str]]) -> str:

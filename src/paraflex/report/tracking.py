@@ -11,9 +11,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.selection import default_mode, names_of, samples
 from paraflex.findings import DONE_STATUSES
-from paraflex.plots.labels import display_unit, text_symbol
-from paraflex.plots.selection import default_mode, names_of, samples
+from paraflex.formatting import display_unit, text_symbol
 from paraflex.report.controllers import controller_panels, controller_tables
 from paraflex.report.curves import (
     DOTTED,

@@ -12,10 +12,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.selection import names_of
 from paraflex.findings import Finding
+from paraflex.formatting import display_unit, text_symbol
 from paraflex.plots.agreement import printed
-from paraflex.plots.labels import display_unit, text_symbol
-from paraflex.plots.selection import names_of
 from paraflex.plots.workspace import round_magnification
 from paraflex.report.curves import TIPS, errors, labelled, largest, look, thinned
 from paraflex.report.film import NO_SHAPES, animation

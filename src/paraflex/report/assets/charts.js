@@ -2,7 +2,7 @@
 const charts = (() => {
   const { page, state, element } = report;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
-  const MARKS = { ring: "circle-open", cross: "x-thin-open" };
+  const MARKS = { ring: "circle-open", cross: "x-thin-open", square: "square", dot: "circle" };
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
   // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
   const PAPER = 640, LOW = 200, LOW_TITLE = 10;
@@ -14,6 +14,12 @@ const charts = (() => {
   const isShown = (chart, curve) =>
     (curve.shown === null || curve.shown.includes(state.run)) && (curve.choice === null || curve.choice === chart.choice);
 
+  // Charts whose choices are different quantities have a label for each.
+  const yLabel = (chart) => {
+    const label = chart.description.y;
+    return Array.isArray(label) ? label[label.length > 1 ? chart.choice : 0] : label;
+  };
+
   const isOwn = (chart) => Boolean(chart.description.figure || chart.description.drawer);
   const ownFigure = (chart) => (chart.description.drawer ? designs.figure(chart) : chart.description.figure);
 
@@ -24,10 +30,14 @@ const charts = (() => {
     const beside = new Set(shown.filter((curve) => curve.run !== null).map((curve) => curve.run)).size > 1;
     return shown.map((curve) => {
       const chosen = beside && curve.run === state.run;
+      if (curve.mark === "bar") return {
+        type: "bar", orientation: "h", name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y), width: 0.6,
+        marker: { color: lineColour(curve) }, hovertemplate: "%{x:.4~g}<extra>%{fullData.name}</extra>", visible: chart.hidden.has(curve.name) ? "legendonly" : true,
+      };
       if (curve.mark) return {
-        type: "scatter", mode: "markers", name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y),
+        type: "scatter", mode: curve.line ? "lines+markers" : "markers", line: { color: lineColour(curve), dash: DASHES[curve.dash], width: 1.4 }, name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y),
         marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: curve.mark === "ring" ? 9 : 8, line: { width: 1.6, color: lineColour(curve) } },
-        text: curve.texts.map(plain), hovertemplate: "%{text}<extra>%{fullData.name}</extra>", visible: chart.hidden.has(curve.name) ? "legendonly" : true,
+        text: curve.texts.map(plain), hovertemplate: `${curve.texts.length ? "%{text}" : "%{x:.4~g}, %{y:.4~g}"}<extra>%{fullData.name}</extra>`, visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       return {
         type: "scatter", mode: "lines", name: plain(curve.name),
@@ -88,13 +98,13 @@ const charts = (() => {
     };
     if (figure) {
       const { xaxis, yaxis, noAxes, ...own } = figure.layout || {};
-      return { ...common, ...own, ...(noAxes ? {} : { xaxis: axis(chart.description.x, xaxis), yaxis: axis(chart.description.y, yaxis) }) };
+      return { ...common, ...own, ...(noAxes ? {} : { xaxis: axis(chart.description.x, xaxis), yaxis: axis(yLabel(chart), yaxis) }) };
     }
     return {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
       xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : logX ? { type: "log", dtick: 1, tickformat: "~g", hoverformat: ".4~g" } : added.xaxis || {}),
-      yaxis: axis(chart.description.y, { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g", ...added.yaxis }),
+      yaxis: axis(yLabel(chart), { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g", ...added.yaxis }),
       shapes: added.shapes || [],
     };
   }
@@ -212,7 +222,7 @@ const charts = (() => {
   function make(description) {
     const plot = element("div", { style: "width:100%;height:100%" });
     const kind = description.drawer ? ` own ${description.drawer}` : description.figure ? " own" : description.equal ? " square" : "";
-    const holder = element("div", { class: `plot${kind}`, role: "img", "aria-label": `${description.title}: ${description.y} over ${description.x}` }, plot);
+    const holder = element("div", { class: `plot${kind}`, role: "img", "aria-label": `${description.title}: ${[].concat(description.y)[0]} over ${description.x}` }, plot);
     const chart = { description, plot, choice: 0, picked: description.pickers.map((picker) => picker.chosen), hidden: new Set(), dots: [], drawn: false, stale: true, inView: false };
     const header = element("header", {}, element("h3", {}, description.title));
     if (description.choices.length) {

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.plots.labels import is_signs, plain
-
-if TYPE_CHECKING:
-    import xarray as xr
-
+from paraflex.formatting import is_signs
 
 # Ratio of speeds along the two axes below which the end-effector is at rest along one of them, up to rounding.
 _STILL = 1e-9
@@ -102,12 +98,12 @@ def of_point(run: xr.Dataset, point: str | None) -> xr.Dataset:
 
 def point_label(run: xr.Dataset, point: str | None) -> str:
     """Return the legend label of the actual motion of the end-effector, or of a point."""
-    return f"{'actual' if point is None else plain(point)}, {run_label(run)}"
+    return f"{'actual' if point is None else point}, {run_label(run)}"
 
 
 def run_label(run: xr.Dataset) -> str:
     """Return the legend label of a run's mode."""
-    return f"mode {plain(str(run['mode'].item()))}"
+    return f"mode {run['mode'].item()}"
 
 
 def samples(run: xr.Dataset) -> int:
@@ -124,3 +120,15 @@ def moving_directions(run: xr.Dataset) -> list[str]:
              for name in ("end_effector_velocity", "end_effector_velocity_desired") if name in run]  # fmt: skip
     speeds = np.max(np.abs(parts), axis=(0, 1))
     return [name for name, speed in zip(names, speeds, strict=True) if speed > _STILL * speeds.max()] or names
+
+
+def as_runs(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
+    """Return results with a leading dimension of modes: those of one mode if it is given, a run without modes as one.
+
+    The mode of a run without modes is "".
+    """
+    if "mode" not in data.dims:
+        return one_run(data, mode).expand_dims(mode=[""]).transpose("mode", "time", ...)
+    if mode is not None:
+        data = data.isel(mode=[place_of(mode, names_of(data, "mode"), "mode")])
+    return data.transpose("mode", "time", ...)

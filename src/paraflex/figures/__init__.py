@@ -1,0 +1,1 @@
+"""Descriptions of charts and tables, in SI units, which `plots`, `report`, `cli` and notebooks draw."""

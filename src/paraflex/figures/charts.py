@@ -1,0 +1,287 @@
+"""Chart: curves over a common axis, as Matplotlib and the page of a report draw them.
+
+Numbers of a description are in SI units; what draws it converts them by `shown_units`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paraflex.formatting import common_unit, display_unit, labelled
+from paraflex.units import DisplayUnit
+
+Array = NDArray[np.float64]
+
+# Numbers of colours and of dashes; the latter include the solid line.
+N_COLOURS, N_DASHES = 8, 5
+DASHED, DOTTED = 1, 2
+# Ratio of the largest to the smallest positive value above which an axis that may be logarithmic is.
+_DECADE = 10.0
+
+
+class Look(NamedTuple):
+    """Look of a curve: index of one of eight colours, or None for the colour of text, and dashes.
+
+    Dashes are 0 solid, 1 dashed, 2 dotted, 3 dash-dotted, 4 long dashes.
+    """
+
+    colour: int | None = None
+    dash: int = 0
+
+
+PLAIN_LOOK = Look()
+
+
+def look(k: int) -> Look:
+    """Return colour and dash of the k-th curve; up to 40 curves differ, and up to eight of them in colour."""
+    return Look(k % N_COLOURS, (k % N_COLOURS + k // N_COLOURS) % N_DASHES)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Axis of a chart.
+
+    Attributes
+    ----------
+    name : str
+        Name of the quantity: "torque".
+    unit : str
+        SI unit of the values; "1" for dimensionless ones.
+    symbol : str
+        Symbol of the quantity, "τ"; empty if it has none.
+    log : bool
+        Whether the axis is logarithmic if its values span more than a decade.
+    linear_below : float
+        Magnitude below which a symmetrical logarithmic axis is linear; 0 (default) for other axes.
+    zero : bool
+        Whether a line marks zero.
+    extent : float
+        Magnitude of the quantity: values that vary by less than a millionth of it are drawn as constant.
+    low, high : float or None
+        Limits of the axis; by default those of the values.
+    ticks : sequence of float
+        Numbers on the axis; by default round ones.
+    names : sequence of str
+        Names at 0, 1, 2, ... in place of numbers, on a vertical axis from the top down.
+    shown : DisplayUnit or None
+        Unit for display; by default one in which the values have few digits.
+    """
+
+    name: str
+    unit: str = "1"
+    symbol: str = ""
+    log: bool = False
+    linear_below: float = 0.0
+    zero: bool = False
+    extent: float = 0.0
+    low: float | None = None
+    high: float | None = None
+    ticks: Sequence[float] = ()
+    names: Sequence[str] = ()
+    shown: DisplayUnit | None = None
+
+    def unit_for(self, values: ArrayLike) -> DisplayUnit:
+        """Return the unit in which values are shown."""
+        return self.shown or (common_unit if is_logarithmic(self, values) else display_unit)(self.unit, values)
+
+    def label(self, unit: DisplayUnit) -> str:
+        """Return the label of the axis in a unit: "torque τ [N m]"."""
+        return labelled(" ".join(filter(None, (self.name, self.symbol))), unit.name)
+
+
+TIME = Axis("time", "s", "t")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Curve of a chart.
+
+    Attributes
+    ----------
+    name : str
+        Name of the curve; empty if it has no entry in the legend.
+    y : (k,) array
+        Ordinates in the SI unit of the axis; NaN where there is no value.
+    x : (k,) array, optional
+        Abscissae in the SI unit of the axis; the time of the runs by default.
+    look : Look
+        Colour and dashes.
+    run : int, optional
+        Run of the curve.
+    shown : tuple of int, optional
+        Selected runs with which the curve is shown; any by default.
+    choice : int, optional
+        Choice of the chart that shows the curve; every choice by default.
+    desired : bool
+        Whether the curve is one that others of the chart should follow.
+    stopped : bool
+        Whether the run ended early, at the last finite value.
+    quiet : bool
+        Whether the curve is omitted from the label at the pointer.
+    mark : str
+        Marks at its points, "ring", "cross", "square" or "dot", or horizontal bars, "bar"; empty (default) for none.
+    line : bool
+        Whether a line joins the points; by default only if they have no marks.
+    texts : sequence of str
+        Text of each mark in the label at the pointer.
+    """
+
+    name: str
+    y: ArrayLike
+    x: ArrayLike | None = None
+    look: Look = PLAIN_LOOK
+    run: int | None = None
+    shown: tuple[int, ...] | None = None
+    choice: int | None = None
+    desired: bool = False
+    stopped: bool = False
+    quiet: bool = False
+    mark: Literal["", "ring", "cross", "square", "dot", "bar"] = ""
+    line: bool = False
+    texts: Sequence[str] = ()
+
+    def is_shown(self, run: int | None, choice: int | None) -> bool:
+        """Check whether the curve is shown for a selected run and a choice; None for all of them."""
+        return (self.shown is None or run is None or run in self.shown) and (
+            self.choice is None or choice is None or choice == self.choice
+        )
+
+
+class Span(NamedTuple):
+    """Shaded range of the abscissa, with its name in the legend; empty without one."""
+
+    low: float
+    high: float
+    name: str = ""
+
+
+class ShownUnits(NamedTuple):
+    """Units in which a chart is drawn: of its abscissa, and of its ordinate for each choice (one without choices)."""
+
+    x: DisplayUnit
+    y: tuple[DisplayUnit, ...]
+
+    def of(self, choice: int | None) -> DisplayUnit:
+        """Return the unit of the ordinate of a choice; of the first one if it is None."""
+        return self.y[choice or 0]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Chart: curves with two axes.
+
+    Attributes
+    ----------
+    identity : str
+        Identifier, unique among the charts of a page.
+    title : str
+        Title.
+    y : Axis or sequence of Axis
+        Vertical axis; one for each choice if their quantities differ.
+    curves : sequence of Curve
+        Curves.
+    x : Axis
+        Horizontal axis; the time by default.
+    choices : sequence of str
+        Names of the members that a page shows one at a time, such as links or motors.
+    choosing : str
+        Noun for a choice.
+    overview : bool
+        Whether the first choice shows all members together.
+    equal : bool
+        Whether both axes have the same scale and unit.
+    spans : sequence of Span
+        Shaded ranges of the abscissa.
+    levels : sequence of float
+        Ordinates at which a line is drawn, such as limits.
+    note : str
+        Sentence below the chart.
+    """
+
+    identity: str
+    title: str
+    y: Axis | Sequence[Axis]
+    curves: Sequence[Curve] = ()
+    x: Axis = TIME
+    choices: Sequence[str] = ()
+    choosing: str = "shown"
+    overview: bool = False
+    equal: bool = False
+    spans: Sequence[Span] = ()
+    levels: Sequence[float] = ()
+    note: str = ""
+
+    @property
+    def over_time(self) -> bool:
+        """Whether the abscissa is the time of the runs."""
+        return self.x is TIME
+
+    @property
+    def axes(self) -> Sequence[Axis]:
+        """Vertical axes: one, or one for each choice."""
+        return (self.y,) if isinstance(self.y, Axis) else self.y
+
+    def axis(self, choice: int | None) -> Axis:
+        """Return the vertical axis of a choice."""
+        return self.axes[(choice or 0) if len(self.axes) > 1 else 0]
+
+    def shown(self, run: int | None, choice: int | None) -> list[Curve]:
+        """Return the curves that are shown for a selected run and a choice; None for all of them."""
+        return [curve for curve in self.curves if curve.is_shown(run, choice)]
+
+    def with_curves(self, curves: Iterable[Curve]) -> Chart:
+        """Return the chart with other curves."""
+        return replace(self, curves=tuple(curves))
+
+    def shown_units(self) -> ShownUnits:
+        """Return the units in which the chart is drawn."""
+        own = len(self.axes) > 1
+        y = [
+            axis.unit_for(joined(curve.y for curve in self.curves if curve.is_shown(None, k if own else None)))
+            for k, axis in enumerate(self.axes)
+        ]
+        xs = joined(curve.x for curve in self.curves if curve.x is not None)
+        x = self.x.unit_for(xs)
+        if self.equal:
+            x = y[0] = min(x, y[0], key=lambda unit: unit.factor)
+        return ShownUnits(x, tuple(y if own else y * max(len(self.choices), 1)))
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Charts under one heading."""
+
+    title: str
+    charts: Sequence[Any]
+
+
+def joined(values: Iterable[ArrayLike]) -> Array:
+    """Return all values of several arrays as one."""
+    return np.concatenate([np.zeros(0), *(np.asarray(one, dtype=float).ravel() for one in values)])
+
+
+def is_wide(values: ArrayLike, ratio: float = _DECADE) -> bool:
+    """Check whether the positive values differ by more than a ratio, by default a decade."""
+    known = np.asarray(values, dtype=float)
+    known = known[np.isfinite(known) & (known > 0.0)]
+    return bool(known.size and known.max() > ratio * known.min())
+
+
+def is_logarithmic(axis: Axis, values: ArrayLike) -> bool:
+    """Check whether an axis with these values is logarithmic: it may be, and the values span more than a decade."""
+    return axis.log and is_wide(values)
+
+
+def stairs(times: Array, values: Array) -> tuple[Array, Array]:
+    """Return the corners of the step curve of values that are held until the next one."""
+    return np.repeat(times, 2)[1:], np.repeat(values, 2)[:-1]
+
+
+def numbered(names: Sequence[str]) -> Iterator[tuple[int, str, Look]]:
+    """Yield number, name and look of each curve."""
+    return ((k, name, look(k)) for k, name in enumerate(names))

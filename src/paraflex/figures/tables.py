@@ -1,0 +1,127 @@
+"""Table: columns of numbers and words, as the terminal, the page of a report, notebooks and files show them.
+
+Numbers are in SI units; `Table.texts` converts and formats them by the one rule of `formatting`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from paraflex.formatting import common_unit, number
+from paraflex.units import DisplayUnit
+
+Cell = float | int | str | None
+
+
+@dataclass(frozen=True)
+class Column:
+    r"""Column of a table.
+
+    Attributes
+    ----------
+    name : str
+        Heading.
+    cells : sequence of float, int, str or None
+        Values in SI units, whole numbers, or words; None where there is none. A word of two lines is "first\nsecond".
+    unit : str
+        SI unit of the values, or a text below the heading for columns of words; empty if there is none.
+    below : sequence of float or None, optional
+        Second value of each cell, in the same unit, which stands below the first.
+    beside : float
+        Magnitude of the quantities whose differences the values are; values within their rounding are 0.
+    digits : int
+        Number of significant digits.
+    infinite : str
+        Text of an infinite value.
+    shown : DisplayUnit or None
+        Unit for display; by default one in which all values have few digits.
+    """
+
+    name: str
+    cells: Sequence[Cell]
+    unit: str = ""
+    below: Sequence[float | None] = ()
+    beside: float = 0.0
+    digits: int = 4
+    infinite: str = "inf"
+    shown: DisplayUnit | None = None
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether no cell is a word."""
+        return not any(isinstance(cell, str) for cell in self.cells)
+
+    @property
+    def shown_unit(self) -> DisplayUnit:
+        """Unit in which the values are shown."""
+        values = [float(cell) for cell in (*self.cells, *self.below) if isinstance(cell, float)]
+        return self.shown or common_unit(self.unit, values, beside=self.beside)
+
+    def texts(self) -> list[str]:
+        """Return the cells as text."""
+        factor = self.shown_unit.factor
+
+        def text(cell: Cell) -> str:
+            if isinstance(cell, str | int | np.integer):
+                return str(cell)
+            return number(cell, self.digits, factor=factor, beside=self.beside, infinite=self.infinite)
+
+        if not self.below:
+            return list(map(text, self.cells))
+        return [f"{text(first)}\n{text(second)}" for first, second in zip(self.cells, self.below, strict=True)]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Table: a heading, columns of equally many cells, and a sentence below.
+
+    Attributes
+    ----------
+    title : str
+        Heading.
+    columns : sequence of Column
+        Columns, that of the names of the rows first.
+    note : str
+        Sentence below the table.
+    runs : mapping of str to int
+        Runs of a page that rows select, by the name of the row.
+    """
+
+    title: str
+    columns: Sequence[Column]
+    note: str = ""
+    runs: Mapping[str, int] | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.columns and self.columns[0].cells)
+
+    def heads(self) -> list[tuple[str, str]]:
+        """Return heading and unit of every column; the unit is empty if there is none."""
+        return [(column.name, column.shown_unit.name if column.is_numeric else column.unit) for column in self.columns]
+
+    def texts(self) -> list[list[str]]:
+        """Return the rows as text."""
+        return [list(row) for row in zip(*(column.texts() for column in self.columns), strict=True)]
+
+    def filled(self) -> Table:
+        """Return the table without columns of numbers that have no value in any row."""
+        kept = [c for c in self.columns if not c.is_numeric or any(_is_known(cell) for cell in c.cells)]
+        return replace(self, columns=kept)
+
+    def thinned(self, rows: Sequence[int]) -> Table:
+        """Return the table with some of its rows; the title has their number and that of all rows."""
+        count = len(self.columns[0].cells)
+        if len(rows) == count:
+            return self
+        columns = [
+            replace(one, cells=[one.cells[k] for k in rows], below=[one.below[k] for k in rows] if one.below else ())
+            for one in self.columns
+        ]
+        return replace(self, title=f"{self.title} ({len(rows)} of {count})", columns=columns)
+
+
+def _is_known(cell: Cell) -> bool:
+    return cell is not None and not (isinstance(cell, float) and np.isnan(cell))

@@ -1,0 +1,214 @@
+"""Text of numbers, units and symbols: one rule for tables, tiles, messages and axes.
+
+`number` writes plain ASCII, for terminals and files; `typeset` turns such a text into that of pages and figures.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from paraflex.units import STRESS, DisplayUnit
+
+# Text for a value that does not exist.
+NO_VALUE = "-"
+# Magnitudes from which and below which numbers are written without powers of ten.
+_SMALLEST_PLAIN, _LARGEST_PLAIN = 1e-3, 1e6
+# Share of the magnitude of its terms below which a difference is a rounding error.
+_ROUNDING = 16.0 * sys.float_info.epsilon
+# Values below this, in any unit, are rounding errors.
+ROUNDING = 1e-12
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+GREEK = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ",
+    "omega": "ω",
+}  # fmt: skip
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
+# Longest name or unit that is shown whole.
+LONGEST = 200
+# Numbers within a text, with the parts that are typeset.
+_WRITTEN = re.compile(r"(?<![\w.])(-)?(\d+(?:\.\d*)?)(?:e([+-]\d+))?(?![\w])")
+
+_PREFIXES = {
+    "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
+    "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
+    "Pa": (DisplayUnit("GPa", 1e-9), STRESS),
+    "N/m": (DisplayUnit("kN/mm", 1e-6), DisplayUnit("N/mm", 1e-3), DisplayUnit("N/m", 1.0)),
+    "m/N": (DisplayUnit("mm/N", 1e3), DisplayUnit("µm/N", 1e6), DisplayUnit("nm/N", 1e9)),
+}
+# Smallest peak for which a unit is used; GPa is for moduli, stresses are in MPa.
+_LEAST, _LEAST_OF = 0.1, {"GPa": 2.0, "kN/mm": 1.0}
+
+
+def number(
+    value: float | None,
+    digits: int = 4,
+    *,
+    factor: float = 1.0,
+    beside: float = 0.0,
+    missing: str = NO_VALUE,
+    infinite: str = "inf",
+    padded: bool = False,
+) -> str:
+    """Format a value times a factor with some significant digits: "0.377", "43708", "1.2e-05".
+
+    Integer digits are all written up to a million; larger numbers and those below 0.001 have an exponent.
+
+    Parameters
+    ----------
+    value : float, optional
+        Value to format.
+    digits : int
+        Number of significant digits.
+    factor : float
+        Factor of the value, such as a change of units.
+    beside : float
+        Magnitude of the quantities whose difference or part the value is; a value within their rounding is "0".
+    missing, infinite : str
+        Texts for a value that is None or NaN, and for an infinite one.
+    padded : bool
+        Whether trailing zeros are kept, so that numbers of a column have equally many digits.
+    """
+    if value is None or math.isnan(value):
+        return missing
+    if math.isinf(factor * value):
+        return infinite
+    if value == 0.0 or (math.isfinite(beside) and abs(value) < _ROUNDING * beside):
+        return "0"
+    value = factor * value
+    # A number that is rounded up to the next power of ten is written as that power.
+    size = abs(float(f"{value:.{digits - 1}e}"))
+    if size >= 10.0 ** (digits - 1) and size < _LARGEST_PLAIN:
+        return f"{value:.0f}"
+    if not _SMALLEST_PLAIN <= size < _LARGEST_PLAIN:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa if padded or '.' not in mantissa else mantissa.rstrip('0').rstrip('.')}e{exponent}"
+    return f"{value:#.{digits}g}" if padded else f"{value:.{digits}g}"
+
+
+def typeset(text: str) -> str:
+    """Return a text with its numbers as pages print them: "1.2e-05" as "1.2 × 10⁻⁵", a minus sign, a dash for none."""
+    return "–" if text == NO_VALUE else _WRITTEN.sub(_typeset, text)
+
+
+def _typeset(found: re.Match[str]) -> str:
+    sign, digits, exponent = found.groups()
+    power = f" × 10{raised(int(exponent))}" if exponent else ""
+    return ("−" if sign else "") + digits + power
+
+
+def quantity(value: float, unit: str, shown: DisplayUnit | None = None, digits: int = 3, *, padded: bool = True) -> str:
+    """Format a value in a suitable unit, or in a given one: "0.377 mm"."""
+    shown = shown or display_unit(unit, value)
+    return f"{number(value, digits, factor=shown.factor, padded=padded)} {shown.name}".rstrip()
+
+
+def count(value: float | None) -> str:
+    """Format a whole number: "43708"; a dash if there is none."""
+    return NO_VALUE if value is None or not math.isfinite(value) else str(int(value))
+
+
+def power_of_ten(value: float) -> str:
+    """Format a power of ten with superscripts, "10⁻⁵", and any other value as a plain number."""
+    exponent = round(math.log10(value)) if value > 0.0 else 0
+    if not math.isclose(value, 10.0**exponent, rel_tol=1e-9):
+        return f"{value:g}"
+    return f"10{raised(exponent)}"
+
+
+def logarithmic_number(value: float) -> str:
+    """Format a number of a logarithmic axis: plain from 0.001 up to below 10⁴, else as "10⁻⁵" or "2·10⁻⁵"."""
+    if value <= 0.0 or 0.999e-3 <= value < 0.999e4:
+        return f"{value:g}"
+    exponent = math.floor(math.log10(value) + 1e-9)
+    digits = f"{value / 10.0**exponent:.3g}"
+    return ("" if digits == "1" else f"{digits}·") + f"10{raised(exponent)}"
+
+
+def raised(exponent: int) -> str:
+    """Return an exponent in superscripts: "⁻⁵"."""
+    return str(exponent).translate(_RAISED)
+
+
+# Units
+
+
+def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
+    """Return the unit in which the largest length, angle, stress, stiffness or compliance has few digits.
+
+    Other units are returned unchanged.
+    """
+    largest, choices = peak(values), display_units(unit)
+    if largest == 0.0:
+        return next(choice for choice in choices if choice.name not in _LEAST_OF)
+    fits = (one for one in choices if largest * one.factor >= _LEAST_OF.get(one.name, _LEAST))
+    return next(fits, choices[-1])
+
+
+def display_units(unit: str) -> tuple[DisplayUnit, ...]:
+    """Return all units in which a quantity of an SI unit may be shown, the largest first."""
+    return _PREFIXES.get(unit, (DisplayUnit(unit[:LONGEST], 1.0),))
+
+
+def common_unit(unit: str, values: Iterable[float | None] | ArrayLike, *, beside: float = 0.0) -> DisplayUnit:
+    """Return the unit in which all values have few digits, else the unit of the largest.
+
+    Values and `beside` are as for `number`.
+    """
+    known = np.abs(np.asarray(values if isinstance(values, np.ndarray) else list(values), dtype=float))  # type: ignore[arg-type]
+    known = known[np.isfinite(known) & (known > _ROUNDING * beside)]
+    if not known.size:
+        return display_unit(unit, 0.0)
+    least, most = float(known.min()), float(known.max())
+    fits = (
+        one
+        for smallest in (_LEAST, _SMALLEST_PLAIN)
+        for one in display_units(unit)
+        if least * one.factor >= _LEAST_OF.get(one.name, smallest) and most * one.factor < 0.1 * _LARGEST_PLAIN
+    )
+    return next(fits, display_unit(unit, most))
+
+
+def peak(values: ArrayLike) -> float:
+    """Return the largest finite magnitude; zero if there is none."""
+    magnitudes = np.abs(np.asarray(values, dtype=float))
+    return float(np.max(magnitudes, initial=0.0, where=np.isfinite(magnitudes)))
+
+
+def labelled(name: str, unit: str) -> str:
+    """Return the label of an axis or a column, with its unit if it has one: "torque [N m]"."""
+    return name if unit in ("1", "") else f"{name} [{unit[:LONGEST]}]"
+
+
+# Names
+
+
+def text_symbol(name: str) -> str:
+    """Return a name as shown: "τ₁" for "tau1", "A₁" for "A1", others unchanged."""
+    letters, digits = _parted(name)
+    if len(letters) == 1 or letters in GREEK:
+        return GREEK.get(letters, letters) + digits.translate(_LOWERED)
+    return name
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """Split a name into its letters and its number; both are empty if it has another form."""
+    parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
+    return (parts[1], parts[2]) if parts else ("", "")
+
+
+def printable(text: str) -> str:
+    """Return a text without control characters, which no SVG may hold, and cut if it is endless."""
+    return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", text if len(text) <= LONGEST else f"{text[:LONGEST]}...")
+
+
+def is_signs(name: str) -> bool:
+    """Return whether the name of a mode consists of the signs of its motors ("+-+-")."""
+    return bool(name) and set(name) <= {"+", "-"}
