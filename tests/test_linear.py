@@ -418,7 +418,7 @@ def test_labelled_arrays():
 
 def test_what_cannot_be_linearised_is_named(raparm_at_q):
     mechanism, _ = raparm_at_q
-    with pytest.raises(InputError, match="no input"):
+    with pytest.raises(InputError, match="not one of the inputs"):
         linearise(mechanism).zeros(inputs=["tau9"])
     with pytest.raises(InputError, match="unknown point"):
         linearise(mechanism, forces=["link1.Z"])

@@ -314,7 +314,7 @@ TWO = scipy.linalg.block_diag(oscillator()[0], oscillator(47.0, 0.0)[0])
         ({"state_weights": np.eye(3)}, "state_weights", "numbers"),
         ({"state_weights": -np.eye(4)}, "state_weights", "semi"),
         ({"measured": ["y2"]}, "measured", "free motion"), ({"delay": -1.0}, "delay", "negative"),
-        ({"deviations": {"y2": 0.1}, "state_weights": None}, "deviations", "best"),
+        ({"deviations": {"y2": 0.1}, "state_weights": None}, "deviations", "no optimal feedback"),
         ({"coloured": {"u7": (1.0, 1.0)}}, "coloured", "unknown"), ({"coloured": {"u1": 1.0}}, "coloured.u1", "pair"),
         ({"coloured": {"u1": (-1.0, 1.0)}}, "coloured.u1", "positive"),
         ({"coloured": {"u1": (1.0, -1.0)}}, "coloured.u1", "positive"),

@@ -17,7 +17,7 @@ from shell import paraflex
 
 def test_travel_beyond_the_reach_of_a_crank_names_the_joint_and_keeps_the_steps():
     crank = pf.load("slider_crank")
-    with pytest.raises(LimitPointError, match=r"travel of rail by 1 m: the branch turns back there") as caught:
+    with pytest.raises(LimitPointError, match=r"travel of rail by 1 m\): the branch turns back there") as caught:
         pf.statics(crank, moved={"rail": 1.0}, held=[], steps=100, stiffness=["slider.B.x"])
     found = caught.value.partial
     assert found.status == "failed"

@@ -168,7 +168,7 @@ def test_many_runs_need_a_folder(studies, kind):
 
 @pytest.mark.parametrize("kind", ["verification", "comparison", "sensitivity"])
 def test_what_runs_one_after_the_other_takes_no_workers(studies, kind):
-    with pytest.raises(InputError, match=r"workers: .* after the other; leave it out"):
+    with pytest.raises(InputError, match=r"workers: .* after another; leave it out"):
         studies[kind].run(workers=Workers())
 
 
