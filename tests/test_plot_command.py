@@ -117,7 +117,8 @@ def _runs(folder: Path) -> None:
     (folder / "linear").mkdir()
     save_results(pf.linear_dataset([each[1] for each in linear], along=linear), folder / "linear" / "linear.nc")
     (folder / "statics").mkdir()
-    pushed = pf.statics(pf.load("leaf_spring_guide"), loads={"stage.T.x": 5.0, "stage.T.y": -20.0}, steps=3, buckling=2)
+    pushed = pf.statics(pf.load("leaf_spring_guide"), loads={"stage.T.x": 5.0, "stage.T.y": -20.0}, steps=3, buckling=2,
+                       stiffness=["stage.T.x", "stage.T.angle"])  # fmt: skip
     save_results(pf.statics_dataset(pushed), folder / "statics" / "statics.nc")
     (folder / "reduction").mkdir()
     # Of few states: the fewest that are needed are sought among all.

@@ -10,6 +10,7 @@ import pytest
 import paraflex as pf
 from flexures import guide, truss
 from paraflex.errors import LimitPointError
+from paraflex.figures.charts import is_logarithmic, joined
 from paraflex.report import render, save_page, statics_page
 from paraflex.results import load_results
 from shell import paraflex
@@ -35,12 +36,15 @@ def test_tiles_tables_and_charts_have_the_numbers_of_the_dataset(pushed):
     assert ("force of stage.T.x", "10.6 N", "moved: 10 mm") in page.figures
     assert ("stiffness of stage.T.y", "5.272 kN/mm", "42 kN/mm at the start") in page.figures
     force = charts(page)["force-0"].curves[0]
-    assert np.asarray(force.x) == pytest.approx(1e3 * pushed["travel"].sel(named="stage.T.x").values)
+    assert np.asarray(force.x) == pytest.approx(pushed["travel"].sel(named="stage.T.x").values)
     assert np.asarray(force.y) == pytest.approx(pushed["effort"].sel(named="stage.T.x").values)
+    assert charts(page)["force-0"].shown_units().x.name == "mm"
     # 1 and 42000 N/mm in one chart.
-    assert charts(page)["stiffness-m"].log
+    stiffness = charts(page)["stiffness-m"]
+    assert is_logarithmic(stiffness.axis(None), joined(curve.y for curve in stiffness.curves))
+    assert not charts(page)["force-0"].axis(None).log
     sinks = charts(page)["travels"].curves[0]
-    assert np.asarray(sinks.y)[-1] == pytest.approx(1e3 * pushed["travel"].sel(named="stage.T.y").values[-1])
+    assert np.asarray(sinks.y)[-1] == pytest.approx(pushed["travel"].sel(named="stage.T.y").values[-1])
     titles = [title for title, _ in page.more]
     assert titles == ["At the last step", "Steps", "Stresses of beams", "Reactions"]
     assert "buckling" not in charts(page)
