@@ -43,6 +43,8 @@ _PREFIXES = {
     "N/m": (DisplayUnit("kN/mm", 1e-6), DisplayUnit("N/mm", 1e-3), DisplayUnit("N/m", 1.0)),
     "m/N": (DisplayUnit("mm/N", 1e3), DisplayUnit("µm/N", 1e6), DisplayUnit("nm/N", 1e9)),
 }
+# Magnitude from which a small value of several stands in the unit of the largest.
+_FEW_ZEROS = 0.01
 # Smallest peak for which a unit is used; GPa is for moduli, stresses are in MPa.
 _LEAST, _LEAST_OF = 0.1, {"GPa": 2.0, "kN/mm": 1.0}
 
@@ -167,13 +169,15 @@ def common_unit(unit: str, values: Iterable[float | None] | ArrayLike, *, beside
     if not known.size:
         return display_unit(unit, 0.0)
     least, most = float(known.min()), float(known.max())
+    choices, first = display_units(unit), display_unit(unit, most)
+    rest = choices[choices.index(first) :]
     fits = (
         one
-        for smallest in (_LEAST, _SMALLEST_PLAIN)
-        for one in display_units(unit)
-        if least * one.factor >= _LEAST_OF.get(one.name, smallest) and most * one.factor < 0.1 * _LARGEST_PLAIN
+        for smallest in (_FEW_ZEROS, _SMALLEST_PLAIN)
+        for one in rest
+        if least * one.factor >= smallest and most * one.factor < 0.1 * _LARGEST_PLAIN
     )
-    return next(fits, display_unit(unit, most))
+    return next(fits, first)
 
 
 def peak(values: ArrayLike) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from rich.console import Console
 
-from paraflex.cli.tables import print_table
+from paraflex.cli.tables import print_tables
 from paraflex.figures.equilibria import (
     buckling_words,
     is_stressed,
@@ -27,10 +27,7 @@ def print_statics(out: Console, data: xr.Dataset) -> None:
     points = len(summary["limit_points"])
     also = f", {points} limit point{'s' * (points > 1)}" if points else ""
     out.print(f"{data.attrs['mechanism']}: {data.sizes['step']} equilibria{also}", soft_wrap=True)
-    if data.sizes["step"] > 1:
-        print_table(out, step_table(data))
-    for table in last_tables(data):
-        print_table(out, table)
+    print_tables(out, [*([step_table(data)] if data.sizes["step"] > 1 else []), *last_tables(data)])
     for line in _lines(data, summary):
         out.print(line, soft_wrap=True)
 

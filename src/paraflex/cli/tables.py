@@ -185,9 +185,10 @@ def framed_table(title: str, headings: Iterable[str], right: Container[int] = ()
     return table
 
 
-def print_table(console: Console, shown: Described, title: str | None = None) -> None:
-    """Print a described table below its title; nothing if it has no rows."""
-    if shown:
+def print_tables(console: Console, tables: Iterable[Described]) -> None:
+    """Print tables that have rows below their titles, a title that several share only once."""
+    title = None
+    for shown in filter(None, tables):
         heads = [f"{name}\n[{unit}]" if unit and column.is_numeric else "\n".join(filter(None, (name, unit)))
                  for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
         table = plain_table()
@@ -195,7 +196,10 @@ def print_table(console: Console, shown: Described, title: str | None = None) ->
             table.add_column(head, justify="right" if column.is_numeric else "left", no_wrap=True)
         for row in shown.texts():
             table.add_row(*row)
-        print_titled(console, shown.title if title is None else title, table)
+        if shown.title != title:
+            console.print(shown.title, soft_wrap=True)
+        console.print(table)
+        title = shown.title
 
 
 def print_titled(console: Console, title: str, table: Table) -> None:
