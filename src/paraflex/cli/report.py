@@ -53,6 +53,6 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
     """Return the report of a dataset and of the summary in its folder."""
     kind = RESULT_KINDS[kind_of(data)]
     kind.refuse("page", str(folder))
-    module, _, function = kind.page.partition(".")
+    module, _, function = (kind.page or "kind_page.kind_page").partition(".")
     page = getattr(import_module(f"paraflex.report.{module}"), function)
     return page(data, folder) if kind.with_folder else page(data)

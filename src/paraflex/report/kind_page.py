@@ -1,0 +1,39 @@
+"""Report of any kind of results whose charts and tables are described in `paraflex.figures`."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import xarray as xr
+
+from paraflex.arguments import checked_arguments
+from paraflex.figures.catalogue import page_panels
+from paraflex.folders.kinds import RESULT_KINDS
+from paraflex.report.page import Page
+from paraflex.report.provenance import verdict_word
+from paraflex.report.text import sections
+from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.kinds import kind_of
+
+
+@checked_arguments()
+def kind_page(data: xr.Dataset) -> Page:
+    """Return the report of results: the tables and charts of the modules that their kind names.
+
+    A module of `paraflex.figures` may define `tables(data)`, which yields tables, and `tiles(data)`, which returns the
+    main numbers as name, value, and the member that they refer to.
+    """
+    kind = kind_of(data)
+    modules = [import_module(f"paraflex.figures.{name}") for name in RESULT_KINDS[kind].figures]
+    tables = (table for module in modules if hasattr(module, "tables") for table in module.tables(data))
+    return Page(
+        title=str(data.attrs.get("mechanism", kind)),
+        kind=kind,
+        verdict=verdict_word(data) if "status" in data else "",
+        facts=[(name, str(data.attrs[name])) for name in ("paraflex_version",) if name in data.attrs],
+        figures=[tile for module in modules if hasattr(module, "tiles") for tile in module.tiles(data)],
+        more=sections(tables),
+        panels=page_panels(kind, data),
+        time=data["time"].values if "time" in data.dims else (),
+        notes=doubt_lines(verdict_of(data)),
+    )
