@@ -11,7 +11,8 @@ import scipy.linalg
 
 import paraflex as pf
 from paraflex.dynamics import build_system
-from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
+from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.sparse import sparse_mass, stiffness_diagonal
 from paraflex.dynamics.state import State, nearest_state
 from paraflex.errors import InputError
