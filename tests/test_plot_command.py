@@ -27,7 +27,7 @@ from paraflex.control import (
 )
 from paraflex.errors import InputError
 from paraflex.mechanism import Motor
-from paraflex.plots.catalogue import CATALOGUE, homes
+from paraflex.plots.catalogue import CATALOGUE, FIGURES
 from paraflex.plots.designs import undominated
 from paraflex.plots.labels import axis_label, logarithmic_number, metric_name
 from paraflex.plots.layout import MM, column_width
@@ -219,7 +219,7 @@ def test_every_figure_of_every_kind_at_both_widths(
 
 def test_catalogue_and_package_have_the_same_figures() -> None:
     named = {name for name in plots.__all__ if not name.startswith("save")}
-    assert named == set(homes())
+    assert named == FIGURES
     assert all(callable(getattr(plots, name)) for name in plots.__all__)
     for figures in CATALOGUE.values():
         names = [figure.name for figure in figures]

@@ -77,7 +77,7 @@ def save_overlays(comparison: RunComparison, folder: Path) -> list[Path]:
     """Write figures of all compared motions in all modes as PNG and return the files."""
     drawn = []
     for name, mode in dict.fromkeys((pair.name, pair.mode) for pair in comparison.motions):
-        listed = CatalogueFigure(f"overlaid_{name}", "compare", "curves of two runs")
+        listed = CatalogueFigure(f"overlaid_{name}", "curves of two runs")
         drawn.append(PlannedFigure(listed, mode, partial(overlaid_motion, comparison, name, mode)))
     return write_figures(drawn, folder, ("png",), dpi=200.0, force=True)
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from paraflex import plots
 from paraflex.errors import InputError, suggestion
-from paraflex.plots.catalogue import CATALOGUE, CatalogueFigure, homes
+from paraflex.plots.catalogue import CATALOGUE, FIGURES, CatalogueFigure
 from paraflex.plots.selection import default_mode, names_of, place_of, point_number, prototype_pair
 from paraflex.results.controllers import controller_names
 
@@ -80,7 +81,7 @@ def find_figure(source: Source, name: str) -> CatalogueFigure:
     names = [figure.name for figure in there]
     near = suggestion(name, names)
     listed = "" if near.startswith("choose from") else f" There are: {', '.join(names)}"
-    elsewhere = "" if name not in homes() else f", of results of kind {source.kind}"
+    elsewhere = "" if name not in FIGURES else f", of results of kind {source.kind}"
     raise InputError(f"no such figure{elsewhere}", field="FIGURE", value=name, remedy=near + listed)
 
 
@@ -142,7 +143,7 @@ def _of_modes(
     """Plan a figure of some results: one drawing, or one for each mode or run."""
 
     def planned(of: str, *given: Any) -> PlannedFigure:
-        return PlannedFigure(figure, of, partial(figure.function, *given))
+        return PlannedFigure(figure, of, partial(getattr(plots, figure.name), *given))
 
     data, shown = source.data, ",".join(modes)
     if figure.takes == "nothing":
