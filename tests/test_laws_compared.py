@@ -13,7 +13,7 @@ import paraflex as pf
 from paraflex import plots
 from paraflex.campaign import Workers
 from paraflex.cli.commands.control import CompareLawsRequest
-from paraflex.cli.control_tables import print_laws
+from paraflex.cli.control import print_laws
 from paraflex.cli.tables import plain_console
 from paraflex.control import ControllerDescription, PIDDescription, simulate_controlled
 from paraflex.control.laws.joints import internal_torques

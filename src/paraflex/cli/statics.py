@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import xarray as xr
+from rich.console import Console
 
 from paraflex.cli import COMPLETE, TROUBLE
 from paraflex.cli.commands.models import StaticsRequest
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
 from paraflex.cli.request import asked_model, asked_of, of_assembly
-from paraflex.cli.statics_tables import print_statics
+from paraflex.cli.tables import plain_table, print_titled
 from paraflex.equilibria import Statics, StaticsDefaults, statics
 from paraflex.equilibria.given import coordinate_named
 from paraflex.errors import AssemblyError, EquilibriumError, InputError, renamed
 from paraflex.files import Model
 from paraflex.files.fields import number_in
 from paraflex.results.statics_data import statics_dataset, statics_summary
+from paraflex.results.statics_rows import (
+    buckling_words,
+    four_digits,
+    is_stressed,
+    last_rows,
+    lowest_frequencies,
+    no_buckling,
+    step_table,
+)
+from paraflex.units import STRESS
 
 _NONE = "none"
 
@@ -28,9 +41,6 @@ def statics_command(request: StaticsRequest) -> int:
     model = asked_model(request.model)
     data = _COMMAND.run(request.files, lambda: _data(model, request))
     return COMPLETE if data["status"].item() == "complete" else TROUBLE
-
-
-_COMMAND = DatasetCommand("statics", statics_summary, print_statics)
 
 
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
@@ -106,3 +116,53 @@ def _parameters(model: Model, asked: StaticsDefaults, request: StaticsRequest) -
     given = {name: value for name, value in (vars(asked) | {"assembly": request.assembly}).items()
              if value is not None and value != {}}  # fmt: skip
     return asked_of(model, {"statics": True} | given)
+
+
+def print_statics(out: Console, data: xr.Dataset) -> None:
+    """Print equilibria: a table of steps, details of the last one, then frequencies, buckling, stress and validity."""
+    summary = statics_summary(data)
+    points = len(summary["limit_points"])
+    also = f", {points} limit point{'s' * (points > 1)}" if points else ""
+    out.print(f"{data.attrs['mechanism']}: {data.sizes['step']} equilibria{also}", soft_wrap=True)
+    if data.sizes["step"] > 1:
+        found = step_table(data)
+        heads = [f"{name}\n[{unit}]" if unit else name for name, unit in found.heads]
+        print_titled(out, found.title, plain_table("", numbers=heads, rows=found.rows))
+    if rows := list(last_rows(data)):
+        title = "At the last step" if data.sizes["step"] > 1 else "At rest"
+        numbers = ("travel", "force", "stiffness", "compliance")
+        print_titled(out, title, plain_table("coordinate", "", numbers=numbers, rows=rows))
+    for line in _lines(data, summary):
+        out.print(line, soft_wrap=True)
+
+
+def _lines(data: xr.Dataset, summary: dict) -> list[str]:
+    lines = []
+    last = data.isel(step=-1)
+    for name, word in lowest_frequencies(data).items():
+        kept = "moved coordinates released" if word == "free" else "held and moved coordinates fixed"
+        values = last[name].values[np.isfinite(last[name].values)]
+        known = ", ".join(map(four_digits, values))
+        kept += ", 0 for growing motions" if np.any(values == 0.0) else ""
+        lines.append(f"{'free ' if word == 'free' else ''}frequencies: {known} Hz, {kept}")
+    if words := buckling_words(data):
+        lines.append(f"buckling at {words}")
+    elif words := no_buckling(data):
+        lines.append(words)
+    if is_stressed(data):
+        body = int(np.nanargmax(data["stress_max"].values))
+        one = data.isel(body=body)
+        safety = float(one["safety_factor"])
+        also = "" if math.isnan(safety) else f"; safety factor {safety:.3g}"
+        lines.append(
+            f"largest stress {STRESS.factor * float(one['stress_max']):.4g} {STRESS.name} in {one['body'].item()} at "
+            f"{float(one['stress_place']):.3g} m, step {int(one['stress_step'])}{also}"
+        )
+    if data.sizes["step"] > 1 and summary["validity"] is not None and summary["validity"]["holds"]:
+        lines.append(f"validity: {summary['validity']['verdict']}")
+    if summary["status"] != "complete":
+        lines.append(f"error: {summary['message']}")
+    return lines
+
+
+_COMMAND = DatasetCommand("statics", statics_summary, print_statics)

@@ -36,7 +36,7 @@ from .linear import (
 )
 from .maps import response_map as response_map
 from .measured import sensors as sensors
-from .methods import work_precision as work_precision
+from .methods import numerical_damping as numerical_damping, work_precision as work_precision
 from .mode_shapes import mode_shapes as mode_shapes
 from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
@@ -50,7 +50,6 @@ from .reduction import (
 )
 from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
-from .spectra import numerical_damping as numerical_damping
 from .stress import (
     beam_stresses as beam_stresses,
     drive_efforts as drive_efforts,
