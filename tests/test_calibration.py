@@ -9,7 +9,7 @@ from made_up import STUDY, made_up, write_study
 from paraflex.plots import targets_reached
 from paraflex.studies import identify, load_identification
 from paraflex.studies.optimisation.confidence import ONE_DEVIATION, student_factor
-from paraflex.studies.optimisation.noise import NOISE_POINTS, noise_of
+from paraflex.studies.optimisation.slopes import NOISE_POINTS, noise_of
 
 FITS = 60
 # Five standard deviations of a binomial distribution would let anything pass; two and a half, one correct code in 80.

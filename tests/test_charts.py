@@ -124,7 +124,7 @@ def page_data(panels):
 def test_print_and_page_draw_the_same_curves(statics):
     charts, rows = page_data(page_panels("statics", statics))
     for name, entry in figures_of_kind("statics").items():
-        described = list(entry.charts(statics))
+        described = entry.describe(statics)
         figure = getattr(plots, name)(statics)
         for panel, chart in zip(figure.axes, described, strict=True):
             shown = charts[chart.identity]

@@ -11,7 +11,7 @@ import pytest
 import paraflex as pf
 from conftest import DESKTOP
 from paraflex.cli.repeated import repeated_runs
-from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.points import marker_place
 from paraflex.files import library_text
 from paraflex.linear.branches import pole_branches
 from paraflex.mechanism import Assembly, LossFactor, Mechanism, Motor, PointRef, RevoluteJoint

@@ -17,7 +17,7 @@ from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import ExpressionLaw, allowing_outside, library_file, load
 from paraflex.integrators import IntegrationOptions
-from paraflex.integrators.jumps import jump_times
+from paraflex.integrators.run import jump_times
 from paraflex.integrators.sensitivity import run_derivatives
 from paraflex.kinematics import Line
 from paraflex.mechanism import (

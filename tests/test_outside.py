@@ -18,8 +18,8 @@ from paraflex.integrators import METHODS, IntegrationOptions, integrate, make_pr
 from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.guests import Guest
 from paraflex.integrators.methods import BDF, RK45, find_method
+from paraflex.integrators.outside import largest_rate
 from paraflex.integrators.stepper import attempts
-from paraflex.integrators.stiffness import largest_rate
 from paraflex.mechanism import (
     Assembly,
     Curvature,

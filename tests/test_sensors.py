@@ -5,11 +5,13 @@ import dataclasses
 import math
 import tomllib
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import paraflex as pf
+from paraflex.control.loop.inside import packed_readings
 from paraflex.control.loop.readings import Readings
 from paraflex.dynamics import (
     build_system,
@@ -20,12 +22,13 @@ from paraflex.dynamics import (
     static_equilibrium,
 )
 from paraflex.dynamics.joint_loads import joint_loads
-from paraflex.dynamics.points import point_motion
+from paraflex.dynamics.points import marker_position, point_motion
 from paraflex.dynamics.reduction import missed_turns
 from paraflex.dynamics.state import reference_pose
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.files import model_from
+from paraflex.kernel.sampled import place_of
 from paraflex.mechanism import SENSOR_KINDS, Encoder, Sensor, StrainGauge
 from paraflex.mechanism.frames import in_frames
 from paraflex.mechanism.sensors import Location
@@ -224,6 +227,21 @@ def test_rows_touch_only_what_a_sensor_depends_on():
     assert touched["seen"] == {"first", "bar"}
     assert touched["gauge"] == {"first"}
     assert touched["stiff"] == set()
+
+
+@pytest.mark.parametrize("geometry", ["linear", "second-order"])
+def test_the_place_of_a_point_in_kernels_at_an_instant_and_over_time_is_one(geometry):
+    system = build_system(everything(geometry))
+    readings = Readings(system, [sensor for sensor in system.mechanism.sensors if sensor.name == "place"])
+    (place,), (point, _) = readings.places, readings.sensors[0].fixed_point
+    assert (place.marker.bending is not None) == (geometry == "second-order")
+    q = np.array([any_state(system, seed)[0] for seed in range(5)])
+    law = SimpleNamespace(**packed_readings(readings))
+    kernel = [place_of.py_func(law, 0, each) for each in q]
+    over_time = marker_position(system, place.marker, q)
+    assert kernel == pytest.approx([over_time[k] @ place.axis for k in range(5)], rel=1e-14)
+    assert np.array([marker_position(system, place.marker, each) for each in q]) == pytest.approx(over_time, rel=1e-14)
+    assert point_motion(system, point, q, q, q).position == pytest.approx(over_time, rel=1e-14)
 
 
 @pytest.mark.parametrize("geometry", ["linear", "second-order"])

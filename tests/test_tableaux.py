@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paraflex.integrators import METHODS
-from paraflex.integrators.tableaux.make import ESDIRK
+from paraflex.integrators.tableaux import ESDIRK
 
 
 def conditions(A, b, order):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from paraflex.checks.unused import file_findings
+from paraflex.checks.check import file_findings
 from paraflex.files import library_text, load_data, model_from
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
 from paraflex.files.expressions import ExpressionError, evaluate

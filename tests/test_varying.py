@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import paraflex as pf
 from paraflex.dynamics import State
-from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.points import marker_place
 from paraflex.errors import InputError, SingularPositionError
 from paraflex.linear.discrete import InputHold, transitions
 from paraflex.mechanism import Motor, PointRef

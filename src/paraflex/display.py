@@ -1,27 +1,19 @@
 """HTML views of objects in notebooks: plain tables that take their colours from the page, light or dark.
 
 The view of a mechanism or a run needs drawings and metrics, which import the classes of mechanisms and runs. Views are
-therefore registered by class with `view`, in higher modules, and `Shown` imports these when a notebook shows an object.
+therefore registered by class with `late.view` in higher layers.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from functools import singledispatch
 from html import escape
-from importlib import import_module
 from typing import Any
 
-# Modules that register views, imported in this order until the view of the class is registered.
-_VIEWS = ("paraflex.results.html", "paraflex.plots.mechanism_html", "paraflex.studies.html")
+from paraflex.late import view
+
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
-
-
-@singledispatch
-def view(thing: object) -> str:
-    """Return the HTML of an object; `view.register(CLASS)` registers the function for a class."""
-    raise TypeError(f"no view of {type(thing).__name__} is registered")
 
 
 class Shown:
@@ -29,9 +21,6 @@ class Shown:
 
     def _repr_html_(self) -> str:
         """Return the HTML for notebooks."""
-        for module in _VIEWS:
-            if view.dispatch(type(self)) is view.dispatch(object):
-                import_module(module)
         return view(self)
 
 

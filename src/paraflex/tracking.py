@@ -34,7 +34,7 @@ from paraflex.dynamics import (
     still_signals,
     undeformed_motion,
 )
-from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.points import marker_place
 from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate

@@ -1,15 +1,16 @@
-"""Checks of the pose a mechanism starts from: closure, special poses, freedoms driven by motors, vibrations."""
+"""Checks of the pose a mechanism starts from: closure, special poses, freedoms, vibrations, loose points."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
+from math import cos, sin
 
 import numpy as np
 
-from paraflex.checks.along import axes_along_beams
-from paraflex.checks.loose import loose_points
+from paraflex.arrays import Array
 from paraflex.dynamics import (
     Closure,
     Mobility,
@@ -17,6 +18,7 @@ from paraflex.dynamics import (
     System,
     build_system,
     closure_of,
+    joint_coordinate,
     mobility,
     natural_frequencies,
     reach,
@@ -24,14 +26,22 @@ from paraflex.dynamics import (
     undeformed,
 )
 from paraflex.dynamics.linearise import BALANCED as BALANCED, LOWEST
+from paraflex.dynamics.state import point_position
 from paraflex.errors import NumericalError, ProportionError
 from paraflex.findings import Finding
 from paraflex.limits import OUT_OF_PROPORTION
-from paraflex.mechanism import Mechanism, standing
+from paraflex.mechanism import FlexibleBeam, Mechanism, standing
+from paraflex.mechanism.joints import GROUND, PointRef
 from paraflex.validity import moved_far, stiff_modes
+from paraflex.validity.actions import numbered_alike
+from paraflex.validity.numbers import mechanism_size
 
 # Natural frequency below that of any link [Hz].
 SLOWEST_LINK = 0.1
+# Sine of the angle between an axis and its beam below which the axis is along the beam.
+_ALONG = 1e-6
+# Distance of two such points relative to the mechanism's size: without its joint an assembly closes only roughly.
+NEAR_POINTS = 0.2
 
 
 @dataclass(frozen=True)
@@ -168,3 +178,59 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
             f"{growing} {'motion grows' if growing == 1 else 'motions grow'} about the pose{held} instead of vibrating",
             "should it be unstable there? look at gravity's sign, springs and loads, or start from --balanced",
         )  # fmt: skip
+
+
+def axes_along_beams(mechanism: Mechanism, rigid: System, q: Array) -> Iterator[Finding]:
+    """Yield slots and prismatic joints whose axis is along a flexible beam and whose pin is on it, at rigid q (n,)."""
+    for joint in mechanism.joints:
+        beam = None if joint.a.on_ground else mechanism.body(joint.a.body)
+        if not joint.slides or joint.follows_beam or not isinstance(beam, FlexibleBeam) or not beam.flexible:
+            continue
+        start = beam.points[joint.a.point]
+        place = start + cos(joint.direction) * joint_coordinate(rigid, joint.name, q[None]).value[0]
+        if abs(sin(joint.direction)) < _ALONG and 0.0 < place < beam.length:
+            yield Finding(
+                "axis-along-beam", f"joint.{joint.name}",
+                f"its axis is a straight line through {joint.a}, which turns with the slope there: {joint.b}, at "
+                f"{place:.3g} m along {beam.name}, presses on it with a force and a moment at {joint.a}, not there",
+                f'if {joint.b} runs along {beam.name} as it bends, use type = "sliding"',
+            )  # fmt: skip
+
+
+def loose_points(rigid: System, q: Array) -> Iterator[Finding]:
+    """Yield unused points close to a point of the same name on another body, at coordinates q of the rigid mechanism.
+
+    B and B3 count as the same name if both points are unused.
+    """
+    mechanism = rigid.mechanism
+    unused = _unused(mechanism)
+    ground = [PointRef(GROUND, name) for name in mechanism.ground]
+    known = [*ground, *(PointRef(body.name, name) for body in mechanism.bodies for name in body.points)]
+    direct = {frozenset((one.a.body, one.b.body)) for one in mechanism.joints}
+    # An assembly by angles leaves the travels of sliding joints open.
+    sliding = {end.body for joint in mechanism.joints if joint.slides for end in (joint.a, joint.b)}
+    sliding.discard(GROUND)
+    reported: set[PointRef] = set()
+    size = mechanism_size(mechanism)
+    pairs: list[tuple[bool, float, PointRef, PointRef]] = []
+    for one, other in product(unused, known):
+        apart = one.body != other.body and frozenset((one.body, other.body)) not in direct
+        if apart and (one.point == other.point or (other in unused and numbered_alike(one, other))):
+            gap = float(np.linalg.norm(point_position(rigid, q, one) - point_position(rigid, q, other)))
+            if gap < size * (1.0 if {one.body, other.body} & sliding else NEAR_POINTS):
+                pairs.append((other not in unused, gap, one, other))
+    # Pairs with both points unused come first, then the nearest.
+    for _, gap, one, other in sorted(pairs, key=lambda pair: pair[:2]):
+        if not reported & {one, other}:
+            reported |= {one, other}
+            yield Finding(
+                "joint-missing", "joint", f"nothing holds {one} and {other}, which lie {gap:.3g} m apart",
+                "is a joint of the two missing?",
+            )  # fmt: skip
+
+
+def _unused(mechanism: Mechanism) -> list[PointRef]:
+    """Return the points of bodies that no joint, spring, load, lump or end-effector refers to."""
+    used = mechanism.points_used
+    named = [PointRef(body.name, name) for body in mechanism.bodies for name in body.points]
+    return [point for point in named if point not in used]

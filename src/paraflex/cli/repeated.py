@@ -9,10 +9,10 @@ from dataclasses import replace
 from functools import partial
 
 import xarray as xr
-from typer.main import get_command
+from typer.main import Typer, get_command
 
 from paraflex.cli.along import asked_tasks, own_method
-from paraflex.cli.commands.requests import filled
+from paraflex.cli.commands.requests import filled, with_options
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import integration_options
 from paraflex.cli.motion import free_run, own_motion, start_of
@@ -69,8 +69,6 @@ def _model(data: xr.Dataset, request: RunRequest, results: str) -> Model:
 
 
 def _request(data: xr.Dataset, results: str) -> RunRequest:
-    from paraflex.cli.app import app  # imported here because it imports the commands
-
     run = asked(data)
     if not run or run.get("ked"):
         why = (
@@ -79,7 +77,9 @@ def _request(data: xr.Dataset, results: str) -> RunRequest:
             else "stored without the command that made them"
         )
         raise InputError(f"these results are {why}", field=results, remedy=_OTHER)
-    command = get_command(app).commands["run"]  # type: ignore[attr-defined]
+    app = Typer(add_completion=False)
+    app.command("run")(with_options(RunRequest, lambda _: None))
+    command = get_command(app)
     return filled(RunRequest, command.make_context("run", shlex.split(run_command_line(run))[2:]).params)
 
 

@@ -19,7 +19,7 @@ from paraflex.control.loop.simulation import Simulation
 from paraflex.control.loop.together import by_name, checked_number, periods_in
 from paraflex.control.observations import WIDEST, Observer, observed_sensors
 from paraflex.dynamics import State
-from paraflex.dynamics.joint_coordinates import marker_position
+from paraflex.dynamics.points import marker_position
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Method
 from paraflex.kinematics import ModelWithPaths
@@ -274,7 +274,7 @@ class Environment(Env[Array, NDArray[Any]]):
         effector = self.simulation.system.mechanism.end_effector
         if self._desired is not None and effector is not None:
             system = self.simulation.system
-            place = marker_position(system, system.marker(effector.point), self.simulation.state.q[None])[0]
+            place = marker_position(system, system.marker(effector.point), self.simulation.state.q)
             info["deviation"] = float(np.linalg.norm(place - self._desired[self._step]))
         return info
 

@@ -1,7 +1,6 @@
 """Equations of motion of a mechanism: its system of constant arrays, consistent states, equilibria, linearisation."""
 
 from paraflex.dynamics.brake import Braked as Braked, brake as brake
-from paraflex.dynamics.chord import across_chord as across_chord
 from paraflex.dynamics.coordinates import (
     BodyCoordinates as BodyCoordinates,
     Marker as Marker,
@@ -21,6 +20,7 @@ from paraflex.dynamics.joint_coordinates import (
 from paraflex.dynamics.linearise import Vibration as Vibration, natural_frequencies as natural_frequencies
 from paraflex.dynamics.numbers import numbers_of as numbers_of, same_layout as same_layout, with_numbers as with_numbers
 from paraflex.dynamics.packing import records as records
+from paraflex.dynamics.points import across_chord as across_chord
 from paraflex.dynamics.quasi_static import (
     JointMotion as JointMotion,
     balanced_state as balanced_state,

@@ -121,11 +121,15 @@ class Marker:
         """Marker at the same position, fixed to the body frame, without the deformation."""
         return replace(self, N=np.zeros_like(self.N), slope=np.zeros_like(self.slope), bending=None)
 
+    def relative_to(self, other: Marker) -> Marker:
+        """Return the marker whose `place` is relative to another point of the body, which bending does not shorten."""
+        return replace(self, x0=self.x0 - other.x0, N=self.N - other.N, slope=self.slope - other.slope)
+
     def place(self, u: Array) -> Array:
-        """Return the position in the body frame (2,) for flexible coordinates u (nf,)."""
-        s = self.x0 + self.N @ u
+        """Return the position in the body frame (..., 2), x0 + N u - (u^T B u / 2, 0), for coordinates u (..., nf)."""
+        s = self.x0 + u @ self.N.T
         if self.bending is not None:
-            s[0] -= 0.5 * (u @ self.bending @ u)
+            s[..., 0] -= 0.5 * (u * (u @ self.bending)).sum(-1)
         return s
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
+from paraflex.dynamics.points import marker_place, marker_position
 from paraflex.dynamics.system import System
 from paraflex.mechanism import Joint, PointRef
 
@@ -86,34 +87,3 @@ def _marker_angle(system: System, marker: Marker, q: Array) -> tuple[Array, Arra
     rows[:, body.angle] = 1.0
     rows[:, body.flexible] = marker.slope
     return np.sum(rows * q, axis=1), rows
-
-
-def marker_place(system: System, marker: Marker, q: Array) -> tuple[Array, Array]:
-    """Return the position (k, 2) of a point in the ground frame, and its derivative (k, 2, n): [1, R E s, R ds/du]."""
-    rows = np.zeros((q.shape[0], 2, q.shape[1]), dtype=np.result_type(q, marker.x0, marker.N))
-    position = marker_position(system, marker, q)
-    if marker.body == GROUND_INDEX:
-        return position, rows
-    body = system.bodies[marker.body]
-    c, s = np.cos(q[:, body.angle]), np.sin(q[:, body.angle])
-    R = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
-    shape = np.broadcast_to(marker.N, (q.shape[0], *marker.N.shape)).astype(rows.dtype)
-    if marker.bending is not None:
-        shape[:, 0] -= q[:, body.flexible] @ marker.bending
-    arm = position - q[:, body.position]
-    rows[:, 0, body.offset] = rows[:, 1, body.offset + 1] = 1.0
-    rows[:, 0, body.angle], rows[:, 1, body.angle] = -arm[:, 1], arm[:, 0]
-    rows[:, :, body.flexible] = R @ shape
-    return position, rows
-
-
-def marker_position(system: System, marker: Marker, q: Array) -> Array:
-    """Return the position (k, 2) of a material point in the ground frame."""
-    if marker.body == GROUND_INDEX:
-        return np.broadcast_to(marker.x0, (q.shape[0], 2))
-    body = system.bodies[marker.body]
-    c, s, u = np.cos(q[:, body.angle]), np.sin(q[:, body.angle]), q[:, body.flexible]
-    x, y = (marker.x0 + u @ marker.N.T).T
-    if marker.bending is not None:
-        x = x - 0.5 * np.sum(u * (u @ marker.bending), axis=1)
-    return q[:, body.position] + np.stack([c * x - s * y, s * x + c * y], axis=1)

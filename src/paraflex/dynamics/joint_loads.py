@@ -17,8 +17,8 @@ from paraflex.arrays import Array
 from paraflex.dynamics.constraints import RowTerm, Term
 from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
 from paraflex.dynamics.following import driven_rows
-from paraflex.dynamics.joint_coordinates import axis_angle, line_direction, marker_place
-from paraflex.dynamics.points import point_motion
+from paraflex.dynamics.joint_coordinates import axis_angle, line_direction
+from paraflex.dynamics.points import marker_place, point_motion
 from paraflex.dynamics.rank import NO_PART, dependence
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import ANGLE, POINT

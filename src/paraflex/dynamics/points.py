@@ -1,4 +1,4 @@
-"""Motion of named points and beam tips from coordinates over time, vectorised over samples."""
+"""Motion of named points, beam tips and deflections from chords, from coordinates over time (k, n)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.coordinates import Marker, end_markers
+from paraflex.dynamics.coordinates import GROUND_INDEX, Marker, end_markers
 from paraflex.dynamics.system import System
 from paraflex.mechanism import PointRef
 
@@ -23,6 +23,35 @@ class PointMotion(NamedTuple):
 def point_motion(system: System, ref: PointRef, q: Array, v: Array, a: Array) -> PointMotion:
     """Return the motion of a named point for coordinates (k, n) and their derivatives."""
     return marker_motion(system, system.marker(ref), q, v, a)
+
+
+def marker_position(system: System, marker: Marker, q: Array) -> Array:
+    """Return the position (..., 2) of a material point in the ground frame for coordinates (..., n)."""
+    if marker.body == GROUND_INDEX:
+        return np.broadcast_to(marker.x0, (*q.shape[:-1], 2))
+    body, at = system.bodies[marker.body], q.T
+    x, y = marker.place(q[..., body.flexible]).T
+    c, s = np.cos(at[body.angle]), np.sin(at[body.angle])
+    return np.array([at[body.offset] + (c * x - s * y), at[body.offset + 1] + (s * x + c * y)]).T
+
+
+def marker_place(system: System, marker: Marker, q: Array) -> tuple[Array, Array]:
+    """Return the position (k, 2) of a point in the ground frame, and its derivative (k, 2, n): [1, R E s, R ds/du]."""
+    rows = np.zeros((q.shape[0], 2, q.shape[1]), dtype=np.result_type(q, marker.x0, marker.N))
+    position = marker_position(system, marker, q)
+    if marker.body == GROUND_INDEX:
+        return position, rows
+    body = system.bodies[marker.body]
+    c, s = np.cos(q[:, body.angle]), np.sin(q[:, body.angle])
+    R = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
+    shape = np.broadcast_to(marker.N, (q.shape[0], *marker.N.shape)).astype(rows.dtype)
+    if marker.bending is not None:
+        shape[:, 0] -= q[:, body.flexible] @ marker.bending
+    arm = position - q[:, body.position]
+    rows[:, 0, body.offset] = rows[:, 1, body.offset + 1] = 1.0
+    rows[:, 0, body.angle], rows[:, 1, body.angle] = -arm[:, 1], arm[:, 0]
+    rows[:, :, body.flexible] = R @ shape
+    return position, rows
 
 
 def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) -> PointMotion:
@@ -41,10 +70,9 @@ def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) 
         return np.column_stack([-x[:, 1], x[:, 0]])
 
     u, du, ddu = q[:, body.flexible], v[:, body.flexible], a[:, body.flexible]
-    local, rate, second = marker.x0 + u @ marker.N.T, du @ marker.N.T, ddu @ marker.N.T
+    local, rate, second = marker.place(u), du @ marker.N.T, ddu @ marker.N.T
     if marker.bending is not None:
         bu, bdu = u @ marker.bending, du @ marker.bending
-        local[:, 0] -= 0.5 * np.sum(u * bu, axis=1)
         rate[:, 0] -= np.sum(du * bu, axis=1)
         second[:, 0] -= np.sum(ddu * bu + du * bdu, axis=1)
     return PointMotion(
@@ -69,11 +97,39 @@ def tip_deflection(system: System, name: str, q: Array) -> Array:
     if not ends:
         return np.full((q.shape[0], 3), np.nan)
     u, first, last = q[:, body.flexible], ends[0], ends[-1]
-    length = last.x0 - first.x0
-    apart = length + u @ (last.N - first.N).T
-    if last.bending is not None:
-        apart[:, 0] -= 0.5 * np.sum(u * (u @ last.bending), axis=1)
-    root = u @ first.slope
+    chord = last.relative_to(first)
+    apart, root = chord.place(u), u @ first.slope
     cos, sin = np.cos(root), np.sin(root)
     along = np.column_stack([cos * apart[:, 0] + sin * apart[:, 1], cos * apart[:, 1] - sin * apart[:, 0]])
-    return np.column_stack([along - length, u @ last.slope - root])
+    return np.column_stack([along - chord.x0, u @ last.slope - root])
+
+
+def across_chord(stations: Array, rest: Array) -> Array:
+    """Return the displacements (k, s) of stations of a deformed body across its chord [m], positive to the left.
+
+    The chord is the line from the first station to the last. Displacements count from the positions that the stations
+    have relative to the chord of the undeformed body; for a beam these are on the chord. Rigid motion has no effect.
+
+    Parameters
+    ----------
+    stations : (k, s, 2) array
+        Positions of the stations in any frame [m]; real or with a complex step.
+    rest : (s, 2) array
+        Positions of the stations in the undeformed body [m].
+
+    Returns
+    -------
+    (k, s) array
+        Displacements [m]; NaN where the first and last stations of the undeformed body coincide.
+    """
+    return _across(stations) - _across(rest[None])
+
+
+def _across(stations: Array) -> Array:
+    """Return the coordinates of stations normal to the line from the first to the last."""
+    arms = stations - stations[:, :1]
+    x, y = arms[:, -1:, 0], arms[:, -1:, 1]
+    # Roots and products only, no norm or modulus: these are analytic, as a complex step requires.
+    length = np.sqrt(x**2 + y**2)
+    length = np.where(length == 0.0, np.nan, length)
+    return (x * arms[:, :, 1] - y * arms[:, :, 0]) / length

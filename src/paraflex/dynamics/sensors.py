@@ -16,9 +16,9 @@ import scipy
 
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.contacts import sliding_joints
-from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, line_direction, marker_position
+from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, line_direction
 from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
-from paraflex.dynamics.points import point_motion
+from paraflex.dynamics.points import marker_position, point_motion
 from paraflex.dynamics.sections import section_at
 from paraflex.dynamics.system import System
 from paraflex.errors import InputError
@@ -199,10 +199,7 @@ class _LocalInputs:
     def displacement(self, point: PointRef) -> Numbers:
         marker = self._system.marker(point)
         u = self._at.q[:, self._system.bodies[marker.body].flexible]
-        x, y = u @ marker.N[0], u @ marker.N[1]
-        if marker.bending is not None:
-            x = x - 0.5 * np.sum(u * (u @ marker.bending), axis=1)
-        return np.column_stack([x, y, u @ marker.slope])
+        return np.column_stack([marker.relative_to(marker.on_frame).place(u), u @ marker.slope])
 
     def origin(self, body: str) -> Numbers:
         return self._at.q[:, self._system.body(body).position]

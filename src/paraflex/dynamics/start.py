@@ -14,7 +14,8 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
-from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
+from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals

@@ -13,7 +13,7 @@ import scipy
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
-from paraflex.dynamics.joint_coordinates import marker_position
+from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import (
     NAMED,
     assemble,
@@ -163,7 +163,7 @@ def reference_pose(system: System, assembly: Assembly) -> Array:
 
 def point_position(system: System, q: Array, ref: PointRef) -> Array:
     """Return the ground-frame position (2,) of a named point at q [m]."""
-    return marker_position(system, system.marker(ref), q[None])[0]
+    return marker_position(system, system.marker(ref), q)
 
 
 def assembled_position(system: System, signals: Signals, t: float, q: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -137,9 +137,9 @@ class System:
         """Index of each body by name."""
         return {body.name: i for i, body in enumerate(self.bodies)}
 
-    def once(self, name: str, make: Callable[[], T]) -> T:
+    def once(self, name: Hashable, make: Callable[[], T]) -> T:
         """Return a quantity that depends on the system alone, computed by `make` once and cached by name."""
-        kept: dict[str, Any] = vars(self).setdefault("_kept", {})
+        kept: dict[Hashable, Any] = vars(self).setdefault("_kept", {})
         if name not in kept:
             kept[name] = make()
         return kept[name]
@@ -155,6 +155,9 @@ class System:
 
     def marker(self, ref: PointRef) -> Marker:
         """Return the material point of a name, on a body as described or on a part of it."""
+        return self.once(ref, lambda: self._marker(ref))
+
+    def _marker(self, ref: PointRef) -> Marker:
         cut = self.mechanism.cut
         return make_marker(self.mechanism, self.bodies, self.index, ref if cut is None else cut.points.get(ref, ref))
 

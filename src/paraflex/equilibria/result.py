@@ -13,15 +13,17 @@ from paraflex.arguments import checked_arguments, given_as
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import System
+from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.rank import NO_PART, Dependence, dependence
+from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.equilibria.branch import Point
 from paraflex.equilibria.equations import Equations
 from paraflex.equilibria.given import Coordinate
-from paraflex.equilibria.solution import resting_solution
 from paraflex.equilibria.stability import Buckling, Vibrations
 from paraflex.errors import InputError, suggestion
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
+from paraflex.kernel.packed import SPRING
 from paraflex.mechanism.quantities import known
 from paraflex.validity import Validity, assess, doubtful_stresses, shared_loads
 
@@ -230,3 +232,36 @@ class Statics(Shown):
         name = max(rigid, key=lambda body: float(np.max(np.abs(rigid[body]))))
         which = int(np.argmax(np.abs(rigid[name])))
         return f"{self.system.carrier(name)[0]} {('moves along x', 'moves along y', 'turns')[which]} most"
+
+
+def resting_solution(
+    system: System, q: Array, multipliers: Array, acting: NDArray[np.int64], status: str, message: str
+) -> Solution:
+    """Return samples at rest with coordinates (k, n) and multipliers (k, m), numbered in place of times.
+
+    `acting` holds the numbers of the rows that act.
+    """
+    zeros = np.zeros(len(q))
+    return Solution(
+        t=np.arange(len(q), dtype=float), q=q, v=np.zeros_like(q), a=np.zeros_like(q), multipliers=multipliers,
+        kinetic_energy=zeros, strain_energy=strain_energy(system, q, multipliers), work=zeros, status=status,
+        message=message, steps=len(q), rejected=0, newton_iterations=0, factorisations=0, wall_time=0.0,
+        constraint_position_max=0.0, constraint_velocity_max=0.0, energy_balance_max=0.0, resting=True,
+        acting=acting,
+    )  # fmt: skip
+
+
+def strain_energy(system: System, q: Array, multipliers: Array) -> Array:
+    """Return the energy (k,) of beams, springs at joints, and springs between points [J]."""
+    rows = system.packed.rows
+    energy = 0.5 * q**2 @ stiffness_diagonal(system)
+    energy += 0.5 * multipliers**2 @ np.where(rows["kind"] == SPRING, rows["compliance"], 0.0)
+    still = np.zeros_like(q)
+    for spring in system.mechanism.linear_springs:
+        ends = (
+            np.array(system.mechanism.ground[end.point]) if end.on_ground
+            else point_motion(system, end, q, still, still).position for end in (spring.a, spring.b)
+        )  # fmt: skip
+        distance = np.linalg.norm(np.subtract(*ends), axis=1)
+        energy += 0.5 * spring.stiffness * (distance - spring.length) ** 2
+    return energy

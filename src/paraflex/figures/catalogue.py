@@ -37,9 +37,8 @@ class Figure:
     shows : str
         Description in one line.
     charts : callable
-        Function that takes the results, and options by keyword, and returns the charts; none for a drawing.
-    module : str
-        Module of `paraflex.plots` that defines a drawing; empty for a figure with charts.
+        Function that takes the results, and options by keyword, and returns the charts; None for a drawing, which is a
+        function of `paraflex.plots`.
     heading : str
         Heading of the charts on the page of a report; empty if the page does not show them.
     takes : str
@@ -60,8 +59,7 @@ class Figure:
 
     name: str
     shows: str
-    charts: Charts = tuple
-    module: str = ""
+    charts: Charts | None = None
     heading: str = ""
     takes: Takes = "results"
     written_as: str = ""
@@ -75,7 +73,12 @@ class Figure:
         """Check whether the results have the variables of the figure and, unless it is a drawing, any charts of it."""
         if not all(name in data for name in self.variables):
             return False
-        return bool(self.module) or any(True for _ in self.charts(prepared(data)))
+        return self.charts is None or any(True for _ in self.charts(prepared(data)))
+
+    def describe(self, data: Any, **options: Any) -> list[Chart]:
+        """Return the charts of results from `prepared`."""
+        assert self.charts is not None
+        return list(self.charts(data, **options))
 
 
 def prepared(data: Any, mode: str | None = None) -> Any:
@@ -124,5 +127,5 @@ def page_panels(kind: str, data: Any) -> list[Panel]:
     data = prepared(data)
     for one in figures_of_kind(kind).values():
         if one.heading and all(name in data for name in one.variables):
-            headings.setdefault(one.heading, []).extend(one.charts(data))
+            headings.setdefault(one.heading, []).extend(one.describe(data))
     return [Panel(heading, charts) for heading, charts in headings.items() if charts]

@@ -27,6 +27,7 @@ from paraflex.files.study import StudyDefaults, check_study
 from paraflex.files.tables import model_tables
 from paraflex.findings import warn_of
 from paraflex.kinematics import Path
+from paraflex.late import save_file
 from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode, standing
 from paraflex.mechanism.quantities import known
 from paraflex.tracking import Ending, TrackingTask, plan_tracking
@@ -263,6 +264,11 @@ class Model(CheckedFields):
         path = FilePath(path)
         data = with_names(_data(self), self.text, path.parent)
         write_text(path, document_text(data, self.text), remedy="choose another file")
+
+
+@save_file.register(Mechanism)
+def _save_mechanism(mechanism: Mechanism, path: str | FilePath) -> None:
+    Model(mechanism).save(path)
 
 
 @checked_arguments(model="give a model, the name or the file of one, or a mechanism")

@@ -11,8 +11,8 @@ import scipy
 
 from paraflex.arrays import Array
 from paraflex.dynamics import State
-from paraflex.integrators import native
 from paraflex.integrators.event_functions import EventFunction
+from paraflex.integrators.native import NativeRun, prepare
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Instant, Problem, Run
 from paraflex.kernel.bodies import weight_work
@@ -133,11 +133,11 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
     return Samples(*joined)
 
 
-def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> native.NativeRun:
+def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> NativeRun:
     """Return a run started from a state, used only for its first sample and the power there."""
     moment = {"times": np.array([t]), "stops": np.array([t + problem.span]), "asked": np.ones(1, dtype=bool)}
     here = replace(problem, initial=State(t, q, v), **moment)
-    begun = native.prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))
+    begun = prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))
     begun.start()
     return begun
 

@@ -22,7 +22,6 @@ from paraflex.errors import (
     SingularPositionError,
     SliderOffBeamError,
 )
-from paraflex.integrators import native, outside
 from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
 from paraflex.integrators.between import samples_too_few, with_between
 from paraflex.integrators.crossing import Crossing, advance, samples_until
@@ -30,7 +29,9 @@ from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
 from paraflex.integrators.limits import elements_too_few
 from paraflex.integrators.method import Family, NativeMethod
+from paraflex.integrators.native import own, prepare as prepare_native
 from paraflex.integrators.options import IntegrationOptions, loose_tolerance, refuse_tolerance
+from paraflex.integrators.outside import prepare as prepare_outside
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Instant, Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
@@ -210,11 +211,11 @@ class Integration:
 
     def resume(self) -> None:
         """Let the next step compute accelerations and multipliers again, as an input changes at the current time."""
-        native.own(self.run).resume()
+        own(self.run).resume()
 
     def under(self, law: SampledLaw | None) -> None:
         """Set a sampled controller, which acts from now on in the time loop of own methods; None for no controller."""
-        run = native.own(self.run)
+        run = own(self.run)
         self.run = replace(run, law=no_law() if law is None else law)
 
     def march(self, until: float | None = None, *, on_progress: Callable[[float], None] | None = None) -> None:
@@ -222,7 +223,7 @@ class Integration:
 
         It stops earlier at an event, or if the run cannot go on. Only own methods advance to a time before the end.
         """
-        run = self.run if until is None else native.own(self.run).until(until)
+        run = self.run if until is None else own(self.run).until(until)
         self._code = PAUSED
         if self.status == "interrupted":
             self.status, self.message = "complete", ""
@@ -250,13 +251,13 @@ class Integration:
     def saved(self) -> Kept:
         """Return the complete state of the integration, exact to the last bit; for own methods only."""
         more = {name: getattr(self, name) for name in _KEPT}
-        arrays = tuple(one.copy() for one in native.own(self.run).arrays())
+        arrays = tuple(one.copy() for one in own(self.run).arrays())
         return Kept(arrays, more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
 
     def restore(self, kept: Kept) -> None:
         """Restore a state from `saved`, of this integration or of one made with the same arguments."""
         # Copy into the existing arrays: their position in memory must not change, as rounding may depend on it.
-        for mine, array in zip(native.own(self.run).arrays(), kept.arrays, strict=True):
+        for mine, array in zip(own(self.run).arrays(), kept.arrays, strict=True):
             mine[...] = array
         for name, value in kept.more.items():
             setattr(self, name, value)
@@ -343,8 +344,8 @@ def _failed(error: IntegrationError) -> IntegrationError:
 
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     """Prepare a run of a problem by the method of the options, without starting it."""
-    kind = native if isinstance(options.method, NativeMethod) else outside
-    return kind.prepare(problem, options)
+    prepare_run = prepare_native if isinstance(options.method, NativeMethod) else prepare_outside
+    return prepare_run(problem, options)
 
 
 def _breakdown(code: int, options: IntegrationOptions, most: int) -> Breakdown:

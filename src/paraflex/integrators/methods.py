@@ -18,11 +18,13 @@ from paraflex.integrators.newmark import (
     Newmark as Newmark,
     Wilson as Wilson,
 )
-from paraflex.integrators.tableaux.esdirk3 import ESDIRK3 as ESDIRK3
-from paraflex.integrators.tableaux.esdirk4 import ESDIRK4 as ESDIRK4
-from paraflex.integrators.tableaux.esdirk5 import ESDIRK5 as ESDIRK5
-from paraflex.integrators.tableaux.tr_bdf2 import TRBDF2 as TRBDF2
-from paraflex.integrators.tableaux.trapezoidal import Trapezoidal as Trapezoidal
+from paraflex.integrators.tableaux import (
+    ESDIRK3 as ESDIRK3,
+    ESDIRK4 as ESDIRK4,
+    ESDIRK5 as ESDIRK5,
+    TRBDF2 as TRBDF2,
+    Trapezoidal as Trapezoidal,
+)
 
 _ALL: tuple[type[Method], ...] = (
     TRBDF2,

@@ -1,17 +1,21 @@
-"""Interface of every run, by any stepper: problem, state and counts, which is all that `integrate` uses."""
+"""Interface of every run, by any stepper: problem, state and counts, which is all that `integrate` uses.
+
+Steps end where torques, loads or prescribed motions jump.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import factorial
 from typing import Protocol
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, inputs_of
+from paraflex.dynamics import Inputs, State, System, inputs_of
 from paraflex.errors import InputError
-from paraflex.integrators.jumps import jump_times
 from paraflex.integrators.limits import StepLimits, step_limits
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.packed import Signals
@@ -22,6 +26,8 @@ FIRST_STEP = 1e-6
 # Relative pivot below which constraint rows are dependent: for own methods rows that were dependent at the start,
 # whatever errors add to them; for external solvers any rows, which is then so within a thousandth of a radian.
 DEPENDENT_PART = 1e-7
+# A jump counts above this fraction of the largest value or derivative of the signal, and above this rounding of values.
+_SMOOTH, _ROUNDING = 1e-9, 1e-13
 
 
 @dataclass(frozen=True)
@@ -192,3 +198,39 @@ def empty_samples(times: Array, system: System, asked: NDArray[np.bool_] | None 
         array.fill(np.nan)
     asked = np.ones(times.size, dtype=bool) if asked is None else np.ascontiguousarray(asked)
     return Samples(times=times, asked=asked, solved=np.zeros(times.size, dtype=bool), **arrays)
+
+
+def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:
+    """Return the knots at which a torque or load jumps, or a prescribed motion in its value, rate or acceleration.
+
+    Parameters
+    ----------
+    signals : Signals
+        Signals to examine.
+    inputs : Inputs
+        Indices of motors, loads and prescribed motions among the signals.
+    knots : (k,) array
+        Times to examine [s].
+    """
+    looked_at = [(k, 1) for k in (*inputs.motors, *inputs.loads)] + [(k, 3) for k in inputs.prescribed]
+    return np.array([t for t in knots if any(_jumps(signals, k, t, derivatives) for k, derivatives in looked_at)])
+
+
+def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
+    first, last = int(signals.start[k]), int(signals.start[k + 1]) - 1
+    breaks = signals.breaks[first:last]
+    piece = int(np.searchsorted(breaks, time, side="right")) - 1
+    if piece < 1 or breaks[piece] != time:
+        return False
+    before, after = signals.coefficients[first + piece - 1], signals.coefficients[first + piece]
+    x = time - breaks[piece - 1]
+    largest = np.max(np.abs(signals.coefficients[first:last]), axis=0)
+    # Rounding of the values is amplified in their derivatives, the more the shorter the pieces are.
+    short = float(np.min(np.diff(signals.breaks[first : last + 1])))
+    rounding = _ROUNDING * float(np.sum(largest * short ** np.arange(largest.size)))
+    for order in range(derivatives):
+        left, right = (float(polyval(at, polyder(one, order))) for one, at in ((before, x), (after, 0.0)))
+        size = max(abs(left), factorial(order) * largest[order])
+        if abs(right - left) > max(_SMOOTH * size, rounding / short**order):
+            return True
+    return False

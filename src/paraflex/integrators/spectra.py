@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from paraflex.errors import InputError
 from paraflex.integrators.methods import METHODS, NDF, RK45, Adams, Method, Radau, find_method
 from paraflex.integrators.newmark import NewmarkMethod, NewmarkNumbers
-from paraflex.integrators.tableaux.make import ESDIRK
+from paraflex.integrators.tableaux import ESDIRK
 
 Array = NDArray[Any]
 Roots = NDArray[Any]

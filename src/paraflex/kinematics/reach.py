@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System
-from paraflex.dynamics.joint_coordinates import marker_place, material_angle
+from paraflex.dynamics.joint_coordinates import material_angle
+from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.projection import LeastChange, assemble, closed, shortened
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PointRef

@@ -10,7 +10,7 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State
-from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.points import marker_place
 from paraflex.errors import InputError
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import FirstCoordinates

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, joint_coordinate
+from paraflex.dynamics import System, joint_coordinate, material_angle
 from paraflex.dynamics.constraints import coordinate_kind
-from paraflex.dynamics.joint_coordinates import marker_place, material_angle
 from paraflex.dynamics.linearise import Inertia
+from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents, rows_of
 from paraflex.errors import InputError

@@ -14,7 +14,7 @@ from scipy.sparse import csr_matrix
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, pose_at_rest, standing_system, static_equilibrium
-from paraflex.dynamics.joint_coordinates import marker_place
+from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.sensors import sensor_rows
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, as_enum

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from paraflex.arguments import checked_arguments, given_as, refused
 from paraflex.display import Shown
 from paraflex.errors import InputError, as_enum
 from paraflex.fem import ReferenceCondition
+from paraflex.late import save_file
 from paraflex.mechanism.bodies import Body, BodyReduction, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
@@ -99,8 +99,7 @@ class Mechanism(Members, Shown):
 
     def save(self, path: str | Path) -> None:
         """Write the model file of this mechanism, from which `load` reads an equal mechanism; see `Model.save`."""
-        # `files` is a layer above `mechanism`, so it is imported only when a file is written.
-        import_module("paraflex.files").Model(self).save(path)
+        save_file(self, path)
 
     @classmethod
     def made_of(cls, given: object) -> Mechanism:

@@ -76,13 +76,14 @@ def plotting_function(name: str) -> Callable[..., Figure]:
         if entry.takes == "mode" and mode is None and "mode" in getattr(data, "dims", ()):
             mode = default_mode(data)
         found = prepared(data, mode)
-        charts = list(entry.charts(found, **options))
+        charts = entry.describe(found, **options)
         if not charts:
             raise InputError("nothing to show in these results", field="figure", value=name, remedy="choose another")
         if not isinstance(found, xr.Dataset) or "time" not in found.dims:
             return print_figure(entry, charts)
         return print_figure(entry, charts, found["time"].values, names_of(found, "mode"))
 
+    assert entry.charts is not None
     own = list(inspect.signature(entry.charts).parameters.values())
     modes = [inspect.Parameter("mode", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None)]
     plot.__name__ = plot.__qualname__ = name

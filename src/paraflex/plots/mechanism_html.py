@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from paraflex.display import facts, page, sentence, table, view
+from paraflex.display import facts, page, sentence, table
 from paraflex.dynamics.constraints import constraint_count
+from paraflex.late import view
 from paraflex.mechanism import Body, Mechanism, grouped, loops
 from paraflex.plots.svg import sketch
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from paraflex import plots
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.catalogue import Figure as CatalogueFigure
 from paraflex.figures.selection import default_mode, names_of, place_of, point_number, prototype_pair
-from paraflex.plots.catalogue import CATALOGUE, figure_names, plotting_function
+from paraflex.plots.catalogue import CATALOGUE, figure_names
 from paraflex.results.controllers import controller_names
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def _of_modes(
     """Plan a figure of some results: one drawing, or one for each mode or run."""
 
     def planned(of: str, *given: Any) -> PlannedFigure:
-        return PlannedFigure(figure, of, partial(plotting_function(figure), *given))
+        return PlannedFigure(figure, of, partial(getattr(plots, figure.name), *given))
 
     data, shown = source.data, ",".join(modes)
     if figure.takes == "nothing":

@@ -1,4 +1,3 @@
 """Reduced flexible coordinates for the bodies of a mechanism, chosen along a motion, for runs of the same equations."""
 
-from paraflex.reduction.reduced import reduced_mechanism as reduced_mechanism
-from paraflex.reduction.size import Size as Size, size_of as size_of
+from paraflex.reduction.reduced import Size as Size, reduced_mechanism as reduced_mechanism, size_of as size_of

@@ -22,9 +22,9 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, acting_loads
-from paraflex.dynamics.joint_coordinates import joint_coordinate, marker_place
+from paraflex.dynamics import System, acting_loads, joint_coordinate
 from paraflex.dynamics.linearise import typical_square
+from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian, sparse_mass, stiffness_diagonal
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch

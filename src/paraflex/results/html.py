@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.display import facts, page, sentence, table, view
+from paraflex.display import facts, page, sentence, table
 from paraflex.dynamics.points import point_motion
 from paraflex.integrators import Solution
 from paraflex.integrators.methods import title_of
+from paraflex.late import view
 from paraflex.mechanism import AngleLaw, PointRef
 from paraflex.motion import MotionRun
 from paraflex.results.metrics import METRICS

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from paraflex.designs.sweep import SweepResult
-from paraflex.display import facts, page, sentence, table, view
+from paraflex.display import facts, page, sentence, table
+from paraflex.late import view
 from paraflex.results import summary
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan

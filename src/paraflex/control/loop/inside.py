@@ -133,7 +133,7 @@ def sampled_law(
         "scratch": np.zeros((2, max(kept, states, inputs, len(outputs)))),
         "t": np.zeros(count), "acted": np.zeros(count), "readings": np.zeros((count, inputs)),
         "wanted": np.zeros((count, len(outputs))), "given": np.zeros((count, len(outputs))),
-        **_read(readings), **filters, **given,
+        **packed_readings(readings), **filters, **given,
     }  # fmt: skip
     return SampledLaw(**{name: _apart(array) for name, array in arrays.items()})
 
@@ -190,7 +190,7 @@ def _law_arrays(linear: LinearLaw | None, law: Any, inputs: int, outputs: int) -
             for name, array in found.items()}  # fmt: skip
 
 
-def _read(readings: Readings) -> dict[str, np.ndarray]:
+def packed_readings(readings: Readings) -> dict[str, np.ndarray]:
     """Return the arrays of the readings: rows of the linear ones, zero for others, and point positions."""
     linear, count = readings.affine, len(readings.names)
     given = {"value": linear.value, "rows_q": linear.q, "rows_v": linear.v, "rows_a": linear.a,
@@ -199,9 +199,13 @@ def _read(readings: Readings) -> dict[str, np.ndarray]:
     for name, rows in given.items():
         found[name] = np.zeros((count, *rows.shape[1:]), rows.dtype)
         found[name][readings.linear] = rows
-    numbers = [np.concatenate([one.axis, one.x0, one.N.ravel(), one.B.ravel()]) for one in readings.places]
-    found["points"] = np.array([[one.sensor, one.offset, one.angle, one.first, len(one.B)] for one in readings.places],
-                               np.int64).reshape(len(numbers), 5)  # fmt: skip
+    points, numbers = [], []
+    for one in readings.places:
+        body, marker = readings.system.bodies[one.marker.body], one.marker
+        bending = np.zeros((body.nf, body.nf)) if marker.bending is None else marker.bending
+        points.append([one.sensor, body.offset, body.angle, body.flexible.start, body.nf])
+        numbers.append(np.concatenate([one.axis, marker.x0, marker.N.ravel(), bending.ravel()]))
+    found["points"] = np.array(points, np.int64).reshape(len(numbers), 5)
     found["shapes"] = np.zeros((len(numbers), max((row.size for row in numbers), default=0)))
     for place, row in zip(found["shapes"], numbers, strict=True):
         place[: row.size] = row

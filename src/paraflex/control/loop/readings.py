@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System
-from paraflex.dynamics.coordinates import GROUND_INDEX
+from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
+from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.sensors import SensorReader, sensor_rows
 from paraflex.integrators.run import Instant
 from paraflex.mechanism import GROUND, Sensor
@@ -46,41 +46,21 @@ class Affine(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Position of a material point along an axis of the ground, e . (r + R (x0 + N u - (u . B u / 2, 0))).
+    """Position of a material point along an axis of the ground.
 
     Attributes
     ----------
     sensor : int
         Index of the sensor.
-    offset, angle, first : int
-        Indices of r (2,), of the angle of R, and of u (nf,) among the coordinates.
     axis : (2,) array
-        Direction e of the axis.
-    x0 : (2,) array
-        Position in the undeformed body [m].
-    N : (2, nf) array
-        Shape rows of the point.
-    B : (nf, nf) array
-        Matrix of the second-order axial displacement.
+        Direction of the axis.
+    marker : Marker
+        Material point of a body.
     """
 
     sensor: int
-    offset: int
-    angle: int
-    first: int
     axis: Array
-    x0: Array
-    N: Array
-    B: Array
-
-    def at(self, q: Array) -> float:
-        """Return the reading at coordinates (n,) [m]."""
-        u = q[self.first : self.first + len(self.B)]
-        x, y = self.x0 + self.N @ u
-        x -= 0.5 * float(u @ self.B @ u)
-        c, s = cos(q[self.angle]), sin(q[self.angle])
-        ex, ey = self.axis
-        return float(ex * (q[self.offset] + c * x - s * y) + ey * (q[self.offset + 1] + s * x + c * y))
+    marker: Marker
 
 
 class Readings:
@@ -109,7 +89,7 @@ class Readings:
     """
 
     def __init__(self, system: System, sensors: Sequence[Sensor], found: Sequence[Affine | None] | None = None) -> None:
-        self._system = system
+        self.system: System = system
         self.sensors: tuple[Sensor, ...] = tuple(sensors)
         self.names: tuple[str, ...] = tuple(sensor.name for sensor in sensors)
         self.units: tuple[str, ...] = tuple(system.mechanism.sensor_unit(sensor) for sensor in sensors)
@@ -132,14 +112,15 @@ class Readings:
     def only(self, names: Sequence[str]) -> Readings:
         """Return the readings of some of the sensors."""
         places = [self.names.index(name) for name in names]
-        return Readings(self._system, [self.sensors[k] for k in places], [self._found[k] for k in places])
+        return Readings(self.system, [self.sensors[k] for k in places], [self._found[k] for k in places])
 
     def __call__(self, now: Instant, torques: Array) -> Array:
         """Return the readings (sensors,) at an instant, under torques (motors,)."""
         found = np.empty(len(self.sensors))
-        found[self.linear] = self.affine.at(now.q, now.v, now.a)
+        if self.linear:
+            found[self.linear] = self.affine.at(now.q, now.v, now.a)
         for place in self.places:
-            found[place.sensor] = place.at(now.q)
+            found[place.sensor] = place.axis @ marker_position(self.system, place.marker, now.q)
         if self._others:
             given = (now.q[None], now.v[None], now.a[None], now.multipliers[None], torques[None])
             found[self._others] = self._reader(*given)[0]
@@ -152,13 +133,7 @@ def _place(system: System, sensor: Sensor, number: int) -> Place | None:
         return None
     point, axis = sensor.fixed_point
     marker = system.marker(point)
-    if marker.body == GROUND_INDEX:
-        return None
-    body = system.bodies[marker.body]
-    bending = np.zeros((body.nf, body.nf)) if marker.bending is None else marker.bending
-    return Place(
-        number, body.offset, body.angle, body.flexible.start, np.array(axis, dtype=float), marker.x0, marker.N, bending
-    )
+    return None if marker.body == GROUND_INDEX else Place(number, np.array(axis, dtype=float), marker)
 
 
 @np.errstate(divide="ignore", invalid="ignore")

@@ -1,7 +1,8 @@
-"""Base class of the results of optimisations and identifications."""
+"""Base class of the results of optimisations and identifications, and the model file of the best design."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,11 +10,11 @@ from typing import Any, ClassVar
 
 from paraflex.campaign import KeptResult
 from paraflex.campaign.study import Result
-from paraflex.studies.optimisation.best import write_best
+from paraflex.files.overlay import overlaid
 from paraflex.studies.optimisation.evaluate import Evaluated
 from paraflex.studies.optimisation.session import Session
 from paraflex.studies.optimisation.study import DesignStudy
-from paraflex.writing import GO_ON, write_json
+from paraflex.writing import GO_ON, write_json, write_text
 
 # Distance from a bound, as a fraction of the range, below which a parameter counts as being at it.
 _AT_BOUND = 1e-4
@@ -21,6 +22,7 @@ _AT_BOUND = 1e-4
 _MOST_REASONS = 5
 # Fields that describe a session, not the result.
 _OF_SESSION = ("fresh", "seconds", "folder")
+BEST = "best.toml"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,3 +112,21 @@ def at_bounds(study: DesignStudy[Result], design: Sequence[float]) -> dict[str, 
     places = dict(zip(study.setting.names, study.unit(design), strict=True))
     low = {name: "low" for name, place in places.items() if place < _AT_BOUND}
     return low | {name: "high" for name, place in places.items() if place > 1.0 - _AT_BOUND}
+
+
+def write_best(folder: Path, study: DesignStudy[Result], design: tuple[float, ...]) -> Path:
+    """Write the mechanism's file with the parameter values of a design, and return its path.
+
+    Raises
+    ------
+    OutputError
+        Folder that cannot be written.
+    """
+    from paraflex.files.document import document_text
+
+    setting = study.setting
+    data = overlaid(dict(setting.data), setting.numbers(design))
+    lines = [f"# {setting.source}, with the numbers that the study {json.dumps(study.name)} found:"]
+    lines += [f"#   {json.dumps(name)}: {value!r}" for name, value in zip(setting.names, design, strict=True)]
+    write_text(folder / BEST, "\n".join([*lines, "", document_text(data, setting.text)]))
+    return folder / BEST

@@ -15,7 +15,6 @@ from paraflex.designs.run import Outcome, Task, trouble
 from paraflex.designs.setting import Setting
 from paraflex.errors import InputError, NumericalError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
-from paraflex.studies.optimisation.noise import NOISE_POINTS, noise_of
 from paraflex.studies.optimisation.study import DesignStudy
 
 EXACT, DIFFERENCES = "exact", "differences"
@@ -23,6 +22,10 @@ EXACT, DIFFERENCES = "exact", "differences"
 NO_SLOPES = "slope.reason"
 # Bounds of the step adapted to noise, as fractions of the ranges; above the upper bound curvature dominates the error.
 _LEAST_STEP, _MOST_STEP = 1e-3, 0.05
+# Number of closely spaced values from which noise is estimated.
+NOISE_POINTS = 8
+# Largest ratio of the estimates of three successive orders that agree.
+_AGREE = 4.0
 
 
 def slope_column(column: str, parameter: str) -> str:
@@ -191,3 +194,34 @@ def run_slopes(
             row[NO_SLOPES] = trouble(error)["reason"]
         rows.append(row)
     return Outcome(task, rows)
+
+
+def noise_of(values: Array) -> Array:
+    """Estimate the standard deviation of the noise in values at closely and equally spaced points.
+
+    Differences of order k of independent noise of variance s^2 have variance s^2 (2k)! / (k!)^2, while those of a
+    smooth function vanish with growing k. The noise is given by the first order whose differences change sign and whose
+    estimate agrees with those of the next two orders. If there is none, the smallest estimate is a bound (More and
+    Wild, Estimating computational noise, SIAM J. Sci. Comput. 33, 2011).
+
+    Parameters
+    ----------
+    values : (points, ...) array
+        Values at the points; the noise of each component is estimated separately.
+    """
+    columns = values.reshape(values.shape[0], -1)
+    return np.array([_noise(column) for column in columns.T]).reshape(values.shape[1:])
+
+
+def _noise(values: Array) -> float:
+    estimates, changes, rest, factor = [], [], values, 1.0
+    for order in range(1, values.size):
+        rest = np.diff(rest)
+        factor *= 0.5 * order / (2.0 * order - 1.0)
+        estimates.append(float(np.sqrt(factor * np.mean(rest**2))))
+        changes.append(bool(rest.min() < 0.0 < rest.max()))
+    for k in range(len(estimates) - 2):
+        three = estimates[k : k + 3]
+        if changes[k] and max(three) <= _AGREE * min(three):
+            return estimates[k]
+    return min(estimates)
