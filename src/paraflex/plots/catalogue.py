@@ -26,76 +26,12 @@ _DRAWINGS: Mapping[str, Figure] = {
             written_as="desired_path",
         ),
         Figure(
-            "motor_torques",
-            "torque of every motor over time, one panel per mode (Fig. 12)",
-            module="modes",
-            written_as="motor_torques",
-        ),
-        Figure(
-            "tip_deflections",
-            "axial and transverse displacement and slope of links' ends (Fig. 13)",
-            module="time_series",
-            takes="mode",
-            written_as="tip_deflections",
-        ),
-        Figure(
-            "link_motions",
-            "angle, speed and acceleration of links, desired and actual (Fig. 14)",
-            module="time_series",
-            takes="mode",
-            written_as="link_motions",
-        ),
-        Figure(
-            "end_effector_path",
-            "desired and actual path, deviation magnified (Fig. 15)",
-            module="workspace",
-            takes="mode",
-            written_as="end_effector_path",
-            points="point",
-        ),
-        Figure(
-            "end_effector_motion",
-            "motion of the end-effector, desired and actual (Fig. 16)",
-            module="time_series",
-            takes="mode",
-            written_as="end_effector_motion",
-            points="point",
-        ),
-        Figure(
-            "phase_diagrams",
-            "phase diagrams of the end-effector (Fig. 17)",
-            module="phase",
-            takes="mode",
-            written_as="phase_diagrams",
-            points="point",
-        ),
-        Figure(
-            "tracking_errors",
-            "tracking error in x and y over time, one panel per mode (Fig. 18)",
-            module="modes",
-            written_as="tracking_errors",
-        ),
-        Figure("tracking_distance", "distance from the desired position over time, all modes", module="driving"),
-        Figure("mode_comparison", "tracking error, vibration and largest torque of every mode", module="driving"),
-        Figure(
-            "actuation_condition",
-            "condition number of the actuation matrix along the path, all modes",
-            module="driving",
-            variables=("actuation_condition",),
-        ),
-        Figure(
             "mechanism_drawing",
             "the mechanism with its deflected links half way through the run",
             module="drawing",
             takes="mode",
             variables=("shape",),
             points="point",
-        ),
-        Figure(
-            "energies",
-            "kinetic and strain energy, work, and error of the energy balance",
-            module="energy",
-            takes="mode",
         ),
         Figure(
             "joint_forces",
@@ -153,21 +89,6 @@ _DRAWINGS: Mapping[str, Figure] = {
             takes="mode",
             written_as="controllers",
         ),
-        Figure(
-            "link_deflections", "transverse displacement of the ends of all links", module="time_series", takes="mode"
-        ),
-        Figure(
-            "point_motions",
-            "distance from the start, speed and acceleration of named points",
-            module="free_motion",
-            takes="mode",
-            variables=("point_velocity", "point_acceleration"),
-            points="points",
-        ),
-        Figure("link_phases", "angular velocity over angle of every body", module="phase", takes="mode"),
-        Figure("motion_overview", "angles, speeds and energies", module="free_motion", written_as="motion_overview"),
-        Figure("coordinates", "generalised coordinates, including modal coordinates of bodies", module="free_motion"),
-        Figure("point_paths", "paths of named points in the plane", module="free_motion", points="points"),
         Figure(
             "compared_links",
             "angle and speed of links in two models (Fig. 22)",
@@ -319,7 +240,6 @@ _DRAWINGS: Mapping[str, Figure] = {
             takes="run",
             written_as="elasticities",
         ),
-        Figure("mode_conditions", "worst condition number of every mode along the path", module="driving"),
     )
 }
 
