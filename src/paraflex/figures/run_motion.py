@@ -161,7 +161,7 @@ def actual_name(data: xr.Dataset, run: int, point: str | None = None) -> str:
 
 
 @figure("kinetic and strain energy, work, and error of the energy balance", heading="Energies", takes="mode",
-        height=34.0)  # fmt: skip
+        variables=("kinetic_energy", "strain_energy", "work"), height=34.0)  # fmt: skip
 def energies(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of kinetic and strain energy and the work done on the mechanism; strain energy; the imbalance.
 

@@ -147,7 +147,8 @@ def _outcome(run: xr.Dataset) -> str:
     return f"stopped at {number(run['time'].values[reached - 1], 3)} s" if reached else "no samples"
 
 
-@figure("tracking error, vibration and largest torque of every mode", columns=3)
+@figure("tracking error, vibration and largest torque of every mode", columns=3,
+        variables=("residual_vibration", "peak_torque"))  # fmt: skip
 def mode_comparison(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of the RMS tracking error, the residual vibration and the largest torque of every mode.
 

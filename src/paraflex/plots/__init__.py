@@ -31,4 +31,7 @@ def __getattr__(name: str) -> Any:
         return _attached(name)
     except AttributeError:
         # A figure of the catalogue that the stub does not list.
-        return getattr(import_module("paraflex.plots.charts"), name)
+        figure = getattr(import_module("paraflex.plots.charts"), name, None)
+        if figure is None:
+            raise
+        return figure
