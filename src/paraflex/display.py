@@ -13,6 +13,8 @@ from html import escape
 from importlib import import_module
 from typing import Any
 
+from paraflex.formatting import number
+
 # Modules that register views, imported in this order until the view of the class is registered.
 _VIEWS = ("paraflex.results.html", "paraflex.plots.mechanism_html", "paraflex.studies.html")
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
@@ -77,9 +79,9 @@ def written(value: Any) -> str:
         return ", ".join(map(written, value))
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return number(value) if isinstance(value, float) else str(value)
 
 
 def _cell(value: Any) -> str:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return f'<td style="text-align: {"right" if number else "left"}">{escape(written(value))}</td>'
+    numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return f'<td style="text-align: {"right" if numeric else "left"}">{escape(written(value))}</td>'

@@ -232,9 +232,9 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         panel.barh(y, x, height=_BAR, color=colour, linewidth=0.0, label=label)
         return
     if curve.mark:
-        style = _DASHES[curve.look.dash] if curve.line else ""
+        style, inside = _DASHES[curve.look.dash] if curve.line else "", "white" if curve.mark == "ring" else colour
         panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], color=colour, label=label,
-                   markersize=_SIZES[curve.mark == "square"], markerfacecolor="white" if curve.mark == "ring" else colour)  # fmt: skip
+                   markersize=_SIZES[curve.mark == "square"], markerfacecolor=inside)  # fmt: skip
         return
     if curve.desired and single:
         panel.plot(x, y, label=label, **_DESIRED)
