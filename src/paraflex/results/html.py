@@ -53,8 +53,8 @@ def motion_run_html(run: MotionRun) -> str:
     if solution.t.size:
         energies = [
             ("largest deflection", _deflection(run)),
-            ("kinetic energy, largest", quantity(np.max(solution.kinetic_energy), "J")),
-            ("strain energy, largest", quantity(np.max(solution.strain_energy), "J")),
+            ("kinetic energy, largest", _text(np.max(solution.kinetic_energy), "J")),
+            ("strain energy, largest", _text(np.max(solution.strain_energy), "J")),
         ]
         last = [values[-1:] for values in (solution.q, solution.v, solution.a)]
         names = [PointRef(body.name, point) for body in system.described.bodies for point in body.points]
@@ -71,6 +71,10 @@ def motion_run_html(run: MotionRun) -> str:
         facts([*energies, ("given torques", torques), *_solver(solution, title_of(solution.method))]),
         table(("point", "x at the end [m]", "y [m]"), points),
     )
+
+
+def _text(value: float, unit: str) -> str:
+    return quantity(value, unit, digits=4, padded=False)
 
 
 def _verdict(run: TrackingRun | MotionRun) -> str:
@@ -93,7 +97,7 @@ def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
     traces = run_traces(run)
 
     def length(metric: str) -> str:
-        return quantity(METRICS[metric].value(traces), "m")
+        return _text(METRICS[metric].value(traces), "m")
 
     after = [] if traces.moving.all() else [("tracking error after it, RMS", length("tracking_rms_after"))]
     return [
@@ -109,7 +113,7 @@ def _deflection(run: TrackingRun | MotionRun) -> str | None:
     """Return the largest deflection of any flexible body from its chord as text; None if there is none."""
     system = run.task.system if isinstance(run, TrackingRun) else run.system
     bent = np.abs(deflections(system, run.solution.q))
-    return quantity(np.nanmax(bent), "m") if np.isfinite(bent).any() else None
+    return _text(np.nanmax(bent), "m") if np.isfinite(bent).any() else None
 
 
 def _solver(solution: Solution, method: str) -> list[tuple[str, Any]]:
