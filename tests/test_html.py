@@ -186,7 +186,7 @@ def test_a_tracking_run_tells_what_its_dataset_does(run) -> None:
     data = tracking_dataset([run]).isel(mode=0)
     assert "complete" in shown.text
     error = float(data["tracking_rms_motion"])
-    assert row(shown, "tracking error during the motion, RMS")[1] == f"{1e3 * error:.4g} mm"
+    assert row(shown, "tracking error during the motion, RMS")[1] == f"{1e6 * error:.4g} µm"
     assert row(shown, "largest deflection")[1] == f"{1e3 * float(data['deflection'].max()):.4g} mm"
     for motor in data["motor"].values:
         peak, rms = (float(data[key].sel(motor=motor)) for key in ("peak_torque", "rms_torque"))
@@ -273,7 +273,7 @@ def test_sensitivities_and_methods() -> None:
     assert "by x<y" in read(found).text
     run = Measurement("esdirk5", tolerance=1e-4, wall_time=0.5, error=1e-5, steps=40)
     compared = MethodComparison("mode ++", "arm", 1.0, 11, 6, 4, Reference("a", 1e-9, "b", 1e-9, 1e-10, 1.0), (run,))
-    assert row(read(compared), "ESDIRK 5(4)")[1:] == ["0.0001", "", "complete", "1e-05", "0.5", "40"]
+    assert row(read(compared), "ESDIRK 5(4)")[1:] == ["1e-04", "", "complete", "1e-05", "0.5", "40"]
 
 
 def test_values_as_text() -> None:

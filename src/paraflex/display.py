@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
+from paraflex.formatting import number
 from paraflex.late import view
 
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
@@ -66,9 +67,9 @@ def written(value: Any) -> str:
         return ", ".join(map(written, value))
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return number(value) if isinstance(value, float) else str(value)
 
 
 def _cell(value: Any) -> str:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return f'<td style="text-align: {"right" if number else "left"}">{escape(written(value))}</td>'
+    numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return f'<td style="text-align: {"right" if numeric else "left"}">{escape(written(value))}</td>'

@@ -148,7 +148,7 @@ def _show(out: Console, results: Mapping[str, StudyResult], task: TrackingTask, 
     ran = {path: result.to_dict() for path, result in results.items() if result.data is not None}
     if not ran:
         return
-    print_studies(out, ran, task, fidelity)
+    print_studies(out, results, ran, task, fidelity)
     modes = {
         f"{mode}, path {path}" if path else mode: one
         for path, summary in ran.items()

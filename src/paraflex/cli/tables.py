@@ -51,23 +51,31 @@ def warn_of(console: Console, findings: Iterable[Finding], whose: str = "") -> N
     printed(findings)
 
 
-def print_studies(console: Console, summaries: Mapping[str, Any], task: TrackingTask, model: str) -> None:
+def print_studies(
+    console: Console, results: Mapping[str, StudyResult], summaries: Mapping[str, Any], task: TrackingTask, model: str
+) -> None:
     """Print tables of the runs in every mode along each path, and a line for each run that an event stopped.
 
     Parameters
     ----------
     console : Console
         Console to print to.
-    summaries : mapping of str to dict
-        Summaries by path; the name of a single path may be empty.
+    results, summaries : mapping of str to StudyResult or dict
+        Results and their summaries by path; the name of a single path may be empty.
     task : TrackingTask
         Task of any of the paths.
     model : str
         Fidelity of the runs, for the title.
     """
-    console.print(_study_table(summaries, task, model))
-    if any(mode.get("tracking_rms_after") is not None for _, mode in _runs(summaries)):
-        console.print(_after_table(summaries, task))
+    from paraflex.figures.run_tables import Runs, after_table, result_table
+
+    data = {path: one.data for path, one in results.items() if one.data is not None}
+    runs = Runs(data, {path: list(results[path].failed) for path in data})
+    table = result_table(runs, brief=True)
+    print_table(console, table, f"{task.mechanism.name}, {model}: {table.title}")
+    settings = next(iter(summaries.values()))["parameters"]["run"]
+    motors = "held all the time" if settings.get("ked") else "held by brakes" if task.holds else "free"
+    print_table(console, after_table(runs), f"Tracking error during the motion and after it, the motors {motors}")
     controllers(console, [(names, mode) for names, mode in _runs(summaries)], _texts(summaries))
     for names, mode in _runs(summaries):
         if mode["status"] == "stopped":
@@ -85,51 +93,6 @@ def _runs(summaries: Mapping[str, Any]) -> Iterator[tuple[list[str], dict[str, A
 
 def _texts(summaries: Mapping[str, Any]) -> list[str]:
     return ["path", "mode"] if any(summaries) else ["mode"]
-
-
-def _study_table(summaries: Mapping[str, Any], task: TrackingTask, model: str) -> Table:
-    """Return a table of the tracking error and peak torques of every run, with its steps and wall time."""
-    from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
-
-    first = next(iter(summaries.values()))
-    span = ErrorSpan(first["error"])
-    motors = [motor.name for motor in task.mechanism.motors]
-    heads = [f"{name}\n[{unit}]" for name, unit in zip(motors, task.mechanism.motor_units(), strict=True)]
-    quantity = "forces" if set(task.mechanism.motor_units()) == {"N"} else "torques"
-    title = f"{first['mechanism']}, {model}: tracking error {SPAN_WORDS[span]}, and peak {quantity}"
-    numbers = ("error\n[m]", *heads, "steps\n", "wall\n[s]")
-    table = plain_table(*_texts(summaries), numbers=numbers, title=title)
-    for names, mode in _runs(summaries):
-        if "steps" not in mode:
-            table.add_row(*names, "failed", *["" for _ in motors], "", "")
-            continue
-        table.add_row(
-            *names,
-            number(mode[HEADLINE[span]], ".4e") if mode["status"] == "complete" else mode["status"],
-            *(number(mode["peak_torque"][motor], ".2f") for motor in motors),
-            str(mode["steps"]),
-            number(mode["wall_time"], ".2f"),
-        )
-    return table
-
-
-def _after_table(summaries: Mapping[str, Any], task: TrackingTask) -> Table:
-    """Return a table of errors during the motion and after it, drift and vibration after it, and energy of brakes.
-
-    Runs with controllers also have settling time and overshoot.
-    """
-    held = task.holds
-    motors = "held by brakes" if held else "free"
-    if next(iter(summaries.values()))["parameters"]["run"].get("ked"):
-        motors = "held all the time"
-    keys = {"motion\n[m]": "tracking_rms_motion", "after\n[m]": "tracking_rms_after", "drift\n[m/s]": "drift_speed",
-            "vibration\n[m]": "residual_vibration"} | ({"brakes\n[J]": "brake_energy"} if held else {})  # fmt: skip
-    if any("controllers" in mode for _, mode in _runs(summaries)):
-        keys |= {"settling\n[s]": "settling_time", "overshoot\n[m]": "overshoot"}
-    ran = ((names, mode) for names, mode in _runs(summaries) if "steps" in mode)
-    rows = ([*names, *(number(mode[key], ".2e") for key in keys.values())] for names, mode in ran)
-    title = f"Tracking error during the motion and after it, the motors {motors}"
-    return plain_table(*_texts(summaries), numbers=keys, rows=rows, title=title)
 
 
 def controllers(

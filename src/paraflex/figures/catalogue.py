@@ -55,6 +55,12 @@ class Figure:
         Number of columns of panels in print; 0 (default) for one of charts over time, else for as many as fit.
     height : float
         Height of a panel in print [mm].
+    shared : bool
+        Whether the panels of a row have the same scale, symmetrical about zero, in print.
+    missing : (str, str)
+        Problem and remedy of the error if the results have nothing that the figure shows.
+    defaults : callable
+        Function of the results that returns options of the printed figure for those that are not given.
     """
 
     name: str
@@ -68,6 +74,9 @@ class Figure:
     panels: Panels = "charts"
     columns: int = 0
     height: float = 48.0
+    shared: bool = False
+    missing: tuple[str, str] = ("nothing to show in these results", "choose another figure")
+    defaults: Callable[[Any], Mapping[str, Any]] = lambda _: {}
 
     def can_show(self, data: Any) -> bool:
         """Check whether the results have the variables of the figure and, unless it is a drawing, any charts of it."""
@@ -127,5 +136,5 @@ def page_panels(kind: str, data: Any) -> list[Panel]:
     data = prepared(data)
     for one in figures_of_kind(kind).values():
         if one.heading and all(name in data for name in one.variables):
-            headings.setdefault(one.heading, []).extend(one.describe(data))
+            headings.setdefault(one.heading, []).extend(chart for chart in one.describe(data) if chart.on_page)
     return [Panel(heading, charts) for heading, charts in headings.items() if charts]

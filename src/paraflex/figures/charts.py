@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 # Numbers of colours and of dashes; the latter include the solid line.
 N_COLOURS, N_DASHES = 8, 5
 DASHED, DOTTED = 1, 2
+# Dashes of successive curves; dotted lines, which are hard to see, come last.
+_DASH_ORDER = (0, 1, 3, 4, 2)
 # Ratio of the largest to the smallest positive value above which an axis that may be logarithmic is.
 _DECADE = 10.0
 
@@ -39,7 +41,7 @@ PLAIN_LOOK = Look()
 
 def look(k: int) -> Look:
     """Return colour and dash of the k-th curve; up to 40 curves differ, and up to eight of them in colour."""
-    return Look(k % N_COLOURS, (k % N_COLOURS + k // N_COLOURS) % N_DASHES)
+    return Look(k % N_COLOURS, _DASH_ORDER[(k % N_COLOURS + k // N_COLOURS) % N_DASHES])
 
 
 @dataclass(frozen=True)
@@ -89,9 +91,10 @@ class Axis:
         """Return the unit in which values are shown."""
         return self.shown or (common_unit if is_logarithmic(self, values) else display_unit)(self.unit, values)
 
-    def label(self, unit: DisplayUnit) -> str:
-        """Return the label of the axis in a unit: "torque τ [N m]"."""
-        return labelled(" ".join(filter(None, (self.name, self.symbol))), unit.name)
+    def label(self, unit: DisplayUnit, *, short: bool = False) -> str:
+        """Return the label of the axis in a unit, "torque τ [N m]"; if short, with the symbol or the last word only."""
+        words = (self.name, self.symbol) if not short else (self.symbol or self.name.rpartition(" ")[2],)
+        return labelled(" ".join(filter(None, words)), unit.name)
 
 
 TIME = Axis("time", "s", "t")
@@ -201,6 +204,10 @@ class Chart:
         Ordinates at which a line is drawn, such as limits.
     note : str
         Sentence below the chart.
+    on_page : bool
+        Whether the page of a report shows the chart; otherwise it is only printed.
+    of_runs : sequence of str
+        Words on each run, such as its error, for the title of its panel in print.
     """
 
     identity: str
@@ -215,6 +222,8 @@ class Chart:
     spans: Sequence[Span] = ()
     levels: Sequence[float] = ()
     note: str = ""
+    on_page: bool = True
+    of_runs: Sequence[str] = ()
 
     @property
     def over_time(self) -> bool:

@@ -108,7 +108,15 @@ def of_names(chart: Chart, data: xr.Dataset, curves: Sequence[tuple[str, Array]]
 
 
 def _in_unit(chart: Chart, values: xr.DataArray) -> Axis:
-    return replace(chart.axis(None), unit=str(values.attrs.get("units", chart.axis(None).unit)))
+    return replace(chart.axis(None), unit=str(values.attrs.get("units", chart.axis(None).unit)).replace("^2", "²"))
+
+
+def ranges(values: Array, axis: int = 0) -> Array:
+    """Return the ranges of the finite values along an axis; 0 where there are none."""
+    known = np.isfinite(values)
+    least, most = (limit(values, axis=axis, where=known, initial=initial)
+                   for limit, initial in ((np.min, np.inf), (np.max, -np.inf)))  # fmt: skip
+    return np.maximum(most - least, 0.0)
 
 
 def risen(values: Array) -> Array:

@@ -96,11 +96,6 @@ def of_point(run: xr.Dataset, point: str | None) -> xr.Dataset:
     return run.drop_vars([f"{name}_desired" for name in moved if f"{name}_desired" in run]).assign(moved)
 
 
-def point_label(run: xr.Dataset, point: str | None) -> str:
-    """Return the legend label of the actual motion of the end-effector, or of a point."""
-    return f"{'actual' if point is None else point}, {run_label(run)}"
-
-
 def run_label(run: xr.Dataset) -> str:
     """Return the legend label of a run's mode."""
     return f"mode {run['mode'].item()}"
@@ -114,9 +109,9 @@ def samples(run: xr.Dataset) -> int:
 
 
 def moving_directions(run: xr.Dataset) -> list[str]:
-    """Return the axes along which the end-effector moves or should move; all axes if it is at rest."""
+    """Return the axes along which the end-effector moves or should move, in any run; all axes if it is at rest."""
     names = names_of(run, "axis")
-    parts = [np.nan_to_num(run[name].transpose("time", "axis").values)
+    parts = [np.nan_to_num(run[name].transpose(..., "axis").values).reshape(-1, len(names))
              for name in ("end_effector_velocity", "end_effector_velocity_desired") if name in run]  # fmt: skip
     speeds = np.max(np.abs(parts), axis=(0, 1))
     return [name for name, speed in zip(names, speeds, strict=True) if speed > _STILL * speeds.max()] or names

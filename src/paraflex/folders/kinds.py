@@ -96,8 +96,8 @@ _NOTHING_MOVES = (
 )
 _DESIGN_DRAWINGS = ("response_curves", "response_map", "parallel_coordinates", "pareto_front")
 _RUN_DRAWINGS = (
-    "mechanism_drawing", "energies", "joint_forces", "beam_stresses", "stress_envelope", "joint_motions",
-    "drive_efforts", "frame_loads", "sensors", "controllers", "link_deflections", "point_motions", "link_phases",
+    "mechanism_drawing", "joint_forces", "beam_stresses", "stress_envelope", "joint_motions", "drive_efforts",
+    "frame_loads", "sensors", "controllers",
 )  # fmt: skip
 _STUDY = ("study.json", "journal.sqlite", "results.parquet")
 RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
@@ -141,17 +141,11 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
                ("frequency", "frequencies"), "reduction.reduction_page", refusals={"motion": _NOTHING_MOVES},
                drawings=("reduced_responses", "reduction_errors", "held_frequency_by_states", "bases_along_path")),
     ResultKind("motion", RUN, ("summary.json", "results.nc"), "results.nc", "motion_dataset",
-               page="motion.motion_page",
-               drawings=("motion_overview", "coordinates", "point_paths", *_RUN_DRAWINGS)),
+               page="motion.motion_page", figures=("run_motion", "motion"), drawings=_RUN_DRAWINGS),
     ResultKind("tracking", RUN, ("summary.json", "results.nc"), "results.nc", "tracking_dataset or run_study",
-               page="tracking.report_of_folder", with_folder=True,
-               drawings=(
-        "desired_path", "motor_torques", "tip_deflections", "link_motions", "end_effector_path", "end_effector_motion",
-        "phase_diagrams", "tracking_errors", "tracking_distance", "mode_comparison", "actuation_condition",
-        *_RUN_DRAWINGS,
-    )),
-    ResultKind("modes", "", marks={"mode": ..., "motors": ...}, listed=True,
-               drawings=("mode_conditions",)),
+               page="tracking.report_of_folder", with_folder=True, figures=("tracking", "run_motion"),
+               drawings=("desired_path", *_RUN_DRAWINGS)),
+    ResultKind("modes", "", marks={"mode": ..., "motors": ...}, listed=True, figures=("modes",)),
 )}  # fmt: skip
 # Files by which a folder without a manifest, from an earlier release, is recognised, by the kind of the folder.
 FOLDER_FILES: dict[str, tuple[str, ...]] = {kind.folder: kind.files for kind in RESULT_KINDS.values() if kind.folder}

@@ -18,6 +18,7 @@ model, run or metric.
 The names below are imported on first use: most commands need one or two of them.
 """
 
+from importlib import import_module
 from typing import Any
 
 import lazy_loader
@@ -30,6 +31,7 @@ def __getattr__(name: str) -> Any:
         return _attached(name)
     except AttributeError:
         # A figure of the catalogue that the stub does not list.
-        from paraflex.plots import charts
-
-        return getattr(charts, name)
+        figure = getattr(import_module("paraflex.plots.charts"), name, None)
+        if figure is None:
+            raise
+        return figure

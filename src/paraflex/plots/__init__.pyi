@@ -6,29 +6,34 @@ from .agreement import (
     model_distances as model_distances,
 )
 from .charts import (
+    actuation_condition as actuation_condition,
+    coordinates as coordinates,
+    end_effector_motion as end_effector_motion,
+    end_effector_path as end_effector_path,
+    energies as energies,
     force_travel as force_travel,
     free_travels as free_travels,
     joint_force_travel as joint_force_travel,
+    link_deflections as link_deflections,
+    link_motions as link_motions,
+    link_phases as link_phases,
+    mode_comparison as mode_comparison,
+    mode_conditions as mode_conditions,
+    motion_overview as motion_overview,
+    motor_torques as motor_torques,
+    phase_diagrams as phase_diagrams,
+    point_motions as point_motions,
+    point_paths as point_paths,
     stiffness_travel as stiffness_travel,
     stress_travel as stress_travel,
+    tip_deflections as tip_deflections,
+    tracking_distance as tracking_distance,
+    tracking_errors as tracking_errors,
 )
 from .controlled import controllers as controllers
 from .derivatives import elasticities as elasticities
 from .drawing import mechanism_drawing as mechanism_drawing
-from .driving import (
-    actuation_condition as actuation_condition,
-    mode_comparison as mode_comparison,
-    mode_conditions as mode_conditions,
-    tracking_distance as tracking_distance,
-)
-from .energy import energies as energies
 from .equilibria import buckling_shapes as buckling_shapes, deformed_shapes as deformed_shapes
-from .free_motion import (
-    coordinates as coordinates,
-    motion_overview as motion_overview,
-    point_motions as point_motions,
-    point_paths as point_paths,
-)
 from .laws import law_comparison as law_comparison
 from .linear import (
     bode as bode,
@@ -40,10 +45,8 @@ from .maps import response_map as response_map
 from .measured import sensors as sensors
 from .methods import work_precision as work_precision
 from .mode_shapes import mode_shapes as mode_shapes
-from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
 from .parallel import parallel_coordinates as parallel_coordinates
-from .phase import link_phases as link_phases, phase_diagrams as phase_diagrams
 from .reduction import (
     bases_along_path as bases_along_path,
     held_frequency_by_states as held_frequency_by_states,
@@ -60,11 +63,5 @@ from .stress import (
     joint_motions as joint_motions,
     stress_envelope as stress_envelope,
 )
-from .time_series import (
-    end_effector_motion as end_effector_motion,
-    joint_forces as joint_forces,
-    link_deflections as link_deflections,
-    link_motions as link_motions,
-    tip_deflections as tip_deflections,
-)
-from .workspace import desired_path as desired_path, end_effector_path as end_effector_path
+from .time_series import joint_forces as joint_forces
+from .workspace import desired_path as desired_path

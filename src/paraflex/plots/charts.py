@@ -17,7 +17,7 @@ from paraflex.errors import InputError
 from paraflex.figures.catalogue import Figure as CatalogueFigure, all_figures, prepared
 from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined
 from paraflex.figures.selection import default_mode, names_of
-from paraflex.formatting import logarithmic_number, peak
+from paraflex.formatting import ROUNDING, logarithmic_number, peak
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import mathematics
 from paraflex.plots.layout import (
@@ -36,9 +36,13 @@ from paraflex.units import DisplayUnit
 
 # Largest number of curves that are distinguishable in one panel.
 MOST_LINES = 7
+# Largest number of panels for members below one another in a figure of one column.
+_MOST_BELOW = 12
 # Decades of a logarithmic axis shown below its largest value.
 _DECADES = 9.0
 _MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o"}
+# Sizes of marks and of squares, which lie on curves [pt], and room beside marks as a share of the panel's width.
+_SIZES, _BESIDE = (4.0, 3.0), 0.06
 # Height of a bar, as a share of the distance of two names.
 _BAR = 0.6
 # Dashes by their numbers in a look.
@@ -72,13 +76,15 @@ def plotting_function(name: str) -> Callable[..., Figure]:
     """Return the plotting function of a figure of the catalogue: of results or their folder, a mode, and options."""
     entry = all_figures()[name]
 
-    def plot(data: Any, mode: str | None = None, **options: Any) -> Figure:
+    def plot(*args: Any, **given: Any) -> Figure:
+        options = shown.bind(*args, **given).arguments
+        data, mode = options.pop(own[0].name), options.pop("mode", None)
         if entry.takes == "mode" and mode is None and "mode" in getattr(data, "dims", ()):
             mode = default_mode(data)
         found = prepared(data, mode)
-        charts = entry.describe(found, **options)
+        charts = entry.describe(found, **{**entry.defaults(found), **options})
         if not charts:
-            raise InputError("nothing to show in these results", field="figure", value=name, remedy="choose another")
+            raise InputError(entry.missing[0], field="figure", value=name, remedy=entry.missing[1])
         if not isinstance(found, xr.Dataset) or "time" not in found.dims:
             return print_figure(entry, charts)
         return print_figure(entry, charts, found["time"].values, names_of(found, "mode"))
@@ -88,7 +94,8 @@ def plotting_function(name: str) -> Callable[..., Figure]:
     modes = [inspect.Parameter("mode", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None)]
     plot.__name__ = plot.__qualname__ = name
     plot.__doc__ = f"Plot {entry.shows}.\n\n{inspect.getdoc(entry.charts)}"
-    plot.__signature__ = inspect.Signature([own[0], *(modes if entry.takes == "mode" else []), *own[1:]])  # type: ignore[attr-defined]
+    shown = inspect.Signature([own[0], *(modes if entry.takes == "mode" else []), *own[1:]])
+    plot.__signature__ = shown  # type: ignore[attr-defined]
     return drawn(plot)
 
 
@@ -115,13 +122,15 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
     rows = _cells(entry, charts, runs)
     if len(rows[0]) == 1 and rows[0][0].chart.equal and len(rows) == 1:
         return _plane(rows[0][0], time)
-    columns = len(rows[0]) if entry.panels == "choices" else _columns(entry, sum(map(len, rows)), charts)
     cells = [cell for row in rows for cell in row]
+    columns = _columns(entry, len(cells), charts)
     figure, axes = panel_grid(
         len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS
     )
     for panel, cell in zip(axes.flat, cells, strict=False):
         _draw(panel, cell, time)
+    if entry.shared:
+        _share_scales(axes)
     if all(cell.chart.over_time for cell in cells):
         label_outer_time(axes)
     names = max(len(chart.axis(None).names) for chart in charts)
@@ -129,19 +138,39 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
 
 
 def _columns(entry: CatalogueFigure, count: int, charts: Sequence[Chart]) -> int:
+    if entry.panels == "choices" and len(charts) > 1:
+        return len(charts)
+    if entry.panels == "runs":
+        return 2 if count == 4 or (is_narrow() and count > 1) else min(count, entry.columns)
     if is_narrow():
         return 1
-    return entry.columns or (min(count, 3) if not charts[0].over_time else 1)
+    return min(count, entry.columns or (3 if not charts[0].over_time else 1))
+
+
+def _share_scales(axes: Any) -> None:
+    """Set the same vertical limits for all panels of a row, symmetrical about zero."""
+    for row in axes:
+        values = [line.get_ydata() for panel in row if panel.get_visible() for line in panel.lines]
+        largest = peak(joined(values))
+        for panel in row:
+            panel.set_ylim(*((-1.08 * largest, 1.08 * largest) if largest > ROUNDING else (-1.0, 1.0)))
 
 
 def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Sequence[str]) -> list[list[_Cell]]:
     """Return rows of panels."""
     run = 0 if entry.takes in ("mode", "models") else None
     if entry.panels == "runs":
-        return [[_Cell(chart, r, 0, name) for r, name in enumerate(runs)] for chart in charts]
+        return [
+            [
+                _Cell(chart, r, 0, ": ".join(filter(None, (name, *chart.of_runs[r : r + 1]))))
+                for r, name in enumerate(runs)
+            ]
+            for chart in charts
+        ]
     if entry.panels == "choices":
-        members = max(len(chart.choices) - chart.overview for chart in charts)
-        return [[_member(chart, run, k) for chart in charts] for k in range(max(members, 1))]
+        members = max(1, *(len(chart.choices) - chart.overview for chart in charts))
+        members = min(members, max(1, _MOST_BELOW // len(charts))) if is_narrow() else members
+        return [[_member(chart, run, k) for chart in charts] for k in range(members)]
     several = len(charts) > 1
     return [[_Cell(chart, run, 0 if chart.choices else None, chart.title if several else "")] for chart in charts]
 
@@ -160,7 +189,7 @@ def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
     units, axis = chart.shown_units(), chart.axis(cell.choice)
     shown, note = _largest(curves)
     title = ", ".join(filter(None, (cell.title, note)))
-    single = len({curve.look.colour for curve in shown if not curve.desired}) == 1
+    single = len({curve.look.colour for curve in shown if not (curve.desired or curve.mark)}) == 1
     for curve in shown:
         _draw_curve(panel, curve, time, units.x, units.of(cell.choice), single=single)
     for level in chart.levels:
@@ -171,11 +200,14 @@ def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
         label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
         low, high = units.x.factor * span.low, units.x.factor * span.high
         panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
+    if not chart.over_time and any(curve.mark for curve in shown):
+        panel.margins(x=_BESIDE)
     values = joined(units.of(cell.choice).factor * np.asarray(curve.y, dtype=float) for curve in shown)
     _set_scale(panel, "y", axis, values, units.of(cell.choice))
-    _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x)
+    _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x,
+               flush=not all(curve.mark for curve in shown))  # fmt: skip
     panel.set_title(mathematics(title))
-    panel.set_ylabel(mathematics(axis.label(units.of(cell.choice))))
+    panel.set_ylabel(mathematics(axis.label(units.of(cell.choice), short=cell.title.endswith(f": {axis.name}"))))
     panel.set_xlabel(mathematics(chart.x.label(units.x)))
 
 
@@ -201,9 +233,9 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         panel.barh(y, x, height=_BAR, color=colour, linewidth=0.0, label=label)
         return
     if curve.mark:
-        style = _DASHES[curve.look.dash] if curve.line else ""
-        panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], markersize=4.0, color=colour, label=label,
-                   markerfacecolor="white" if curve.mark == "ring" else colour)  # fmt: skip
+        style, inside = _DASHES[curve.look.dash] if curve.line else "", "white" if curve.mark == "ring" else colour
+        panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], color=colour, label=label,
+                   markersize=_SIZES[curve.mark == "square"], markerfacecolor=inside)  # fmt: skip
         return
     if curve.desired and single:
         panel.plot(x, y, label=label, **_DESIRED)
@@ -214,11 +246,12 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         panel.plot(x[known[-1]], y[known[-1]], **_STOPPED)
 
 
-def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: DisplayUnit) -> None:
-    """Set scale, limits and lines of an axis."""
+def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: DisplayUnit, *, flush: bool = True) -> None:
+    """Set scale, limits and lines of an axis; a logarithmic abscissa ends with its values if `flush`."""
     set_limits = panel.set_ylim if direction == "y" else panel.set_xlim
     if axis.names:
         list_lines(panel, axis.names)
+        panel.grid(axis="x", color="0.9", linewidth=0.4)
     elif axis.linear_below:
         _symmetrical(panel, direction, axis.linear_below * unit.factor)
     elif is_logarithmic(axis, values):
@@ -228,7 +261,7 @@ def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: Displ
             panel.yaxis.set_minor_locator(NullLocator())
             top = positive.max()
             set_limits(max(0.5 * np.percentile(positive, 0.5), top * 10.0**-_DECADES), 2.0 * top)
-        else:
+        elif flush:
             set_limits(positive.min(), positive.max())
     elif axis.extent:
         keep_flat(panel, unit.factor * axis.extent, direction)

@@ -9,14 +9,15 @@ from paraflex.formatting import GREEK, LONGEST, ROUNDING, printable, text_symbol
 from paraflex.results.metrics import metric_label
 from paraflex.units import STRESS
 
-# Letters of symbols in mathematics; η is that of modal coordinates.
-_LETTERS = {letter: rf"\{name}" for name, letter in GREEK.items()} | {"φ": r"\varphi", "η": r"\eta"}
+# Letters of symbols in mathematics.
+_LETTERS = {letter: rf"\{name}" for name, letter in GREEK.items()} | {"φ": r"\varphi"}
 _DOTS = {"\u0307": r"\dot ", "\u0308": r"\ddot ", "": ""}
 _RAISED_BACK = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
-# A Greek letter, or a Latin one with dots or a number or alone, as a symbol within a text.
+# A Greek letter, a Latin one with dots or a number, or one alone before a unit or before a colon at the beginning, as a
+# symbol within a text.
 _SYMBOL = re.compile(
-    rf"(?<![^\W\d_])(?:([{''.join(_LETTERS)}])([\u0307\u0308]?)([₀-₉]*)|([A-Za-z])(?:([\u0307\u0308])([₀-₉]*)|()([₀-₉]+)))"
-    r"(?![^\W\d_])"
+    rf"(?<![^\W\d_])(?:([{''.join(_LETTERS)}])([\u0307\u0308]?)([₀-₉]*)|([A-Za-z])(?:([\u0307\u0308])([₀-₉]*)|()([₀-₉]+)"
+    r"|(?= \[)|(?<=^.)(?=: )))(?![^\W\d_])"
 )
 
 

@@ -103,6 +103,7 @@ def label_outer_time(axes: NDArray[Any]) -> None:
         shown = [panel for panel in column if panel.get_visible()]
         for panel in shown[:-1]:
             panel.tick_params(labelbottom=False)
+            panel.set_xlabel("")
         shown[-1].set_xlabel(axis_label("time"))
 
 

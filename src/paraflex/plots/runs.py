@@ -27,12 +27,6 @@ START: dict[str, Any] = _MARK | {"marker": "s", "zorder": 4.0, "label": "start"}
 MOST_LINES = 7
 # Largest number of panels in one column.
 _MOST_ROWS = 4
-# Variables of the end-effector's motion, their quantities, and the factors to the units of their labels.
-END_EFFECTOR = (
-    ("end_effector", "position", 1e3),
-    ("end_effector_velocity", "velocity", 1.0),
-    ("end_effector_acceleration", "acceleration", 1.0),
-)
 
 
 def draw_actual(axes: Axes, run: xr.Dataset, x: ArrayLike, y: ArrayLike, **look: Any) -> None:

@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
-from paraflex.figures.selection import of_point, point_label, select_run
-from paraflex.formatting import peak
+from paraflex.figures.runs import round_magnification
 from paraflex.plots.given import drawn
 from paraflex.plots.layout import ONE_COLUMN, equal_scales_height, is_narrow, lay_out, panels
 from paraflex.plots.mechanism import draw_mechanism
@@ -24,8 +23,6 @@ from paraflex.plots.style import BLUE
 # Margin around the drawing as a share of its size, and smallest and largest ratio of a panel's height to its width.
 _MARGIN, _FLATTEST, _TALLEST = 0.06, 0.3, 1.3
 _TALLEST_WIDE = 0.75  # Largest ratio for a figure of two columns.
-# The largest deviation is shown as at most this share of the path's extent.
-_SHOWN_DEVIATION = 0.15
 
 
 @drawn
@@ -37,34 +34,6 @@ def desired_path(data: xr.Dataset) -> Figure:
     _draw_direction(axes, path)
     axes.plot(*path[0], **START)
     draw_mechanism(axes, data, path)
-    return finish_workspace(figure, axes)
-
-
-@drawn
-def end_effector_path(
-    data: xr.Dataset, mode: str, magnification: float | None = None, point: str | None = None
-) -> Figure:
-    """Plot the desired and the actual path of the end-effector, with magnified deviation between them (Fig. 15).
-
-    Parameters
-    ----------
-    magnification : float, optional
-        Magnification of the deviation; by default the largest of 1, 2, 5, 10, ... that keeps it small beside the path.
-    point : str, optional
-        Point "body.point" in place of the end-effector; it has no desired path, and its own path is not magnified.
-    """
-    run = of_point(select_run(data, mode), point)
-    if "end_effector_desired" in run:
-        return deviated_paths({point_label(run, None): run}, magnification)
-    if magnification is not None:
-        raise InputError(
-            "a point without a desired path has no deviation", field="magnification", value=magnification,
-            remedy="leave it out",
-        )  # fmt: skip
-    figure, axes = workspace_panel()
-    path = 1e3 * run["end_effector"].transpose("time", "axis").values
-    draw_actual(axes, run, *path.T, label=point_label(run, point))
-    axes.plot(*path[0], **START)
     return finish_workspace(figure, axes)
 
 
@@ -89,22 +58,6 @@ def deviated_paths(
     draw_desired(axes, *desired.T)
     axes.plot(*desired[0], **START)
     return finish_workspace(figure, axes)
-
-
-def round_magnification(deviation: NDArray[np.float64], extent: float) -> float:
-    """Return the largest of 1, 2, 5, 10, ... that keeps a deviation small relative to the extent of the path [mm].
-
-    It is 1 if the deviation is negligible.
-    """
-    lengths = np.linalg.norm(deviation, axis=1)
-    largest = peak(lengths)
-    if not largest > 1e-9 * extent:
-        return 1.0
-    room = _SHOWN_DEVIATION * extent / largest
-    if room < 1.0:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(room))
-    return power * max(digit for digit in (1.0, 2.0, 5.0) if digit * power <= room)
 
 
 def workspace_panel() -> tuple[Figure, Axes]:

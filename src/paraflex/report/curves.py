@@ -47,12 +47,6 @@ def largest(values: NDArray[np.float64]) -> float:
     return float(magnitudes.max()) if magnitudes.size else float("nan")
 
 
-def energy_scale(data: xr.Dataset) -> float:
-    """Return the largest energy or work of all runs [J], the scale for the rounding of energy imbalances."""
-    return max((largest(data[name].values) for name in ("kinetic_energy", "strain_energy", "work") if name in data),
-               key=np.nan_to_num, default=0.0)  # fmt: skip
-
-
 def errors(data: xr.Dataset) -> xr.DataArray:
     """Return the distance of the end-effector from its desired position [m], over the dimensions of runs and time."""
     gaps = (data["end_effector"] - data["end_effector_desired"]).transpose(..., "axis")
@@ -74,15 +68,6 @@ def bending(data: xr.Dataset, name: str = "tip_transverse") -> xr.DataArray:
     """Return the displacements of the ends of links that bend."""
     bent = [largest(data["tip_transverse"].sel(body=body).values) > 0.0 for body in data["body"].values]
     return data[name].isel(body=np.flatnonzero(bent))
-
-
-def deflections_of(data: xr.Dataset) -> NDArray[np.float64]:
-    """Return magnitudes of the deflections of links from their chords (..., time, body).
-
-    For results of earlier versions they are the transverse displacements of the links' ends.
-    """
-    name = "deflection" if "deflection" in data else "tip_transverse"
-    return np.abs(data[name].transpose(..., "time", "body").values)
 
 
 def joint_force_curves(force: NDArray[np.float64], x: NDArray[np.float64] | None = None) -> list[Curve]:
@@ -176,17 +161,6 @@ def plane_path(data: xr.Dataset, runs: Sequence[str], *, common: bool = True) ->
             name = f"deviation × {times:g}"
             curves.append(Curve(name, far[:, 1], far[:, 0], Look(1, DOTTED), run=r, shown=(r,)))
     return Chart("path", "End-effector path", "y [mm]", curves, x="x [mm]", equal=True, over_time=False)
-
-
-def energies(data: xr.Dataset, runs: Sequence[str]) -> Chart:
-    """Return a chart of kinetic and strain energy and work of the selected run."""
-    names = {"kinetic_energy": "kinetic", "strain_energy": "strain", "work": "work done on it"}
-    curves = [
-        Curve(label, data[name].values[r], run=r, shown=(r,), look=look(k))
-        for r in range(len(runs))
-        for k, (name, label) in enumerate(names.items())
-    ]
-    return Chart("energies", "Energies", "energy [J]", curves)
 
 
 def thinned(data: xr.Dataset) -> xr.Dataset:

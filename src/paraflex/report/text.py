@@ -129,6 +129,12 @@ def table_html(shown: Table) -> str:
     return table(heads, rows, caption=shown.title, note=shown.note, runs=shown.runs)
 
 
+def table_pairs(shown: Table) -> list[tuple[str, str]]:
+    """Return names and values of a table with one row, for `pairs`."""
+    return [(name, f"{typeset(cell)} {unit}".rstrip())
+            for (name, unit), cell in zip(shown.heads(), shown.texts()[0], strict=True)]  # fmt: skip
+
+
 def sections(tables: Iterable[Table]) -> list[tuple[str, str]]:
     """Return titles and HTML of the tables that have rows, those of one title together."""
     found: dict[str, str] = {}

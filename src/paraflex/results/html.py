@@ -8,6 +8,7 @@ import numpy as np
 
 from paraflex.display import facts, page, sentence, table
 from paraflex.dynamics.points import point_motion
+from paraflex.formatting import number, quantity
 from paraflex.integrators import Solution
 from paraflex.integrators.methods import title_of
 from paraflex.late import view
@@ -53,15 +54,15 @@ def motion_run_html(run: MotionRun) -> str:
     if solution.t.size:
         energies = [
             ("largest deflection", _deflection(run)),
-            ("kinetic energy, largest", f"{np.max(solution.kinetic_energy):.4g} J"),
-            ("strain energy, largest", f"{np.max(solution.strain_energy):.4g} J"),
+            ("kinetic energy, largest", _text(np.max(solution.kinetic_energy), "J")),
+            ("strain energy, largest", _text(np.max(solution.strain_energy), "J")),
         ]
         last = [values[-1:] for values in (solution.q, solution.v, solution.a)]
         names = [PointRef(body.name, point) for body in system.described.bodies for point in body.points]
         shown = [ref for ref in names if "._" not in str(ref)][:_MOST_LISTED]
         points = [(str(ref), *map(float, point_motion(system, ref, *last).position[0])) for ref in shown]
     given = {
-        name: "in time" if isinstance(law, AngleLaw) else f"{law:g}" for name, law in run.torques.items() if law != 0.0
+        name: "in time" if isinstance(law, AngleLaw) else number(law) for name, law in run.torques.items() if law != 0.0
     }
     torques = [f"{name} {value}" for name, value in given.items()]
     return page(
@@ -73,6 +74,10 @@ def motion_run_html(run: MotionRun) -> str:
     )
 
 
+def _text(value: float, unit: str) -> str:
+    return quantity(value, unit, digits=4, padded=False)
+
+
 def _verdict(run: TrackingRun | MotionRun) -> str:
     return "" if run.validity is None else run.validity.verdict
 
@@ -82,7 +87,7 @@ def _ended(solution: Solution) -> str:
         return solution.status
     # A run fails after its last sample; its message gives the time.
     until = " at" if solution.status in ("complete", "stopped") else ", its last sample at"
-    return f"{solution.status}{until} t = {solution.t[-1]:.4g} s"
+    return f"{solution.status}{until} t = {number(solution.t[-1])} s"
 
 
 def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
@@ -92,13 +97,13 @@ def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
         return []
     traces = run_traces(run)
 
-    def millimetres(metric: str) -> str:
-        return f"{1e3 * METRICS[metric].value(traces):.4g} mm"
+    def length(metric: str) -> str:
+        return _text(METRICS[metric].value(traces), "m")
 
-    after = [] if traces.moving.all() else [("tracking error after it, RMS", millimetres("tracking_rms_after"))]
+    after = [] if traces.moving.all() else [("tracking error after it, RMS", length("tracking_rms_after"))]
     return [
-        ("tracking error during the motion, RMS", millimetres("tracking_rms_motion")),
-        ("tracking error during the motion, largest", millimetres("tracking_max_motion")),
+        ("tracking error during the motion, RMS", length("tracking_rms_motion")),
+        ("tracking error during the motion, largest", length("tracking_max_motion")),
         *after,
         ("largest deflection", _deflection(run)),
         ("condition number, worst", float(METRICS["actuation_condition_max"].value(traces))),
@@ -106,10 +111,10 @@ def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
 
 
 def _deflection(run: TrackingRun | MotionRun) -> str | None:
-    """Return the largest deflection of any flexible body from its chord as text in mm; None if there is none."""
+    """Return the largest deflection of any flexible body from its chord as text; None if there is none."""
     system = run.task.system if isinstance(run, TrackingRun) else run.system
     bent = np.abs(deflections(system, run.solution.q))
-    return f"{1e3 * np.nanmax(bent):.4g} mm" if np.isfinite(bent).any() else None
+    return _text(np.nanmax(bent), "m") if np.isfinite(bent).any() else None
 
 
 def _solver(solution: Solution, method: str) -> list[tuple[str, Any]]:
@@ -119,7 +124,7 @@ def _solver(solution: Solution, method: str) -> list[tuple[str, Any]]:
         ("steps", f"{solution.steps}, {solution.rejected} more rejected"),
         ("Newton iterations", solution.newton_iterations),
         ("factorisations", solution.factorisations),
-        ("wall time", f"{solution.wall_time:.3g} s"),
-        ("largest violation of constraints", f"{solution.constraint_position_max:.2g} m"),
-        ("largest imbalance of energy", f"{imbalance:.2g} J" if np.isfinite(imbalance) else None),
+        ("wall time", quantity(solution.wall_time, "s")),
+        ("largest violation of constraints", quantity(solution.constraint_position_max, "m")),
+        ("largest imbalance of energy", quantity(imbalance, "J") if np.isfinite(imbalance) else None),
     ]

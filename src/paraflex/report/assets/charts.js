@@ -6,6 +6,8 @@ const charts = (() => {
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
   // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
   const PAPER = 640, LOW = 200, LOW_TITLE = 10;
+  // Charts of a panel that stand open; more are folded.
+  const MOST_OPEN = 6;
   const all = [];
 
   // Plotly reads tags in text; names are not to be read so.
@@ -137,8 +139,9 @@ const charts = (() => {
     for (const [name, value] of Object.entries({ x1: 0, x2: 26, y1: 5, y2: 5, stroke, "stroke-width": 2, "stroke-dasharray": SAMPLES[curve.dash] })) line.setAttribute(name, value);
     if (curve.mark) {
       const mark = document.createElementNS("http://www.w3.org/2000/svg", "path");
-      const d = curve.mark === "ring" ? "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0" : "M9 1L17 9M9 9L17 1";
-      for (const [name, value] of Object.entries({ d, stroke, "stroke-width": 1.6, fill: "none" })) mark.setAttribute(name, value);
+      const round = "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0", square = "M10 2h6v6h-6z";
+      const d = { ring: round, dot: round, square, bar: square, cross: "M9 1L17 9M9 9L17 1" }[curve.mark];
+      for (const [name, value] of Object.entries({ d, stroke, "stroke-width": 1.6, fill: curve.mark === "ring" ? "none" : stroke })) mark.setAttribute(name, value);
       svg.append(mark);
     } else svg.append(line);
     return svg;
@@ -147,7 +150,7 @@ const charts = (() => {
   function drawLegend(chart) {
     const byName = new Map();
     for (const curve of chart.description.curves) {
-      if (isShown(chart, curve)) byName.set(curve.name, [...(byName.get(curve.name) || []), curve]);
+      if (curve.name && isShown(chart, curve)) byName.set(curve.name, [...(byName.get(curve.name) || []), curve]);
     }
     chart.legend.replaceChildren();
     if (byName.size < 2) return;
@@ -250,7 +253,10 @@ const charts = (() => {
   function start() {
     const holders = [...page.survey.map((panel) => [panel, "survey"]), ...page.panels.map((panel) => [panel, "panels"])];
     for (const [panel, place] of holders) {
-      document.getElementById(place).append(element("h2", {}, panel.title), element("div", { class: "charts" }, ...panel.charts.map(make)));
+      const made = panel.charts.map(make);
+      document.getElementById(place).append(element("h2", {}, panel.title), element("div", { class: "charts" }, ...made.splice(0, MOST_OPEN)));
+      if (made.length) document.getElementById(place).append(element("details", {},
+        element("summary", {}, `${made.length} more charts: ${made.map((figure) => figure.querySelector("h3").textContent).join(", ")}`), element("div", { class: "charts" }, ...made)));
     }
     const byFigure = new Map(all.map((chart) => [chart.figure, chart]));
     const watch = new IntersectionObserver((entries) => {

@@ -1,0 +1,89 @@
+"""Charts of a run without a path: angles, speeds and energies, generalised coordinates, paths of points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import xarray as xr
+
+from paraflex.figures.catalogue import figure
+from paraflex.figures.charts import Axis, Chart, Curve, look
+from paraflex.figures.run_motion import ANGLE, ANGLES, RATES, energy_chart, moving_points, points_of
+from paraflex.figures.runs import followed, ranges, stopped_runs
+from paraflex.figures.selection import names_of
+from paraflex.formatting import ROUNDING, peak, text_symbol
+
+# Axes of coordinates by the last part of their names.
+_KINDS = {
+    "x": Axis("displacement", "m", "x"),
+    "y": Axis("displacement", "m", "y"),
+    "phi": ANGLE,
+    "eta": Axis("modal coordinate", "m √kg", "η"),
+}
+# Largest number of points that a chart shows; results.nc has all.
+_MOST_POINTS = 60
+
+
+@figure("angles, speeds and energies", written_as="motion_overview", height=40.0)
+def motion_overview(data: xr.Dataset) -> Iterator[Chart]:
+    """Yield charts of the angles and angular velocities of the bodies, and of the energies."""
+    yield followed(ANGLES, data, data["angle"])
+    yield followed(RATES, data, data["angular_velocity"])
+    yield energy_chart(data)
+
+
+@figure("paths of named points in the plane", heading="Points", points="points",
+        defaults=lambda data: {"points": [names_of(data, "point")[k] for k in moving_points(data)]})  # fmt: skip
+def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]:
+    """Yield the chart of the paths of named points in the plane.
+
+    Parameters
+    ----------
+    points : sequence of str
+        Points "body.point" to plot; by default all that move. The printed figure by default shows the end-effector and
+        the points that travel most, up to seven.
+    """
+    places = data["point_position"].isel(mode=0).transpose("point", "time", "axis").values
+    names = names_of(data, "point")
+    shown = points_of(data, points) if points else moving_points(data, _MOST_POINTS)
+    stopped = stopped_runs(data)[0]
+    curves = []
+    for k, one in enumerate(shown):
+        x, y = places[one].T
+        curves += [Curve(names[one], y, x, look(k), run=0, stopped=stopped),
+                   Curve("", y[:1], x[:1], look(k), mark="square")]  # fmt: skip
+    if not shown:
+        curves = [Curve("points, which do not move", places[:, 0, 1], places[:, 0, 0], look(0), mark="dot")]
+    yield Chart("points", "Paths of points", Axis("", "m", "y"), curves, Axis("", "m", "x"), equal=True,
+                on_page=bool(shown))  # fmt: skip
+
+
+@figure("generalised coordinates, including modal coordinates of bodies", heading="Coordinates", panels="choices",
+        variables=("coordinate_value",), height=34.0)  # fmt: skip
+def coordinates(data: xr.Dataset) -> Iterator[Chart]:
+    """Yield the chart of the generalised coordinates that change: of one kind at a time.
+
+    They are positions and angles of body frames, and flexible coordinates.
+    """
+    names, bodies = names_of(data, "coordinate"), names_of(data, "body")
+    values = data["coordinate_value"].transpose("mode", "time", "coordinate").values
+    travel = ranges(values[0])
+    kinds = [name.rpartition(".")[2].rstrip("0123456789") for name in names]
+    groups = {kind: [k for k, one in enumerate(kinds) if one == kind and travel[k] > ROUNDING] for kind in _KINDS}
+    groups = {kind: members for kind, members in groups.items() if members} or {"phi": list(range(len(names)))[:1]}
+    curves, stopped = [], stopped_runs(data)[0]
+    for choice, (kind, members) in enumerate(groups.items()):
+        for place, k in enumerate(members):
+            body, _, own = names[k].rpartition(".")
+            # A body has the same look in all charts of its frame's coordinates.
+            label, style = text_symbol(body), look(bodies.index(body))
+            if kind == "eta":
+                label, style = f"{label}: {text_symbol(own)}", look(place)
+            curves.append(Curve(label, values[0, :, k], look=style, run=0, choice=choice, stopped=stopped))
+    yield Chart(
+        "coordinates", "Generalised coordinates",
+        [replace(_KINDS[kind], extent=peak(values[..., own])) for kind, own in groups.items()],
+        curves, choices=[text_symbol(kind) for kind in groups], choosing="coordinate",
+        note="Coordinates that do not change are left out. Flexible coordinates are those of mass-normalised modes.",
+    )  # fmt: skip
