@@ -96,9 +96,9 @@ _NOTHING_MOVES = (
 )
 _DESIGN_DRAWINGS = ("response_curves", "response_map", "parallel_coordinates", "pareto_front")
 _RUN_DRAWINGS = (
-    "mechanism_drawing", "energies", "joint_forces", "beam_stresses", "stress_envelope", "joint_motions",
-    "drive_efforts", "frame_loads", "sensors", "controllers", "link_deflections", "point_motions", "link_phases",
+    "mechanism_drawing", "energies", "link_deflections", "point_motions", "link_phases",
 )  # fmt: skip
+_RUN_FIGURES = ("loads", "controllers", "sensors")
 _STUDY = ("study.json", "journal.sqlite", "results.parquet")
 RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
     ResultKind("sweep", STUDY_OF_RUNS, _STUDY,
@@ -141,10 +141,10 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
                ("frequency", "frequencies"), "reduction.reduction_page", refusals={"motion": _NOTHING_MOVES},
                drawings=("reduced_responses", "reduction_errors", "held_frequency_by_states", "bases_along_path")),
     ResultKind("motion", RUN, ("summary.json", "results.nc"), "results.nc", "motion_dataset",
-               page="motion.motion_page",
+               page="motion.motion_page", figures=_RUN_FIGURES,
                drawings=("motion_overview", "coordinates", "point_paths", *_RUN_DRAWINGS)),
     ResultKind("tracking", RUN, ("summary.json", "results.nc"), "results.nc", "tracking_dataset or run_study",
-               page="tracking.report_of_folder", with_folder=True,
+               page="tracking.report_of_folder", with_folder=True, figures=_RUN_FIGURES,
                drawings=(
         "desired_path", "motor_torques", "tip_deflections", "link_motions", "end_effector_path", "end_effector_motion",
         "phase_diagrams", "tracking_errors", "tracking_distance", "mode_comparison", "actuation_condition",

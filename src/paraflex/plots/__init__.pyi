@@ -6,13 +6,20 @@ from .agreement import (
     model_distances as model_distances,
 )
 from .charts import (
+    beam_stresses as beam_stresses,
+    controllers as controllers,
+    drive_efforts as drive_efforts,
     force_travel as force_travel,
+    frame_loads as frame_loads,
     free_travels as free_travels,
     joint_force_travel as joint_force_travel,
+    joint_forces as joint_forces,
+    joint_motions as joint_motions,
+    sensors as sensors,
     stiffness_travel as stiffness_travel,
+    stress_envelope as stress_envelope,
     stress_travel as stress_travel,
 )
-from .controlled import controllers as controllers
 from .derivatives import elasticities as elasticities
 from .drawing import mechanism_drawing as mechanism_drawing
 from .driving import (
@@ -37,7 +44,6 @@ from .linear import (
     singular_values as singular_values,
 )
 from .maps import response_map as response_map
-from .measured import sensors as sensors
 from .methods import work_precision as work_precision
 from .mode_shapes import mode_shapes as mode_shapes
 from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
@@ -53,16 +59,8 @@ from .reduction import (
 from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
 from .spectra import numerical_damping as numerical_damping
-from .stress import (
-    beam_stresses as beam_stresses,
-    drive_efforts as drive_efforts,
-    frame_loads as frame_loads,
-    joint_motions as joint_motions,
-    stress_envelope as stress_envelope,
-)
 from .time_series import (
     end_effector_motion as end_effector_motion,
-    joint_forces as joint_forces,
     link_deflections as link_deflections,
     link_motions as link_motions,
     tip_deflections as tip_deflections,

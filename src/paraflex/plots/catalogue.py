@@ -98,62 +98,6 @@ _DRAWINGS: Mapping[str, Figure] = {
             takes="mode",
         ),
         Figure(
-            "joint_forces",
-            "magnitude of the force in every joint over time",
-            module="time_series",
-            takes="mode",
-            variables=("joint_force",),
-        ),
-        Figure(
-            "beam_stresses",
-            "largest stress of every beam over time",
-            module="stress",
-            takes="mode",
-            variables=("stress",),
-        ),
-        Figure(
-            "stress_envelope",
-            "largest stress of the run along every beam",
-            module="stress",
-            takes="mode",
-            variables=("section_moment",),
-        ),
-        Figure(
-            "joint_motions",
-            "angle or travel of every joint, and its rate, over time",
-            module="stress",
-            takes="mode",
-            variables=("joint_coordinate",),
-        ),
-        Figure(
-            "drive_efforts",
-            "torque, speed and power of motors and prescribed motions",
-            module="stress",
-            takes="mode",
-            variables=("input_power",),
-        ),
-        Figure(
-            "frame_loads",
-            "shaking force and moment of the mechanism on the ground",
-            module="stress",
-            takes="mode",
-            variables=("frame_force",),
-        ),
-        Figure(
-            "sensors",
-            "reading of every sensor, a panel for each unit",
-            module="measured",
-            takes="mode",
-            variables=("sensor_reading",),
-        ),
-        Figure(
-            "controllers",
-            "torques of controllers before and after limits, and their readings",
-            module="controlled",
-            takes="mode",
-            written_as="controllers",
-        ),
-        Figure(
             "link_deflections", "transverse displacement of the ends of all links", module="time_series", takes="mode"
         ),
         Figure(

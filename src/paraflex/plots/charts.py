@@ -76,9 +76,9 @@ def plotting_function(name: str) -> Callable[..., Figure]:
         if entry.takes == "mode" and mode is None and "mode" in getattr(data, "dims", ()):
             mode = default_mode(data)
         found = prepared(data, mode)
-        charts = list(entry.charts(found, **options))
+        charts = list(entry.charts(found, **options)) if entry.has_variables(found) else []
         if not charts:
-            raise InputError("nothing to show in these results", field="figure", value=name, remedy="choose another")
+            raise InputError(entry.nothing[0], field="figure", value=name, remedy=entry.nothing[1])
         if not isinstance(found, xr.Dataset) or "time" not in found.dims:
             return print_figure(entry, charts)
         return print_figure(entry, charts, found["time"].values, names_of(found, "mode"))

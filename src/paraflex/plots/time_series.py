@@ -99,14 +99,6 @@ def link_deflections(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 
 @drawn
-def joint_forces(data: xr.Dataset, mode: str | None = None) -> Figure:
-    """Plot the magnitude of the force in every joint over time; of more than seven, the seven largest."""
-    run = one_run(data, mode)
-    forces = np.linalg.norm(run["joint_force"].transpose("time", "joint", "axis").values, axis=2)
-    return largest_over_time(data, run, forces, "joint", axis_label("force"))
-
-
-@drawn
 def link_motions(data: xr.Dataset, mode: str) -> Figure:
     """Plot angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14).
 

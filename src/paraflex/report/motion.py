@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.catalogue import page_panels
+from paraflex.figures.runs import thinned
 from paraflex.figures.selection import names_of
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import text_symbol
-from paraflex.report.controllers import controller_panels, controller_tables
 from paraflex.report.curves import (
     TIPS,
     bending,
@@ -19,13 +20,11 @@ from paraflex.report.curves import (
     energies,
     energy_scale,
     followed,
-    joint_force_curves,
     largest,
     look,
-    thinned,
 )
 from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.loads import load_panel, load_tables, load_tiles
+from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
@@ -57,7 +56,7 @@ def motion_page(data: xr.Dataset) -> Page:
         facts=common_facts(data),
         command=run_command_line(asked(data)),
         figures=_figures(data),
-        more=[*controller_tables(data), *load_tables(data), *reduction_tables(data), ("Integration", _table(data))],
+        more=[*load_tables(data), *reduction_tables(data), ("Integration", _table(data))],
         panels=_panels(few),
         time=few["time"].values,
         runs=_ALONE,
@@ -122,13 +121,10 @@ def _panels(data: xr.Dataset) -> list[Panel]:
     points = _points(data)
     if points is not None:
         motion.append(points)
-    panels = [Panel("Motion", motion), Panel("Energies", [energies(run, _ALONE)])]
-    if data.sizes["joint"]:
-        panels.append(Panel("Joints", [_joint_forces(data)]))
     return [
-        *panels,
-        *controller_panels(run, _ALONE),
-        *load_panel(run, _ALONE),
+        Panel("Motion", motion),
+        Panel("Energies", [energies(run, _ALONE)]),
+        *page_panels("motion", data),
         Panel("Coordinates", [_coordinates(data, bodies)]),
     ]
 
@@ -157,16 +153,6 @@ def _points(data: xr.Dataset) -> Chart | None:
     return Chart(
         "points", "Paths of points", f"y [{unit.name}]", curves, x=f"x [{unit.name}]", equal=True, over_time=False
     )
-
-
-def _joint_forces(data: xr.Dataset) -> Chart:
-    force = data["joint_force"].transpose("joint", "time", "axis").values
-    names = names_of(data, "joint")[:_MOST_CHOICES]
-    return Chart(
-        "forces", "Joint forces", "force [N]", joint_force_curves(force[: len(names)]),
-        choices=[text_symbol(name) for name in names], choosing="joint",
-        note="On the joint's second body, in the ground frame.",
-    )  # fmt: skip
 
 
 def _coordinates(data: xr.Dataset, bodies: list[str]) -> Chart:

@@ -11,10 +11,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.catalogue import page_panels
+from paraflex.figures.runs import thinned
 from paraflex.figures.selection import default_mode, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import display_unit, text_symbol
-from paraflex.report.controllers import controller_panels, controller_tables
 from paraflex.report.curves import (
     DOTTED,
     ERRORS,
@@ -30,12 +31,11 @@ from paraflex.report.curves import (
     largest,
     look,
     plane_path,
-    thinned,
     torque_chart,
     torque_unit,
 )
 from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.loads import load_panel, load_tables, load_tiles
+from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, summary_beside, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
@@ -90,12 +90,11 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         figures=_figures(data),
         more=[
             ("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {})),
-            *controller_tables(data),
             *load_tables(data, default_mode(data)),
             *reduction_tables(data),
             ("Integration", solver_table(data)),
         ],
-        panels=[*_panels(few, runs), *controller_panels(few, runs), *load_panel(few, runs)],
+        panels=[*_panels(few, runs), *page_panels("tracking", few)],
         time=few["time"].values,
         runs=runs,
         selected=runs.index(default_mode(data)),
