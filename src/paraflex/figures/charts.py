@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 # Numbers of colours and of dashes; the latter include the solid line.
 N_COLOURS, N_DASHES = 8, 5
 DASHED, DOTTED = 1, 2
-# Dashes of successive curves; dotted lines, which often have a meaning of their own, are the last.
-_DASHES = (0, 1, 3, 4, 2)
+# Dashes of successive curves; dotted lines, which are hard to see, come last.
+_DASH_ORDER = (0, 1, 3, 4, 2)
 # Ratio of the largest to the smallest positive value above which an axis that may be logarithmic is.
 _DECADE = 10.0
 
@@ -41,7 +41,7 @@ PLAIN_LOOK = Look()
 
 def look(k: int) -> Look:
     """Return colour and dash of the k-th curve; up to 40 curves differ, and up to eight of them in colour."""
-    return Look(k % N_COLOURS, _DASHES[(k % N_COLOURS + k // N_COLOURS) % N_DASHES])
+    return Look(k % N_COLOURS, _DASH_ORDER[(k % N_COLOURS + k // N_COLOURS) % N_DASHES])
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ _MOST_CHOICES = 60
 # Number of rows above which a table of stresses has only the beam with the largest stress of each run.
 _MOST_ROWS = 40
 _LOADS = "Loads"
+_ERRORS = " After ±: how far a load may be off by errors of integration, where that is more than 1 %."
 _NO_STRESS = (
     "the stresses of these beams are not known",
     "give their sections outer_fibre, or sides, and run the model again",
@@ -209,6 +210,8 @@ def stress_table(loads: LoadsOfRuns, heads: Sequence[str] = (), *, largest: bool
         note += " A section without outer_fibre has no bending stress."
     elif any(one["axial_stress_max"] is None for one in figures):
         note += " Coordinates of a beam without axial stress do not stretch: its stress is of bending alone."
+    if any(resolved_error(one, "stress") for one in figures):
+        note += _ERRORS
     columns = [
         *run_columns([run for run, *_ in rows], heads),
         Column("beam", [body for _, body, _ in rows]),
@@ -260,7 +263,7 @@ def joint_tables(loads: Mapping[str, Any]) -> Iterator[Table]:
         shown = common_unit(unit, [one[key] for one in rows for key in ("least", "most")])
         note = f"{what}. From and to: {word}; largest magnitudes and their times."
         if any(resolved_error(one, key) for one in rows for key in ("force", "moment")):
-            note += " After ±: how far a load may be off by errors of integration, where that is more than 1 %."
+            note += _ERRORS
         yield Table(title, [
             Column("joint", list(own)),
             *(Column(head, [one[key] for one in rows], unit, shown=shown)

@@ -21,8 +21,9 @@ _SHOWN_DEVIATION = 0.15
 
 
 def run_names(data: xr.Dataset) -> list[str]:
-    """Return the names of runs in legends: "mode +-+-"; empty for a run without modes."""
-    return [f"mode {name}" if name else "" for name in names_of(data, "mode")]
+    """Return the names of runs in legends: "mode +-+-", or another noun; empty for a run without modes."""
+    noun = data["mode"].attrs.get("noun", "mode")
+    return [f"{noun} {name}".lstrip() if name else "" for name in names_of(data, "mode")]
 
 
 def stopped_runs(data: xr.Dataset) -> list[bool]:

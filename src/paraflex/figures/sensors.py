@@ -35,9 +35,9 @@ def sensors(data: xr.Dataset) -> Iterator[Chart]:
     """Yield a chart of the readings of sensors over time for each unit, without sensors that have no readings."""
     units = sensor_units(data)
     values = data[READING].transpose("mode", "time", SENSOR)
-    known = np.isfinite(values.values).any(axis=(0, 1))
-    for k, unit in enumerate(dict.fromkeys(unit for unit, is_known in zip(units, known, strict=True) if is_known)):
-        own = [s for s, each in enumerate(units) if each == unit and known[s]]
+    known = [s for s in range(len(units)) if np.isfinite(values.values[:, :, s]).any()]
+    for k, unit in enumerate(dict.fromkeys(units[s] for s in known)):
+        own = [s for s in known if units[s] == unit]
         quantity = _QUANTITIES.get(unit, "reading")
         axis = Axis(quantity, shown=_STRAIN if unit == "1" else None)
         chart = Chart(f"sensors-{k}", f"Sensors: {quantity}", axis, choosing="sensor")

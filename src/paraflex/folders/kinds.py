@@ -98,7 +98,7 @@ _DESIGN_DRAWINGS = ("response_curves", "response_map", "parallel_coordinates", "
 _RUN_DRAWINGS = (
     "mechanism_drawing", "energies", "link_deflections", "point_motions", "link_phases",
 )  # fmt: skip
-_RUN_FIGURES = ("loads", "controllers", "sensors")
+_RUN_FIGURES = ("controllers", "loads", "sensors")
 _STUDY = ("study.json", "journal.sqlite", "results.parquet")
 RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
     ResultKind("sweep", STUDY_OF_RUNS, _STUDY,

@@ -42,7 +42,7 @@ _MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o"}
 # Height of a bar, as a share of the distance of two names.
 _BAR = 0.6
 # Dashes by their numbers in a look.
-_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), ":", (0, (5, 1.5, 1, 1.5)), (0, (9, 2)))
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)), (0, (9, 2)))
 _DESIRED: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 0.8, "zorder": 2.5}
 _STOPPED: dict[str, Any] = {
     "color": BLACK, "linestyle": "none", "marker": "x", "markersize": 4.5, "markeredgewidth": 1.2, "zorder": 3.0,

@@ -69,7 +69,7 @@ def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str,
         _, run, body, one = stresses[0]
         factor = "" if one["safety_factor"] is None else f", safety factor {number(one['safety_factor'], 3)}"
         where = f"{_of(run, body)} at {quantity(one['place'], 'm', padded=False)}, t = {number(one['time'])} s{factor}"
-        tiles.append(("largest stress", load_text(one, "stress", "Pa"), where))
+        tiles.append(("largest stress", load_text(one, "stress", "Pa", 3), where))
     for _, run, name, one in ranked(figures, "drives", "torque_max")[:_MOST_TILES]:
         unit = one["torque_unit"] or ""
         kind = {"N m": "torque", "N": "force"}.get(unit, "effort")
@@ -77,12 +77,12 @@ def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str,
         if one["power_max"] is not None and one["speed_max"] is not None:
             power = quantity(one["power_max"], "W", padded=False)
             of += f"; up to {speed_text(one['speed_max'], one['speed_unit'] or '', 3)}, {power}"
-        tiles.append((f"largest drive {kind}", load_text(one, "torque", unit), of))
+        tiles.append((f"largest drive {kind}", load_text(one, "torque", unit, 3), of))
     forces = ranked(figures, "joints", "force_max")
     if forces and forces[0][0]:
         _, run, joint, one = forces[0]
         where = f"{_of(run, joint)}, t = {number(one['force_time'])} s"
-        tiles.append(("largest joint force", load_text(one, "force", "N"), where))
+        tiles.append(("largest joint force", load_text(one, "force", "N", 3), where))
     return tiles
 
 

@@ -168,7 +168,8 @@ def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Datase
     first = parts[0]
     # Coordinates are taken from the first run; common ones are equal.
     data = xr.concat(parts, dim="mode", coords="minimal", compat="override", join="override", combine_attrs="override")
-    return data.assign_coords(mode=list(labels)).assign_attrs(runs[0].attrs | first.attrs)
+    # The labels are whole names of runs.
+    return data.assign_coords(mode=("mode", list(labels), {"noun": ""})).assign_attrs(runs[0].attrs | first.attrs)
 
 
 def _of_one_kind(runs: Mapping[int, xr.Dataset]) -> tuple[dict[int, xr.Dataset], list[int]]:

@@ -31,7 +31,6 @@ from paraflex.report.curves import (
     largest,
     look,
     plane_path,
-    torque_chart,
     torque_unit,
 )
 from paraflex.report.film import NO_SHAPES, animation
@@ -226,10 +225,7 @@ def _panels(data: xr.Dataset, runs: list[str]) -> list[Panel]:
         ]
     return [
         Panel("Following the path", [compared(ERRORS, errors(data), runs), plane_path(data, runs)]),
-        Panel("Motors", [
-            followed(torque_chart(data), data["torque"], runs),
-            compared(condition, data["actuation_condition"], runs),
-        ]),
+        Panel("Motors", [compared(condition, data["actuation_condition"], runs)]),
         Panel("Links", links),
         Panel("Energies", [energies(data, runs), compared(STRAIN, data["strain_energy"], runs)]),
     ]  # fmt: skip

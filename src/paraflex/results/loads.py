@@ -114,11 +114,11 @@ def resolved_error(figures: Mapping[str, Any], load: str) -> float | None:
     return error if most and error is not None and error > RESOLVED * most else None
 
 
-def load_text(figures: Mapping[str, Any], load: str, unit: str) -> str:
+def load_text(figures: Mapping[str, Any], load: str, unit: str, digits: int = 4) -> str:
     """Return a largest load with its unit, and with its error if that is `resolved_error`: "47.06 ± 9 MPa"."""
     most, shown = figures[f"{load}_max"], display_unit(unit, figures[f"{load}_max"])
     off = error_text(resolved_error(figures, load), shown.factor)
-    return f"{number(most, factor=shown.factor)}{off} {shown.name}".rstrip()
+    return f"{number(most, digits, factor=shown.factor)}{off} {shown.name}".rstrip()
 
 
 def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
