@@ -42,12 +42,15 @@ _PREFIXES = {
     "Pa": (DisplayUnit("GPa", 1e-9), STRESS),
     "m √kg": (DisplayUnit("mm √kg", 1e3), DisplayUnit("µm √kg", 1e6)),
     "N/m": (DisplayUnit("kN/mm", 1e-6), DisplayUnit("N/mm", 1e-3), DisplayUnit("N/m", 1.0)),
+    "N": (DisplayUnit("kN", 1e-3), DisplayUnit("N", 1.0)),
+    "N m": (DisplayUnit("kN m", 1e-3), DisplayUnit("N m", 1.0)),
+    "W": (DisplayUnit("kW", 1e-3), DisplayUnit("W", 1.0)),
     "m/N": (DisplayUnit("mm/N", 1e3), DisplayUnit("µm/N", 1e6), DisplayUnit("nm/N", 1e9)),
 }
 # Magnitude from which a small value of several stands in the unit of the largest.
 _FEW_ZEROS = 0.01
 # Smallest peak for which a unit is used; GPa is for moduli, stresses are in MPa.
-_LEAST, _LEAST_OF = 0.1, {"GPa": 2.0, "kN/mm": 1.0}
+_LEAST, _LEAST_OF = 0.1, {"GPa": 2.0, "kN/mm": 1.0, "kN": 10.0, "kN m": 10.0, "kW": 10.0}
 
 
 def number(
@@ -111,6 +114,17 @@ def quantity(value: float, unit: str, shown: DisplayUnit | None = None, digits: 
     """Format a value in a suitable unit, or in a given one: "0.377 mm"."""
     shown = shown or display_unit(unit, value)
     return f"{number(value, digits, factor=shown.factor, padded=padded)} {shown.name}".rstrip()
+
+
+def error_text(error: float | None, factor: float = 1.0) -> str:
+    """Format an error times a factor with one digit, to be written behind its value: " ± 600"; empty if it is None."""
+    return "" if error is None else f" ± {number(float(f'{factor * error:.0e}'), 1)}"
+
+
+def speed_text(speed: float, unit: str, digits: int = 4) -> str:
+    """Format a speed in m/s or rad/s; the latter also in rpm, as a value given without a unit may have been in rpm."""
+    turns = f", {number(speed, digits, factor=30.0 / math.pi)} rpm" if unit == "rad/s" else ""
+    return f"{number(speed, digits)} {unit}{turns}".rstrip()
 
 
 def count(value: float | None) -> str:

@@ -31,12 +31,6 @@ def printed_unit(unit: str) -> DisplayUnit:
     return STRESS if unit == "Pa" else DisplayUnit("" if unit == "1" else unit, 1.0)
 
 
-def speed_text(speed: float, unit: str, form: str = ".4g") -> str:
-    """Format a speed in m/s or rad/s; the latter also in rpm, as a value given without a unit may have been in rpm."""
-    turns = f", {speed * 30.0 / math.pi:{form}} rpm" if unit == "rad/s" else ""
-    return f"{speed:{form}} {unit}{turns}"
-
-
 class Unit(NamedTuple):
     """Unit with its exact value in SI units, `factor` times pi to the power `pi`, and its dimension."""
 

@@ -17,6 +17,7 @@ from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, cl
 from paraflex.errors import ProportionError
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
+from paraflex.formatting import speed_text
 from paraflex.mechanism import (
     Actuator,
     AngleLaw,
@@ -31,7 +32,6 @@ from paraflex.mechanism import (
     grouped,
     loops,
 )
-from paraflex.units import speed_text
 
 # Largest number of loops and of redundant constraints listed.
 _LISTED = 1000

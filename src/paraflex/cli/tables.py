@@ -13,7 +13,6 @@ from rich.table import Table
 from paraflex.cli.collected import printed
 from paraflex.errors import printable
 from paraflex.findings import DONE_STATUSES, Finding
-from paraflex.units import STRESS
 
 if TYPE_CHECKING:
     from paraflex.figures.tables import Table as Described
@@ -21,10 +20,6 @@ if TYPE_CHECKING:
     # Their import takes as long as all of `paraflex info`.
     from paraflex.studies import StudyResult
     from paraflex.tracking import TrackingTask
-
-
-# Torques below this share of the largest are rounding errors.
-_ROUNDING = 1e-9
 
 
 class _PlainConsole(Console):
@@ -99,27 +94,9 @@ def controllers(
     console: Console, runs: Sequence[tuple[Sequence[str], Mapping[str, Any]]], texts: Sequence[str] = ()
 ) -> None:
     """Print a table of the controllers of runs, if any; `texts` are the heads of the columns that name a run."""
-    rows = []
-    for names, run in runs:
-        internal = number(_unless_rounding(run.get("internal_torque_max"), run.get("peak_torque", {})), ".2g")
-        for name, one in run.get("controllers", {}).items():
-            most = max((each["given_max"] or 0.0 for each in one["torques"].values()), default=0.0)
-            share = "" if one["saturated_share"] is None else f"{100.0 * one['saturated_share']:.3g}"
-            times = (f"{1e3 * one[key]:.4g}" for key in ("period", "delay"))
-            rows.append([*names, name, one["law"], *times, f"{most:.3g}", share, *([internal] if texts else [])])
-    if rows:
-        numbers = ["period\n[ms]", "delay\n[ms]", "largest\ntorque", "limited\n[%]"]
-        numbers += ["internal\ntorque"] if texts else []
-        console.print(plain_table(*texts, "controller", "law", numbers=numbers, rows=rows, title="Controllers"))
+    from paraflex.figures.controllers import controller_table
 
-
-def _unless_rounding(value: float | None, beside: Mapping[str, float | None]) -> float | None:
-    """Return a value, or zero if it is a rounding error of the values beside it."""
-    return (
-        0.0
-        if value is not None and value < _ROUNDING * max((x or 0.0 for x in beside.values()), default=0.0)
-        else value
-    )
+    print_table(console, controller_table({tuple(names): run for names, run in runs}, texts))
 
 
 def plain_table(
@@ -152,17 +129,25 @@ def print_tables(console: Console, tables: Iterable[Described]) -> None:
     """Print tables that have rows below their titles, a title that several share only once."""
     title = None
     for shown in filter(None, tables):
-        heads = [f"{name}\n[{unit}]" if unit and column.is_numeric else "\n".join(filter(None, (name, unit)))
-                 for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
-        table = plain_table()
-        for head, column in zip(heads, shown.columns, strict=True):
-            table.add_column(head, justify="right" if column.is_numeric else "left", no_wrap=True)
-        for row in shown.texts():
-            table.add_row(*row)
-        if shown.title != title:
-            console.print(shown.title, soft_wrap=True)
-        console.print(table)
+        print_table(console, shown, "" if shown.title == title else shown.title)
         title = shown.title
+
+
+def print_table(console: Console, shown: Described, title: str | None = None) -> None:
+    """Print a table below a title, by default its own; nothing if it has no rows."""
+    if not shown:
+        return
+    heads = [f"{name}\n[{unit}]" if unit and column.is_numeric else "\n".join(filter(None, (name, unit)))
+             for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
+    table = plain_table()
+    for head, column in zip(heads, shown.columns, strict=True):
+        table.add_column(head, justify="right" if column.is_numeric else "left", no_wrap=True)
+    for row in shown.texts():
+        table.add_row(*row)
+    title = shown.title if title is None else title
+    if title:
+        console.print(title, soft_wrap=True)
+    console.print(table)
 
 
 def print_titled(console: Console, title: str, table: Table) -> None:
@@ -238,18 +223,10 @@ def _reduced_words(one: Mapping[str, Any]) -> str:
 
 def stresses(console: Console, summaries: Mapping[str, Any]) -> None:
     """Print a table of the largest stress of every run along the paths, if there are stresses."""
-    from paraflex.results.loads import ranked
+    from paraflex.figures.loads import stress_table
 
-    rows, numbers = [], (f"stress\n[{STRESS.name}]", "at\n[m]", "time\n[s]", "safety\nfactor")
-    for names, mode in _runs(summaries):
-        found = ranked({"": mode.get("loads", {})}, "beams", "stress_max")
-        if found:
-            most, _, body, one = found[0]
-            values = (STRESS.factor * most, one["place"], one["time"], one["safety_factor"])
-            rows.append([*names, body, *(number(value, ".4g") for value in values)])
-    if rows:
-        table = plain_table(*_texts(summaries), "beam", numbers=numbers, rows=rows)
-        print_titled(console, "Largest stress of every run", table)
+    loads = {tuple(names): mode.get("loads", {}) for names, mode in _runs(summaries)}
+    print_table(console, stress_table(loads, _texts(summaries), largest=True), "Largest stress of every run")
 
 
 def failures(console: Console, result: StudyResult, whose: str = "") -> None:

@@ -6,7 +6,7 @@ gallery of the documentation and the functions of `paraflex.plots` are made from
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -80,9 +80,11 @@ class Figure:
 
     def can_show(self, data: Any) -> bool:
         """Check whether the results have the variables of the figure and, unless it is a drawing, any charts of it."""
-        if not all(name in data for name in self.variables):
-            return False
-        return self.charts is None or any(True for _ in self.charts(prepared(data)))
+        return self.has_variables(data) and (self.charts is None or any(True for _ in self.charts(prepared(data))))
+
+    def has_variables(self, data: Any) -> bool:
+        """Check whether the results have the variables of the figure."""
+        return all(name in data for name in self.variables)
 
     def describe(self, data: Any, **options: Any) -> list[Chart]:
         """Return the charts of results from `prepared`."""
@@ -130,11 +132,16 @@ def all_figures() -> Mapping[str, Figure]:
     return {name: one for kind in RESULT_KINDS for name, one in figures_of_kind(kind).items()}
 
 
-def page_panels(kind: str, data: Any) -> list[Panel]:
-    """Return the charts of a report, those of one heading together, in the order of the catalogue."""
+def page_panels(kind: str, data: Any, names: Container[str] | None = None) -> list[Panel]:
+    """Return the charts of a report, those of one heading together, in the order of the catalogue.
+
+    A chart that two figures have is shown once. If names are given, the charts are those of these figures.
+    """
     headings: dict[str, list[Chart]] = {}
-    data = prepared(data)
+    data, seen = prepared(data), set[str]()
     for one in figures_of_kind(kind).values():
-        if one.heading and all(name in data for name in one.variables):
-            headings.setdefault(one.heading, []).extend(chart for chart in one.describe(data) if chart.on_page)
+        if one.heading and (names is None or one.name in names) and one.has_variables(data):
+            charts = [chart for chart in one.describe(data) if chart.on_page and chart.identity not in seen]
+            seen.update(chart.identity for chart in charts)
+            headings.setdefault(one.heading, []).extend(charts)
     return [Panel(heading, charts) for heading, charts in headings.items() if charts]

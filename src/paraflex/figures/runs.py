@@ -21,8 +21,9 @@ _SHOWN_DEVIATION = 0.15
 
 
 def run_names(data: xr.Dataset) -> list[str]:
-    """Return the names of runs in legends: "mode +-+-"; empty for a run without modes."""
-    return [f"mode {name}" if name else "" for name in names_of(data, "mode")]
+    """Return the names of runs in legends: "mode +-+-", or another noun; empty for a run without modes."""
+    noun = data["mode"].attrs.get("noun", "mode")
+    return [f"{noun} {name}".lstrip() if name else "" for name in names_of(data, "mode")]
 
 
 def stopped_runs(data: xr.Dataset) -> list[bool]:
@@ -69,6 +70,7 @@ def followed(chart: Chart, data: xr.Dataset, values: xr.DataArray, desired: xr.D
         if wanted is not None:
             curves.append(Curve("desired", wanted[:, p], look=Look(dash=DOTTED), choice=1 + p, desired=True))
     choices = [f"all {plural(chart.choosing)}", *map(text_symbol, parts)] if several else []
+    curves = [curve for curve in curves if np.isfinite(curve.y).any()]
     return replace(
         chart, y=_in_unit(chart, values), curves=curves, choices=choices, overview=several, spans=after_motion(data)
     )  # fmt: skip
@@ -142,8 +144,9 @@ def round_magnification(deviation: Array, extent: float) -> float:
 
 
 def thinned(data: xr.Dataset) -> xr.Dataset:
-    """Return every n-th sample if there are more than a chart can show."""
-    return data.isel(time=slice(None, None, max(1, -(-data.sizes["time"] // MOST_SAMPLES))))
+    """Return every n-th sample of runs and of their controllers if there are more than a chart can show."""
+    long = {dim: size for dim, size in data.sizes.items() if str(dim) == "time" or str(dim).startswith("sample_")}
+    return data.isel({dim: slice(None, None, -(-size // MOST_SAMPLES) or 1) for dim, size in long.items()})
 
 
 def plural(noun: str) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paraflex.formatting import common_unit, number
+from paraflex.formatting import common_unit, error_text, number
 from paraflex.units import DisplayUnit
 
 Cell = float | int | str | None
@@ -30,6 +30,8 @@ class Column:
         SI unit of the values, or a text below the heading for columns of words; empty if there is none.
     below : sequence of float or None, optional
         Second value of each cell, in the same unit, which stands below the first.
+    errors : sequence of float or None, optional
+        Error of each value, in the same unit, which is written behind ±; None where it is not.
     beside : float
         Magnitude of the quantities whose differences the values are; values within their rounding are 0.
     digits : int
@@ -44,6 +46,7 @@ class Column:
     cells: Sequence[Cell]
     unit: str = ""
     below: Sequence[float | None] = ()
+    errors: Sequence[float | None] = ()
     beside: float = 0.0
     digits: int = 4
     infinite: str = "inf"
@@ -69,9 +72,12 @@ class Column:
                 return str(cell)
             return number(cell, self.digits, factor=factor, beside=self.beside, infinite=self.infinite)
 
+        texts = list(map(text, self.cells))
+        for k, error in enumerate(self.errors):
+            texts[k] += error_text(error, factor)
         if not self.below:
-            return list(map(text, self.cells))
-        return [f"{text(first)}\n{text(second)}" for first, second in zip(self.cells, self.below, strict=True)]
+            return texts
+        return [f"{first}\n{text(second)}" for first, second in zip(texts, self.below, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -117,7 +123,14 @@ class Table:
         if len(rows) == count:
             return self
         columns = [
-            replace(one, cells=[one.cells[k] for k in rows], below=[one.below[k] for k in rows] if one.below else ())
+            replace(
+                one,
+                **{
+                    name: [values[k] for k in rows]
+                    for name in ("cells", "below", "errors")
+                    if (values := getattr(one, name))
+                },
+            )
             for one in self.columns
         ]
         return replace(self, title=f"{self.title} ({len(rows)} of {count})", columns=columns)

@@ -95,10 +95,7 @@ _NOTHING_MOVES = (
     "paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
 )
 _DESIGN_DRAWINGS = ("response_curves", "response_map", "parallel_coordinates", "pareto_front")
-_RUN_DRAWINGS = (
-    "mechanism_drawing", "joint_forces", "beam_stresses", "stress_envelope", "joint_motions", "drive_efforts",
-    "frame_loads", "sensors", "controllers",
-)  # fmt: skip
+_RUN_FIGURES = ("controllers", "loads", "sensors")
 _STUDY = ("study.json", "journal.sqlite", "results.parquet")
 RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
     ResultKind("sweep", STUDY_OF_RUNS, _STUDY,
@@ -141,10 +138,11 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
                ("frequency", "frequencies"), "reduction.reduction_page", refusals={"motion": _NOTHING_MOVES},
                drawings=("reduced_responses", "reduction_errors", "held_frequency_by_states", "bases_along_path")),
     ResultKind("motion", RUN, ("summary.json", "results.nc"), "results.nc", "motion_dataset",
-               page="motion.motion_page", figures=("run_motion", "motion"), drawings=_RUN_DRAWINGS),
+               page="motion.motion_page", figures=("run_motion", "motion", *_RUN_FIGURES),
+               drawings=("mechanism_drawing",)),
     ResultKind("tracking", RUN, ("summary.json", "results.nc"), "results.nc", "tracking_dataset or run_study",
-               page="tracking.report_of_folder", with_folder=True, figures=("tracking", "run_motion"),
-               drawings=("desired_path", *_RUN_DRAWINGS)),
+               page="tracking.report_of_folder", with_folder=True, figures=("tracking", "run_motion", *_RUN_FIGURES),
+               drawings=("desired_path", "mechanism_drawing")),
     ResultKind("modes", "", marks={"mode": ..., "motors": ...}, listed=True, figures=("modes",)),
 )}  # fmt: skip
 # Files by which a folder without a manifest, from an earlier release, is recognised, by the kind of the folder.

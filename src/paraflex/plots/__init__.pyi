@@ -7,13 +7,19 @@ from .agreement import (
 )
 from .charts import (
     actuation_condition as actuation_condition,
+    beam_stresses as beam_stresses,
+    controllers as controllers,
     coordinates as coordinates,
+    drive_efforts as drive_efforts,
     end_effector_motion as end_effector_motion,
     end_effector_path as end_effector_path,
     energies as energies,
     force_travel as force_travel,
+    frame_loads as frame_loads,
     free_travels as free_travels,
     joint_force_travel as joint_force_travel,
+    joint_forces as joint_forces,
+    joint_motions as joint_motions,
     link_deflections as link_deflections,
     link_motions as link_motions,
     link_phases as link_phases,
@@ -24,13 +30,14 @@ from .charts import (
     phase_diagrams as phase_diagrams,
     point_motions as point_motions,
     point_paths as point_paths,
+    sensors as sensors,
     stiffness_travel as stiffness_travel,
+    stress_envelope as stress_envelope,
     stress_travel as stress_travel,
     tip_deflections as tip_deflections,
     tracking_distance as tracking_distance,
     tracking_errors as tracking_errors,
 )
-from .controlled import controllers as controllers
 from .derivatives import elasticities as elasticities
 from .drawing import mechanism_drawing as mechanism_drawing
 from .equilibria import buckling_shapes as buckling_shapes, deformed_shapes as deformed_shapes
@@ -42,7 +49,6 @@ from .linear import (
     singular_values as singular_values,
 )
 from .maps import response_map as response_map
-from .measured import sensors as sensors
 from .methods import work_precision as work_precision
 from .mode_shapes import mode_shapes as mode_shapes
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
@@ -56,12 +62,4 @@ from .reduction import (
 from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
 from .spectra import numerical_damping as numerical_damping
-from .stress import (
-    beam_stresses as beam_stresses,
-    drive_efforts as drive_efforts,
-    frame_loads as frame_loads,
-    joint_motions as joint_motions,
-    stress_envelope as stress_envelope,
-)
-from .time_series import joint_forces as joint_forces
 from .workspace import desired_path as desired_path

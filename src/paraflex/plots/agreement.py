@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from paraflex.figures.run_motion import most_deflected
 from paraflex.figures.selection import names_of, select_model, select_run
 from paraflex.formatting import display_unit, peak
 from paraflex.plots.given import drawn
@@ -16,7 +17,6 @@ from paraflex.plots.layout import is_narrow, panels
 from paraflex.plots.runs import draw_actual, draw_curves, finish_over_time
 from paraflex.plots.scales import mark_powers
 from paraflex.plots.style import PAIR, keep_flat, look_of
-from paraflex.plots.time_series import most_deflected
 from paraflex.plots.workspace import deviated_paths
 
 _MODEL_NAMES = {

@@ -46,7 +46,7 @@ _SIZES, _BESIDE = (4.0, 3.0), 0.06
 # Height of a bar, as a share of the distance of two names.
 _BAR = 0.6
 # Dashes by their numbers in a look.
-_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), ":", (0, (5, 1.5, 1, 1.5)), (0, (9, 2)))
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)), (0, (9, 2)))
 _DESIRED: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 0.8, "zorder": 2.5}
 _STOPPED: dict[str, Any] = {
     "color": BLACK, "linestyle": "none", "marker": "x", "markersize": 4.5, "markeredgewidth": 1.2, "zorder": 3.0,
@@ -82,7 +82,7 @@ def plotting_function(name: str) -> Callable[..., Figure]:
         if entry.takes == "mode" and mode is None and "mode" in getattr(data, "dims", ()):
             mode = default_mode(data)
         found = prepared(data, mode)
-        charts = entry.describe(found, **{**entry.defaults(found), **options})
+        charts = entry.describe(found, **{**entry.defaults(found), **options}) if entry.has_variables(found) else []
         if not charts:
             raise InputError(entry.missing[0], field="figure", value=name, remedy=entry.missing[1])
         if not isinstance(found, xr.Dataset) or "time" not in found.dims:

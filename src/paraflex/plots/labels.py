@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from paraflex.formatting import GREEK, LONGEST, ROUNDING, printable, text_symbol
 from paraflex.results.metrics import metric_label
-from paraflex.units import STRESS
 
 # Letters of symbols in mathematics.
 _LETTERS = {letter: rf"\{name}" for name, letter in GREEK.items()} | {"φ": r"\varphi"}
@@ -46,11 +45,6 @@ QUANTITIES = {
     "magnitude": Quantity("acceleration", "", "m/s²"),
     "torque": Quantity("torque", r"$\tau$", "N m"),
     "force": Quantity("force", "", "N"),
-    "moment": Quantity("moment", "", "N m"),
-    "power": Quantity("power", "", "W"),
-    "travel": Quantity("travel", "", "m"),
-    "stress": Quantity("stress", "", STRESS.name),
-    "place": Quantity("distance from the first end", "", "m"),
     "energy": Quantity("energy", "", "J"),
     "condition": Quantity("condition number", "", "1"),
     "flexible": Quantity("modal coordinate", r"$\eta$", "mm kg$^{1/2}$"),

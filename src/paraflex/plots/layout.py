@@ -98,7 +98,7 @@ def panel_grid(count: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple
 
 
 def label_outer_time(axes: NDArray[Any]) -> None:
-    """Name the time axis below the lowest panel of each column and remove its numbers from the others."""
+    """Name the time axis below the lowest panel of each column and remove its name and numbers from the others."""
     for column in arranged(axes).T:
         shown = [panel for panel in column if panel.get_visible()]
         for panel in shown[:-1]:

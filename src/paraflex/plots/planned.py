@@ -12,7 +12,6 @@ from paraflex.errors import InputError, suggestion
 from paraflex.figures.catalogue import Figure as CatalogueFigure
 from paraflex.figures.selection import default_mode, names_of, place_of, point_number, prototype_pair
 from paraflex.plots.catalogue import CATALOGUE, figure_names
-from paraflex.results.controllers import controller_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +57,6 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "work_precision": lambda found: any(
         run["status"] == "complete" for method in found["methods"].values() for run in method["runs"]
     ),
-    "controllers": lambda found: bool(controller_names(found)),
     "law_comparison": lambda found: bool((found["status"] == "complete").any()),
     **dict.fromkeys(("singular_values", "pole_zero_map"), lambda found: found.sizes["map"] > 0),
     "bode": lambda found: found.sizes["output"] > 0,

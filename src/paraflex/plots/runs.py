@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from paraflex.figures.selection import names_of, run_label, samples
 from paraflex.formatting import peak
 from paraflex.plots.labels import symbol
-from paraflex.plots.layout import figure_width, is_narrow, label_outer_time, lay_out, panel_grid, panels
+from paraflex.plots.layout import figure_width, is_narrow, label_outer_time, lay_out, panels
 from paraflex.plots.style import BLACK, BLUE, SHADE, look_of
 
 DESIRED: dict[str, Any] = {
@@ -25,8 +25,6 @@ STOPPED: dict[str, Any] = _MARK | {"marker": "x", "markeredgewidth": 1.2, "zorde
 START: dict[str, Any] = _MARK | {"marker": "s", "zorder": 4.0, "label": "start"}
 # Largest number of lines that are distinguishable in one panel.
 MOST_LINES = 7
-# Largest number of panels in one column.
-_MOST_ROWS = 4
 
 
 def draw_actual(axes: Axes, run: xr.Dataset, x: ArrayLike, y: ArrayLike, **look: Any) -> None:
@@ -58,11 +56,6 @@ def draw_curves(axes: Axes, run: xr.Dataset, curves: Mapping[str, NDArray[np.flo
 def draw_desired(axes: Axes, x: ArrayLike, y: ArrayLike) -> None:
     """Draw the curve that a run should follow."""
     axes.plot(x, y, **DESIRED)
-
-
-def listed_panels(count: int) -> tuple[Figure, NDArray[Any]]:
-    """Create `count` panels in one column, or in two if one is too long; they are the first of `axes.flat`."""
-    return panel_grid(count, 1 if count <= _MOST_ROWS else 2)
 
 
 def largest_columns(values: NDArray[np.float64]) -> list[int]:

@@ -18,8 +18,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.figures.selection import names_of, point_number, select_run
 from paraflex.figures.shapes import figure_of
 from paraflex.folders import RESULT_KINDS
-from paraflex.formatting import display_unit, printable
-from paraflex.results.acting import sized
+from paraflex.formatting import display_unit, printable, quantity
 from paraflex.results.kinds import kind_of
 
 Array = NDArray[np.float64]
@@ -446,7 +445,7 @@ def _load_keys(run: xr.Dataset) -> dict[str, str]:
         acting = np.flatnonzero(sizes)
         if acting.size:
             name = f"load {names[acting[0]]}" if acting.size == 1 else "loads"
-            keys[kind] = f"{name}: {sized(float(sizes.max()), unit)}"
+            keys[kind] = f"{name}: {quantity(float(sizes.max()), unit, digits=4, padded=False)}"
     return keys
 
 

@@ -17,7 +17,6 @@ from paraflex.report.page import Chart, Curve, Look
 # Numbers of colours and of dashes of the page; the latter include the solid line.
 N_COLOURS, N_DASHES = 8, 5
 DOTTED = 2
-MOST_SAMPLES = 2000
 # Share of its median above which a curve that begins at zero is drawn on a logarithmic axis.
 _RISEN = 0.01
 # Charts without their curves. Displacements of ends differ from deflections, which are measured from a link's chord.
@@ -68,18 +67,6 @@ def bending(data: xr.Dataset, name: str = "tip_transverse") -> xr.DataArray:
     """Return the displacements of the ends of links that bend."""
     bent = [largest(data["tip_transverse"].sel(body=body).values) > 0.0 for body in data["body"].values]
     return data[name].isel(body=np.flatnonzero(bent))
-
-
-def joint_force_curves(force: NDArray[np.float64], x: NDArray[np.float64] | None = None) -> list[Curve]:
-    """Return curves of magnitude and components of forces (joints, samples, 2), one choice per joint.
-
-    They are drawn over `x`, by default the time.
-    """
-    curves = []
-    for j, one in enumerate(force):
-        parts = (("magnitude", np.linalg.norm(one, axis=-1)), ("x", one[:, 0]), ("y", one[:, 1]))
-        curves += [Curve(word, y, x, run=0, choice=j, look=look(k)) for k, (word, y) in enumerate(parts)]
-    return curves
 
 
 def followed(
@@ -161,11 +148,6 @@ def plane_path(data: xr.Dataset, runs: Sequence[str], *, common: bool = True) ->
             name = f"deviation × {times:g}"
             curves.append(Curve(name, far[:, 1], far[:, 0], Look(1, DOTTED), run=r, shown=(r,)))
     return Chart("path", "End-effector path", "y [mm]", curves, x="x [mm]", equal=True, over_time=False)
-
-
-def thinned(data: xr.Dataset) -> xr.Dataset:
-    """Return every n-th sample if there are more than a chart can show."""
-    return data.isel(time=slice(None, None, max(1, -(-data.sizes["time"] // MOST_SAMPLES))))
 
 
 def _plural(what: str) -> str:

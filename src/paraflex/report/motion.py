@@ -15,11 +15,9 @@ from paraflex.figures.runs import thinned
 from paraflex.figures.selection import as_runs, names_of
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity, text_symbol, typeset
-from paraflex.report.controllers import controller_panels, controller_tables
-from paraflex.report.curves import joint_force_curves
 from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.loads import load_panel, load_tables, load_tiles
-from paraflex.report.page import Chart, Page, Panel
+from paraflex.report.loads import load_tables, load_tiles
+from paraflex.report.page import Page
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import pairs, table_pairs
@@ -29,8 +27,6 @@ from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
 
 _ALONE = ("",)
-# Largest number of joints that a chart offers for choice; results.nc has all.
-_MOST_CHOICES = 60
 
 
 @checked_arguments()
@@ -40,7 +36,6 @@ def motion_page(data: xr.Dataset) -> Page:
     data = data.transpose("time", ...)
     moving = animation(data, ())
     few = as_runs(thinned(data))
-    joints = [Panel("Joints", [_joint_forces(thinned(data))])] if data.sizes["joint"] else []
     status = str(data["status"].item())
     return Page(
         title=data.attrs["mechanism"],
@@ -51,12 +46,11 @@ def motion_page(data: xr.Dataset) -> Page:
         command=run_command_line(asked(data)),
         figures=_figures(data),
         more=[
-            *controller_tables(data),
             *load_tables(data),
             *reduction_tables(data),
             ("Integration", _table(data, few)),
         ],
-        panels=[*page_panels("motion", few), *joints, *controller_panels(few, _ALONE), *load_panel(few, _ALONE)],
+        panels=page_panels("motion", few),
         time=few["time"].values,
         runs=_ALONE,
         film=moving,
@@ -94,16 +88,6 @@ def _torque(values: xr.DataArray) -> str:
     if "time" not in values.dims:
         return typeset(f"{number(float(values))} N m")
     return typeset(f"{number(float(values.min()))} to {number(float(values.max()))} N m")
-
-
-def _joint_forces(data: xr.Dataset) -> Chart:
-    force = data["joint_force"].transpose("joint", "time", "axis").values
-    names = names_of(data, "joint")[:_MOST_CHOICES]
-    return Chart(
-        "forces", "Joint forces", "force [N]", joint_force_curves(force[: len(names)]),
-        choices=[text_symbol(name) for name in names], choosing="joint",
-        note="On the joint's second body, in the ground frame.",
-    )  # fmt: skip
 
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:

@@ -11,6 +11,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.figures.catalogue import page_panels
+from paraflex.figures.runs import thinned
 from paraflex.plots.designs import DesignTable
 from paraflex.report.choice import Picked, drawn_rows
 from paraflex.report.curves import (
@@ -22,12 +24,10 @@ from paraflex.report.curves import (
     errors,
     followed,
     plane_path,
-    thinned,
     torque_chart,
 )
 from paraflex.report.designs import columns, metric_name, reasons, shown_unit
 from paraflex.report.film import animation
-from paraflex.report.loads import load_panel
 from paraflex.report.page import Page, Panel
 from paraflex.report.search import IDENTIFICATION, search_tables, search_tiles
 from paraflex.report.survey import LOWER, Step, drawn_designs, survey
@@ -42,6 +42,7 @@ _SHOWN_VARIABLES = (
     "spring_station", "joint_rail", "gear_radius", "load_station", "load_force", "load_torque", "stress",
     "joint_coordinate", "joint_speed", "drive_torque", "drive_power",
 )  # fmt: skip
+_SHOWN_FIGURES = ("beam_stresses", "joint_motions", "drive_efforts")
 _STATIONS = ("point_station", "spring_station", "joint_rail", "load_station")
 _DIFFERING = (*_STATIONS, "gear_radius")
 _COORDINATES = (
@@ -167,7 +168,8 @@ def side_by_side(runs: Sequence[xr.Dataset], labels: Sequence[str]) -> xr.Datase
     first = parts[0]
     # Coordinates are taken from the first run; common ones are equal.
     data = xr.concat(parts, dim="mode", coords="minimal", compat="override", join="override", combine_attrs="override")
-    return data.assign_coords(mode=list(labels)).assign_attrs(runs[0].attrs | first.attrs)
+    # The labels are whole names of runs.
+    return data.assign_coords(mode=("mode", list(labels), {"noun": ""})).assign_attrs(runs[0].attrs | first.attrs)
 
 
 def _of_one_kind(runs: Mapping[int, xr.Dataset]) -> tuple[dict[int, xr.Dataset], list[int]]:
@@ -309,7 +311,7 @@ def _panels(data: xr.Dataset, runs: list[str], account: StudyAccount) -> list[Pa
     data = data.transpose("mode", "time", ...)
     title = f"The {'best ' if account.seeks_least else ''}designs in motion"
     if "end_effector_desired" not in data:
-        loads = [chart for panel in load_panel(data, runs, selecting="design") for chart in panel.charts]
+        loads = [chart for panel in page_panels("motion", data, _SHOWN_FIGURES) for chart in panel.charts]
         return [Panel(title, [*loads, compared(STRAIN, data["strain_energy"], runs)])]
     charts = [
         compared(ERRORS, errors(data), runs),

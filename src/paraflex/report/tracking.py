@@ -17,9 +17,8 @@ from paraflex.figures.runs import thinned
 from paraflex.figures.selection import default_mode, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity
-from paraflex.report.controllers import controller_panels, controller_tables
 from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.loads import load_panel, load_tables, load_tiles
+from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, common_facts, run_command_line, summary_beside, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
@@ -72,12 +71,11 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         figures=_figures(data),
         more=[
             *sections([result_table(rows), after_table(rows)]),
-            *controller_tables(data),
             *load_tables(data, default_mode(data)),
             *reduction_tables(data),
             *sections([solver_table(rows)]),
         ],
-        panels=[*page_panels("tracking", few), *controller_panels(few, runs), *load_panel(few, runs)],
+        panels=page_panels("tracking", few),
         time=few["time"].values,
         runs=runs,
         selected=runs.index(default_mode(data)),

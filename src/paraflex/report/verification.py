@@ -12,12 +12,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.runs import thinned
 from paraflex.figures.selection import names_of
 from paraflex.findings import Finding
 from paraflex.formatting import display_unit, text_symbol
 from paraflex.plots.agreement import printed
 from paraflex.plots.workspace import round_magnification
-from paraflex.report.curves import TIPS, errors, labelled, largest, look, thinned
+from paraflex.report.curves import TIPS, errors, labelled, largest, look
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, summary_beside, verdict_word, verify_command_line

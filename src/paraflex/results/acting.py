@@ -9,6 +9,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, joint_coordinate
+from paraflex.formatting import number, quantity
 from paraflex.mechanism import AngleLaw, Load, Mechanism, PrescribedAngle, TabulatedLaw
 from paraflex.mechanism.laws import marks
 
@@ -21,8 +22,6 @@ _MOVED = 1e-2
 _HALVINGS = 50
 # A load with an onset before this fraction of the study acts from the start.
 _AT_ONCE = 1e-6
-# Loads of at least this magnitude are printed in kN and kN m.
-_LARGE = 1e4
 
 
 @dataclass(frozen=True)
@@ -61,12 +60,12 @@ class ActingLoad:
         if self.begins is None:
             return f"0 {unit}"
         if self.later:
-            return f"{sized(self.largest, unit)} from {self.begins:.3g} s"
+            return f"{_sized(self.largest, unit)} from {number(self.begins, 3)} s"
         if self.grows:
-            return f"up to {sized(self.largest, unit)}"
+            return f"up to {_sized(self.largest, unit)}"
         first = float(np.linalg.norm(self.shown))
-        more = f", up to {sized(self.largest, unit)}" if self.largest > (1.0 + 1e-6) * first else ""
-        return sized(first, unit) + more
+        more = f", up to {_sized(self.largest, unit)}" if self.largest > (1.0 + 1e-6) * first else ""
+        return _sized(first, unit) + more
 
 
 def acting_load(load: Load, duration: float | None = None) -> ActingLoad:
@@ -107,7 +106,7 @@ def drive_speed(drive: PrescribedAngle, slides: bool, duration: float | None = N
     """Format the largest speed of a prescribed motion over a study, with its unit."""
     rates = np.abs(drive.law.evaluate(_times((drive.law,), duration))[1])
     constant = np.ptp(rates) <= _NOTHING * rates.max()
-    return ("" if constant else "up to ") + sized(float(rates.max()), "m/s" if slides else "rad/s")
+    return ("" if constant else "up to ") + _sized(float(rates.max()), "m/s" if slides else "rad/s")
 
 
 def first_movements(mechanism: Mechanism, duration: float | None = None) -> dict[str, int]:
@@ -141,9 +140,8 @@ def load_variables(mechanism: Mechanism, times: Array) -> Mapping[str, tuple[tup
     return {"load_force": (("time", "load", "axis"), force), "load_torque": (("time", "load"), torque)}
 
 
-def sized(value: float, unit: str) -> str:
-    """Format a magnitude with its unit, large forces and torques in thousands: "800 N", "12.5 kN"."""
-    return f"{value / 1e3:.4g} k{unit}" if value >= _LARGE and unit[0] == "N" else f"{value:.4g} {unit}"
+def _sized(value: float, unit: str) -> str:
+    return quantity(value, unit, digits=4, padded=False)
 
 
 def _times(laws: tuple[AngleLaw, ...], duration: float | None) -> Array:

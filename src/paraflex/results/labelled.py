@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from paraflex.dynamics import System
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
+from paraflex.results.beam_stresses import largest_stresses
 from paraflex.results.drawing import drawing_coordinates, drawing_variables
 from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
@@ -25,7 +26,6 @@ from paraflex.results.stress import (
     MOMENT,
     UNITS as STRESS_UNITS,
     Variables,
-    largest_stresses,
     section_coordinates,
     section_variables,
 )

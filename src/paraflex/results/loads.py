@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.findings import RESOLVED
+from paraflex.formatting import display_unit, error_text, number, quantity, speed_text
 from paraflex.results.numbers import finite_or_none, largest, units_of_each
-from paraflex.units import STRESS, speed_text
 
 Figures = dict[str, float | str | None]
 # Unit of the rate of a joint, by the unit of the effort that drives it.
@@ -108,10 +108,17 @@ def _uncertain(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> float | 
     return max(parts, default=None)
 
 
-def error_text(figures: Mapping[str, Any], load: str, factor: float = 1.0) -> str:
-    """Return the error of a largest load as text, such as " ± 0.3", if it exceeds one per cent of the load, else ""."""
+def resolved_error(figures: Mapping[str, Any], load: str) -> float | None:
+    """Return the error of a largest load if it exceeds one per cent of the load, else None."""
     most, error = figures[f"{load}_max"], figures.get(f"{load}_error")
-    return f" ± {float(f'{factor * error:.1g}'):g}" if most and error is not None and error > RESOLVED * most else ""
+    return error if most and error is not None and error > RESOLVED * most else None
+
+
+def load_text(figures: Mapping[str, Any], load: str, unit: str, digits: int = 4) -> str:
+    """Return a largest load with its unit, and with its error if that is `resolved_error`: "47.06 ± 9 MPa"."""
+    most, shown = figures[f"{load}_max"], display_unit(unit, figures[f"{load}_max"])
+    off = error_text(resolved_error(figures, load), shown.factor)
+    return f"{number(most, digits, factor=shown.factor)}{off} {shown.name}".rstrip()
 
 
 def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
@@ -159,9 +166,8 @@ def joint_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
     known = ranked(loads, "joints", "force_max")
     if not known or not known[0][0]:
         return ""
-    most, name, joint, one = known[0]
-    whose = f"mode {name}: " if name else ""
-    return f"{whose}largest joint force {most:.4g}{error_text(one, 'force')} N in {joint}{_at(one['force_time'])}"
+    _, name, joint, one = known[0]
+    return f"{_whose(name)}largest joint force {load_text(one, 'force', 'N')} in {joint}{_at(one['force_time'])}"
 
 
 def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
@@ -175,27 +181,25 @@ def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
     known = ranked(loads, "beams", "stress_max")
     if not known:
         return ""
-    most, name, body, one = known[0]
-    whose = f"mode {name}: " if name else ""
-    off = error_text(one, "stress", STRESS.factor)
-    text = f"{whose}largest stress {STRESS.factor * most:.4g}{off} {STRESS.name} in {body} at {one['place']:.3g} m"
-    text += f", t = {one['time']:.4g} s"
+    _, name, body, one = known[0]
+    text = (
+        f"{_whose(name)}largest stress {load_text(one, 'stress', 'Pa')} in {body} at "
+        f"{quantity(one['place'], 'm', padded=False)}, t = {number(one['time'])} s"
+    )
     factors = [(beam["safety_factor"], where) for _, _, where, beam in known if beam["safety_factor"] is not None]
     if not factors:
         return text
     least, where = min(factors)
-    return f"{text}; safety factor {least:.3g}" + (f" ({where})" if where != body else "")
+    return f"{text}; safety factor {number(least, 3)}" + (f" ({where})" if where != body else "")
 
 
 def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
     """Return a sentence for each prescribed motion of a run, with its largest torque, speed and power."""
-    whose = f"mode {mode}: " if mode else ""
     return [
-        f"{whose}prescribed.{name}: {_EFFORTS[one['torque_unit']]} up to "
-        f"{one['torque_max']:.4g}{error_text(one, 'torque')} {one['torque_unit'] or ''}".rstrip()
-        + f"{_at(one['torque_time'])}; "
-        f"speed up to {speed_text(one['speed_max'], one['speed_unit'] or '').rstrip()}; "
-        f"power up to {one['power_max']:.4g} W{_at(one['power_time'])}"
+        f"{_whose(mode)}prescribed.{name}: {_EFFORTS[one['torque_unit']]} up to "
+        f"{load_text(one, 'torque', one['torque_unit'] or '')}{_at(one['torque_time'])}; "
+        f"speed up to {speed_text(one['speed_max'], one['speed_unit'] or '')}; "
+        f"power up to {quantity(one['power_max'], 'W', digits=4, padded=False)}{_at(one['power_time'])}"
         for name, one in figures.get("drives", {}).items()
         if None not in (one["torque_max"], one["speed_max"], one["power_max"])
     ]
@@ -204,5 +208,9 @@ def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
 _EFFORTS = {"N m": "torque", "N": "force", None: "torque or force"}
 
 
+def _whose(mode: str) -> str:
+    return f"mode {mode}: " if mode else ""
+
+
 def _at(time: float | None) -> str:
-    return "" if time is None else f" at t = {time:.4g} s"
+    return "" if time is None else f" at t = {number(time)} s"

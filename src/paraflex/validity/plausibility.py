@@ -16,11 +16,12 @@ from paraflex.dynamics.joint_loads import drive_torques, load_errors, undetermin
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import RESOLVED, Finding
+from paraflex.formatting import speed_text
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.method import NativeMethod
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_poses, grouped
-from paraflex.units import STRESS, speed_text
+from paraflex.units import STRESS
 from paraflex.validity.bending import bending_of
 from paraflex.validity.blame import most_likely
 from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, doubtful_numbers, mechanism_size
@@ -395,7 +396,7 @@ def _moving(mechanism: Mechanism, solution: Solution) -> str:
     for one in mechanism.prescribed:
         rate = float(np.max(np.abs(one.law.evaluate(solution.t)[1])))
         unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
-        named.append(f"prescribed.{one.name} (up to {speed_text(rate, unit, '.3g')})")
+        named.append(f"prescribed.{one.name} (up to {speed_text(rate, unit, 3)})")
     named += [f"load.{load.name} ({load.largest(solution.t):.3g} {load.unit})" for load in mechanism.loads]
     return f": {', '.join(named)}" if named else ""
 

@@ -1,0 +1,145 @@
+"""Charts and tables of controllers: their settings, torques before and after limits, and readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from paraflex.figures.catalogue import figure
+from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, look, stairs
+from paraflex.figures.loads import run_columns
+from paraflex.figures.runs import after_motion
+from paraflex.figures.selection import names_of
+from paraflex.figures.tables import Column, Table
+from paraflex.formatting import NO_VALUE, ROUNDING, number, quantity, text_symbol
+from paraflex.results.controllers import (
+    CONTROLLERS,
+    GIVEN,
+    INPUT,
+    OUTPUT,
+    READINGS,
+    SAMPLE,
+    WANTED,
+    ControllerData,
+    controllers_of,
+)
+from paraflex.units import DisplayUnit
+
+_WORDS = {"rad": "angle", "m": "position", "rad/s": "rate", "m/s": "speed", "N m": "torque", "N": "force"}
+# Internal torques below this share of the largest torque are rounding errors.
+_INTERNAL = 1e-9
+
+
+@figure(
+    "torques of controllers before and after limits, and their readings", heading="Controllers", takes="mode",
+    written_as="controllers", height=40.0,
+    missing=("no controllers in these results", "run it with --controller, or with [study] controllers in the model"),
+)  # fmt: skip
+def controllers(data: xr.Dataset) -> Iterator[Chart]:
+    """Yield charts of the torques of every controller and of its readings, one for each unit.
+
+    Torques as they act are solid, held from the end of the delay to the next sample; those of the law before limits are
+    dotted. A dashed line is a limit that a torque reaches.
+    """
+    for one in controllers_of(data):
+        for dim, variable in ((OUTPUT, GIVEN), (INPUT, READINGS)):
+            values = one.data[variable].transpose("mode", dim, SAMPLE).values
+            # A mode lacks the signals of motors that it does not drive.
+            known = [k for k in range(values.shape[1]) if np.isfinite(values[:, k]).any()]
+            units = [one.units[name] for name in names_of(one.data, dim)]
+            for number_of_unit, unit in enumerate(dict.fromkeys(units[k] for k in known)):
+                own = [k for k in known if units[k] == unit]
+                chart = _signals(one, dim, values[:, own], own, Axis(_WORDS.get(unit, "reading"), unit))
+                yield replace(chart, identity=f"{chart.identity}-{number_of_unit}", spans=after_motion(data))
+
+
+def _signals(one: ControllerData, dim: str, values: Array, own: Sequence[int], axis: Axis) -> Chart:
+    """Return the chart of the torques or readings (runs, signals, samples) of a controller that share a unit."""
+    names, times = names_of(one.data, dim), one.data[SAMPLE].values
+
+    def held(name: str, r: int, p: int, times: Array, values: Array, **more: Any) -> Curve:
+        x, y = stairs(times, values)
+        return Curve(name, y, x, **{"look": look(p), "run": r, "shown": (r,)} | more)
+
+    known = [(r, p) for r in range(len(values)) for p in range(len(own)) if np.isfinite(values[r, p]).any()]
+    from_delay = times + one.delay if dim == OUTPUT else times
+    curves = [held(text_symbol(names[own[p]]), r, p, from_delay, values[r, p]) for r, p in known]
+    if dim == INPUT:
+        return Chart(f"readings-{one.name}", f"Controller {one.name}: readings", axis, curves)
+    wanted = one.data[WANTED].transpose("mode", OUTPUT, SAMPLE).values
+    curves += [
+        held("wanted by the law", r, p, times, wanted[r, own[p]], look=look(p)._replace(dash=DOTTED), desired=True,
+             quiet=True) for r, p in known
+    ]  # fmt: skip
+    bounds = [(bound, p) for p, signal in enumerate(own) for bound in one.limits[names[signal]]]
+    levels = dict.fromkeys(bound for bound, p in bounds if bound is not None and np.any(values[:, p] == bound))
+    note = "Solid: torques as they act, after the delay and until the next sample; dotted: those of the law."
+    title = f"Controller {one.name}: {axis.name}s"
+    return Chart(f"torques-{one.name}", title, axis, curves, levels=tuple(levels), note=note)
+
+
+def controller_table(runs: Mapping[tuple[str, ...], Mapping[str, Any]], heads: Sequence[str] = ()) -> Table:
+    """Return the table of controllers, one row for each in each run.
+
+    Parameters
+    ----------
+    runs : mapping of tuple to mapping
+        Numbers of `results.controllers.controller_figures` by the names of the run, such as its path and mode.
+    heads : sequence of str
+        Headings of the names of a run.
+    """
+    rows = [(run, name, one) for run, of in runs.items() for name, one in of.get(CONTROLLERS, {}).items()]
+    controllers = [one for *_, one in rows]
+    return Table("Controllers", [
+        *run_columns([run for run, *_ in rows], heads),
+        Column("controller", [f"{name}\n{one['law']}" for _, name, one in rows], "law"),
+        *(Column(key, [one[key] for one in controllers], "s", shown=DisplayUnit("ms", 1e3))
+          for key in ("period", "delay")),
+        Column("limited", [_limited(one) for one in controllers], "samples"),
+        Column("limits", ["\n".join(_limits(one["torques"])) for one in controllers]),
+        Column("largest", [_largest(one["torques"]) for one in controllers], "torque"),
+        Column("internal", [_internal(runs[run]) for run, *_ in rows], "N m"),
+    ], "Limited: samples at which a limit of torques or of their rates was reached. Internal: the largest torque that "
+       "only strains links.").filled()  # fmt: skip
+
+
+def _limited(one: Mapping[str, Any]) -> str:
+    share = one["saturated_share"]
+    return f"{NO_VALUE if share is None else f'{number(share, 3, factor=100.0)} %'}\nof {one['samples']}"
+
+
+def _limits(torques: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the limits in words, only once if they are the same for all motors."""
+    words = {motor: _limits_of(one) for motor, one in torques.items()}
+    if len(set(words.values())) == 1:
+        return [next(iter(words.values()))]
+    return [f"{text_symbol(motor)}: {word}" for motor, word in words.items()]
+
+
+def _limits_of(one: Mapping[str, Any]) -> str:
+    low, high, unit, words = one["lowest"], one["highest"], one["unit"], []
+    if low is not None or high is not None:
+        both = high is not None and low == -high
+        words.append(f"±{number(high)} {unit}" if both else f"{number(low)} to {number(high)} {unit}")
+    if one["rate"] is not None:
+        words.append(f"{number(one['rate'])} {unit}/s")
+    return ", ".join(words) or "none"
+
+
+def _largest(torques: Mapping[str, Mapping[str, Any]]) -> str:
+    known = [(one["given_max"], motor, one["unit"]) for motor, one in torques.items() if one["given_max"] is not None]
+    if not known:
+        return NO_VALUE
+    most, motor, unit = max(known)
+    return f"{quantity(most, unit, padded=False)}\n{motor}"
+
+
+def _internal(run: Mapping[str, Any]) -> float | None:
+    """Return the largest internal torque of a run [N m]; zero if it is a rounding error."""
+    value = run.get("internal_torque_max")
+    efforts = [each["given_max"] or 0.0 for of in run[CONTROLLERS].values() for each in of["torques"].values()]
+    return 0.0 if value is not None and value < max(ROUNDING, _INTERNAL * max(efforts, default=0.0)) else value
