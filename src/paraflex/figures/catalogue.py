@@ -15,7 +15,7 @@ from typing import Any, Literal
 import xarray as xr
 
 from paraflex.figures.charts import Chart, Panel
-from paraflex.figures.selection import as_runs
+from paraflex.figures.selection import as_runs, names_of, place_of
 from paraflex.folders.kinds import RESULT_KINDS
 
 Charts = Callable[..., Iterable[Chart]]
@@ -85,7 +85,7 @@ def prepared(data: Any, mode: str | None = None) -> Any:
     """
     if isinstance(data, xr.Dataset) and "time" in data.dims and "model" not in data.dims:
         return as_runs(data, mode)
-    return data if mode is None else data.sel(mode=[mode])
+    return data if mode is None else data.isel(mode=[place_of(mode, names_of(data, "mode"), "mode")])
 
 
 _MODULES: dict[str, dict[str, Figure]] = {}

@@ -125,6 +125,8 @@ class Curve:
         Whether the curve is omitted from the label at the pointer.
     mark : str
         Marks at its points, "ring", "cross", "square" or "dot", or horizontal bars, "bar"; empty (default) for none.
+    size : float
+        Size of the marks relative to the usual one.
     line : bool
         Whether a line joins the points; by default only if they have no marks.
     texts : sequence of str
@@ -142,6 +144,7 @@ class Curve:
     stopped: bool = False
     quiet: bool = False
     mark: Literal["", "ring", "cross", "square", "dot", "bar"] = ""
+    size: float = 1.0
     line: bool = False
     texts: Sequence[str] = ()
 

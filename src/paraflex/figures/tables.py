@@ -29,7 +29,9 @@ class Column:
     unit : str
         SI unit of the values, or a text below the heading for columns of words; empty if there is none.
     below : sequence of float or None, optional
-        Second value of each cell, in the same unit, which stands below the first.
+        Second value of each cell, which stands below the first; None where there is none.
+    below_unit : str
+        Unit in which second values are given, which is written after each; by default that of the first ones.
     beside : float
         Magnitude of the quantities whose differences the values are; values within their rounding are 0.
     digits : int
@@ -44,6 +46,7 @@ class Column:
     cells: Sequence[Cell]
     unit: str = ""
     below: Sequence[float | None] = ()
+    below_unit: str = ""
     beside: float = 0.0
     digits: int = 4
     infinite: str = "inf"
@@ -57,7 +60,9 @@ class Column:
     @property
     def shown_unit(self) -> DisplayUnit:
         """Unit in which the values are shown."""
-        values = [float(cell) for cell in (*self.cells, *self.below) if isinstance(cell, float)]
+        values = [
+            float(cell) for cell in (*self.cells, *(() if self.below_unit else self.below)) if isinstance(cell, float)
+        ]
         return self.shown or common_unit(self.unit, values, beside=self.beside)
 
     def texts(self) -> list[str]:
@@ -69,9 +74,13 @@ class Column:
                 return str(cell)
             return number(cell, self.digits, factor=factor, beside=self.beside, infinite=self.infinite)
 
-        if not self.below:
-            return list(map(text, self.cells))
-        return [f"{text(first)}\n{text(second)}" for first, second in zip(self.cells, self.below, strict=True)]
+        def second(value: float | None) -> str:
+            if value is None:
+                return ""
+            return "\n" + (f"{number(value, 3)} {self.below_unit}" if self.below_unit else text(value))
+
+        below = map(second, self.below or [None] * len(self.cells))
+        return [text(first) + more for first, more in zip(self.cells, below, strict=True)]
 
 
 @dataclass(frozen=True)

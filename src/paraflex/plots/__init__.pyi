@@ -6,9 +6,17 @@ from .agreement import (
     model_distances as model_distances,
 )
 from .charts import (
+    bases_along_path as bases_along_path,
+    bode as bode,
     force_travel as force_travel,
     free_travels as free_travels,
+    held_frequency_by_states as held_frequency_by_states,
     joint_force_travel as joint_force_travel,
+    pole_zero_map as pole_zero_map,
+    poles_along_path as poles_along_path,
+    reduced_responses as reduced_responses,
+    reduction_errors as reduction_errors,
+    singular_values as singular_values,
     stiffness_travel as stiffness_travel,
     stress_travel as stress_travel,
 )
@@ -30,12 +38,6 @@ from .free_motion import (
     point_paths as point_paths,
 )
 from .laws import law_comparison as law_comparison
-from .linear import (
-    bode as bode,
-    pole_zero_map as pole_zero_map,
-    poles_along_path as poles_along_path,
-    singular_values as singular_values,
-)
 from .maps import response_map as response_map
 from .measured import sensors as sensors
 from .methods import work_precision as work_precision
@@ -44,12 +46,6 @@ from .modes import motor_torques as motor_torques, tracking_errors as tracking_e
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
 from .parallel import parallel_coordinates as parallel_coordinates
 from .phase import link_phases as link_phases, phase_diagrams as phase_diagrams
-from .reduction import (
-    bases_along_path as bases_along_path,
-    held_frequency_by_states as held_frequency_by_states,
-    reduced_responses as reduced_responses,
-    reduction_errors as reduction_errors,
-)
 from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
 from .spectra import numerical_damping as numerical_damping

@@ -114,7 +114,8 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
     rows = _cells(entry, charts, runs)
     if len(rows[0]) == 1 and rows[0][0].chart.equal and len(rows) == 1:
         return _plane(rows[0][0], time)
-    columns = len(rows[0]) if entry.panels == "choices" else _columns(entry, sum(map(len, rows)), charts)
+    several = entry.panels == "choices" and len(charts) > 1
+    columns = len(charts) if several else _columns(entry, sum(map(len, rows)), charts)
     cells = [cell for row in rows for cell in row]
     figure, axes = panel_grid(
         len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS
@@ -130,7 +131,7 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
 def _columns(entry: CatalogueFigure, count: int, charts: Sequence[Chart]) -> int:
     if is_narrow():
         return 1
-    return entry.columns or (min(count, 3) if not charts[0].over_time else 1)
+    return min(entry.columns or (1 if charts[0].over_time else 3), count)
 
 
 def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Sequence[str]) -> list[list[_Cell]]:
@@ -166,29 +167,30 @@ def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
         panel.axhline(units.of(cell.choice).factor * level, **_LEVEL)
     if chart.over_time and time is not None and time[0] < time[-1]:
         panel.set_xlim(time[0], time[-1])
+    values = joined(units.of(cell.choice).factor * np.asarray(curve.y, dtype=float) for curve in shown)
+    _set_scale(panel, "y", axis, values, units.of(cell.choice))
+    _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x)
     for span in chart.spans:
         label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
         low, high = units.x.factor * span.low, units.x.factor * span.high
         panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
-    values = joined(units.of(cell.choice).factor * np.asarray(curve.y, dtype=float) for curve in shown)
-    _set_scale(panel, "y", axis, values, units.of(cell.choice))
-    _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x)
     panel.set_title(mathematics(title))
     panel.set_ylabel(mathematics(axis.label(units.of(cell.choice))))
     panel.set_xlabel(mathematics(chart.x.label(units.x)))
 
 
 def _largest(curves: Sequence[Curve]) -> tuple[list[Curve], str]:
-    """Return the curves of at most `MOST_LINES` names, those with the largest peaks, and "7 of 8, the largest"."""
+    """Return marks, the lines with the largest peaks (at most `MOST_LINES` names), and "7 of 8, the largest"."""
     peaks: dict[str, float] = {}
     for curve in curves:
-        if curve.name and not curve.desired:
+        if curve.name and not (curve.desired or curve.mark):
             peaks[curve.name] = max(peaks.get(curve.name, 0.0), peak(curve.y))
     if len(peaks) <= MOST_LINES:
         return list(curves), ""
-    kept = sorted(peaks, key=lambda name: -peaks[name])[:MOST_LINES]
-    shown = [curve for curve in curves if curve.desired or not curve.name or curve.name in kept]
-    return shown, f"{MOST_LINES} of {len(peaks)}, the largest"
+    left_out = sorted(peaks, key=lambda name: -peaks[name])[MOST_LINES:]
+    return [
+        curve for curve in curves if curve.desired or curve.name not in left_out
+    ], f"{MOST_LINES} of {len(peaks)}, the largest"
 
 
 def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit: DisplayUnit, *, single: bool) -> None:
@@ -201,8 +203,8 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         return
     if curve.mark:
         style = _DASHES[curve.look.dash] if curve.line else ""
-        panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], markersize=4.0, color=colour, label=label,
-                   markerfacecolor="white" if curve.mark == "ring" else colour)  # fmt: skip
+        panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], markersize=4.0 * curve.size, color=colour,
+                   label=label, markerfacecolor="white" if curve.mark == "ring" else colour)  # fmt: skip
         return
     if curve.desired and single:
         panel.plot(x, y, label=label, **_DESIRED)
@@ -246,13 +248,7 @@ def _symmetrical(panel: Axes, direction: str, least: float) -> None:
     axis, set_scale = (panel.yaxis, panel.set_yscale) if direction == "y" else (panel.xaxis, panel.set_xscale)
     set_scale("symlog", linthresh=least, linscale=0.5)
     axis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=least))
-    axis.set_major_formatter(FuncFormatter(_signed_power))
-
-
-def _signed_power(value: float, _: Any) -> str:
-    if value == 0.0:
-        return "0"
-    return ("\N{MINUS SIGN}" if value < 0.0 else "") + logarithmic_number(abs(value))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
 
 
 def _plane(cell: _Cell, time: Any) -> Figure:

@@ -60,8 +60,6 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "link_deflections": lambda found: bool(found["tip_transverse"].any()),
     "controllers": lambda found: bool(controller_names(found)),
     "law_comparison": lambda found: bool((found["status"] == "complete").any()),
-    **dict.fromkeys(("singular_values", "pole_zero_map"), lambda found: found.sizes["map"] > 0),
-    "bode": lambda found: found.sizes["output"] > 0,
     "mode_shapes": _vibrates,
     "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }

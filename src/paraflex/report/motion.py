@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.selection import names_of
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import text_symbol
@@ -28,8 +29,7 @@ from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
-from paraflex.report.reduced_runs import reduction_tables
-from paraflex.report.text import count, number, pairs, quantity
+from paraflex.report.text import count, number, pairs, quantity, sections
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
@@ -57,7 +57,12 @@ def motion_page(data: xr.Dataset) -> Page:
         facts=common_facts(data),
         command=run_command_line(asked(data)),
         figures=_figures(data),
-        more=[*controller_tables(data), *load_tables(data), *reduction_tables(data), ("Integration", _table(data))],
+        more=[
+            *controller_tables(data),
+            *load_tables(data),
+            *sections(reduced_runs(data)),
+            ("Integration", _table(data)),
+        ],
         panels=_panels(few),
         time=few["time"].values,
         runs=_ALONE,

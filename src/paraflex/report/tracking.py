@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.selection import default_mode, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import display_unit, text_symbol
@@ -38,8 +39,7 @@ from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, summary_beside, verdict_word
-from paraflex.report.reduced_runs import reduction_tables
-from paraflex.report.text import NO_VALUE, count, number, quantity, table
+from paraflex.report.text import NO_VALUE, count, number, quantity, sections, table
 from paraflex.results.controllers import controller_names
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
@@ -92,7 +92,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
             ("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {})),
             *controller_tables(data),
             *load_tables(data, default_mode(data)),
-            *reduction_tables(data),
+            *sections(reduced_runs(data)),
             ("Integration", solver_table(data)),
         ],
         panels=[*_panels(few, runs), *controller_panels(few, runs), *load_panel(few, runs)],

@@ -36,7 +36,7 @@ const charts = (() => {
       };
       if (curve.mark) return {
         type: "scatter", mode: curve.line ? "lines+markers" : "markers", line: { color: lineColour(curve), dash: DASHES[curve.dash], width: 1.4 }, name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y),
-        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: curve.mark === "ring" ? 9 : 8, line: { width: 1.6, color: lineColour(curve) } },
+        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: (curve.size ?? 1) * (curve.mark === "ring" ? 9 : 8), line: { width: 1.6, color: lineColour(curve) } },
         text: curve.texts.map(plain), hovertemplate: `${curve.texts.length ? "%{text}" : "%{x:.4~g}, %{y:.4~g}"}<extra>%{fullData.name}</extra>`, visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       return {
