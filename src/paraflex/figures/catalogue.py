@@ -56,6 +56,8 @@ class Figure:
         Number of columns of panels in print; 0 (default) for one of charts over time, else for as many as fit.
     height : float
         Height of a panel in print [mm].
+    remedy : str
+        Remedy in the error message for results without charts of the figure.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Figure:
     panels: Panels = "charts"
     columns: int = 0
     height: float = 48.0
+    remedy: str = "choose another"
 
     def can_show(self, data: Any) -> bool:
         """Check whether the results have the variables of the figure and, unless it is a drawing, any charts of it."""

@@ -39,6 +39,8 @@ from paraflex.units import DisplayUnit
 Row = tuple[str, str, Complex]
 
 _HEADING = "Responses, poles and zeros"
+# Remedy for models without maps from motors.
+_OTHERS = "draw bode for other inputs and outputs"
 FREQUENCY = Axis("frequency", "Hz", log=True)
 _DEGREES = DisplayUnit("°", 180.0 / math.pi)
 # Largest numbers of branches drawn, and of oscillations, poles or zeros in a row; linear.nc and linear.json have all.
@@ -46,7 +48,7 @@ _BRANCHES, _OSCILLATIONS, _ROOTS = 7, 6, 5
 # A smaller damping ratio is a rounding error.
 _ROUNDING = 1e-7
 # Share of the largest drawn magnitude below which a pole is zero.
-_NOTHING = 1e-9
+_NOTHING = 1e-7
 # Sizes of the rings of the last mode's zeros, and its increment from mode to mode, so that equal rings are nested.
 _RING, _RING_STEP = 0.7, 0.25
 _ROOTS_NOTE = "Those on the imaginary axis as frequencies [Hz]; * marks the right half plane."
@@ -57,7 +59,7 @@ _ROOTS_NOTE = "Those on the imaginary axis as frequencies [Hz]; * marks the righ
 
 @figure(
     "gains from motors to their encoders and to the end-effector over frequency, all modes", heading=_HEADING,
-    written_as="singular_values", height=62.0,
+    written_as="singular_values", height=62.0, remedy=_OTHERS,
 )  # fmt: skip
 def singular_values(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of the largest and least gain from a mode's motors to their own encoders and to the end-effector.
@@ -134,7 +136,8 @@ def _phase_axis(angles: Sequence[Array]) -> Axis:
 
 
 @figure(
-    "poles and zeros in the complex plane, all modes", heading=_HEADING, written_as="pole_zero_map", height=70.0
+    "poles and zeros in the complex plane, all modes", heading=_HEADING, written_as="pole_zero_map", height=70.0,
+    remedy=_OTHERS,
 )  # fmt: skip
 def pole_zero_map(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of poles (crosses, motors free) and zeros (rings) of all modes, on symmetrical logarithmic axes.
@@ -177,7 +180,7 @@ def pole_zero_map(data: xr.Dataset) -> Iterator[Chart]:
 
 @figure(
     "frequencies and real parts of poles along the motion", heading=_HEADING, takes="mode", panels="choices",
-    written_as="poles_along_path", variables=("branch_real",),
+    written_as="poles_along_path", variables=("branch_real",), remedy="linearise with --along, or give along=",
 )  # fmt: skip
 def poles_along_path(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of frequencies and real parts of the lowest poles along a motion, motors free and held.
@@ -193,7 +196,7 @@ def poles_along_path(data: xr.Dataset) -> Iterator[Chart]:
         for k in np.flatnonzero(np.isfinite(values.real).any(axis=0)):
             for curves, y in ((frequencies, np.abs(values[:, k]) / (2.0 * np.pi)), (real, values[:, k].real)):
                 curves.append(Curve(f"branch {k + 1}", y, data["moment"].values, look(int(k)), choice=c))
-    time = Axis("time", "s", "t")
+    time = Axis("time", "s")
     note = "Each branch is followed by its motion. Frozen at instants, poles say nothing about stability."
     yield Chart("branches", "Frequencies along the motion", Axis("frequency", "Hz"), frequencies, time, choices,
                 "mode and motors", note=note)  # fmt: skip

@@ -87,12 +87,13 @@ def held_frequency_by_states(data: xr.Dataset) -> Iterator[Chart]:
     exact = data["natural_frequency"].sel(variant=FULL, holding=HOLDINGS[1]).isel(order=0).values
     found = data["held_frequency"].transpose("mode", "reduction", "kept").values
     curves = []
+    known = states[np.isfinite(found).any(axis=(0, 1))] if np.isfinite(found).any() else states
     for m in range(len(modes)):
+        curves.append(Curve(_states_of(data, FULL), np.full(2, exact[m]), known[[0, -1]], choice=m))
         curves += [
             Curve(name, found[m, r], states, _look(r + 1), choice=m, mark="dot", line=True)
             for r, name in enumerate(names_of(data, "reduction")) if np.isfinite(found[m, r]).any()
         ]  # fmt: skip
-        curves.append(Curve(_states_of(data, FULL), np.full(2, exact[m]), states[[0, -1]], choice=m))
     of = "" if len(modes) > 1 else f" of {modes[0]}"
     yield Chart("held", f"Lowest frequency, motors{of} held", Axis("lowest frequency", "Hz", log=True), curves,
                 Axis("states"), _choices(data), "mode")  # fmt: skip
@@ -100,15 +101,15 @@ def held_frequency_by_states(data: xr.Dataset) -> Iterator[Chart]:
 
 @figure(
     "errors along the path with bases of one and of several poses", heading=_BASES, takes="mode",
-    written_as="bases_along_path", variables=("along_error",), height=62.0,
+    written_as="bases_along_path", variables=("along_error",), height=62.0, remedy="reduce along a path: --along 21",
 )  # fmt: skip
 def bases_along_path(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of errors of responses and of frequencies along a path.
 
     Bases are those of each pose, of one pose, and interpolated. Dashed: static shapes are of other poses too.
     """
-    errors = [("along", "responses", data["along_error"], [float(data.attrs["accuracy"])])]
-    errors += [(f"along-{holding}", f"frequencies, {HELD_WORDS[holding]}",
+    errors = [("along", "Responses", data["along_error"], [float(data.attrs["accuracy"])])]
+    errors += [(f"along-{holding}", f"Frequencies, {HELD_WORDS[holding]}",
                 data["along_frequency_error"].sel(holding=holding), []) for holding in HOLDINGS]  # fmt: skip
     unit = data.attrs["place_unit"]
     for identity, title, values, levels in errors:
@@ -119,7 +120,7 @@ def bases_along_path(data: xr.Dataset) -> Iterator[Chart]:
             for m in range(data.sizes["mode"]) for b, name in enumerate(names_of(data, "basis"))
             for s, static in enumerate(STATIC[: 1 if name == OWN else None]) if np.isfinite(lines[m, b, s]).any()
         ]  # fmt: skip
-        yield Chart(identity, f"Errors of {title}", Axis("largest relative error", log=True), curves,
+        yield Chart(identity, title, Axis("largest relative error", log=True), curves,
                     Axis(_ALONG[unit], unit), _choices(data), "mode", levels=levels)  # fmt: skip
 
 

@@ -11,11 +11,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullLocator, SymmetricalLogLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from paraflex.errors import InputError
 from paraflex.figures.catalogue import Figure as CatalogueFigure, all_figures, prepared
-from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined
+from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
 from paraflex.figures.selection import default_mode, names_of
 from paraflex.formatting import logarithmic_number, peak
 from paraflex.plots.given import drawn
@@ -76,9 +76,10 @@ def plotting_function(name: str) -> Callable[..., Figure]:
         if entry.takes == "mode" and mode is None and "mode" in getattr(data, "dims", ()):
             mode = default_mode(data)
         found = prepared(data, mode)
-        charts = list(entry.charts(found, **options))
+        known = all(variable in found for variable in entry.variables)
+        charts = list(entry.charts(found, **options)) if known else []
         if not charts:
-            raise InputError("nothing to show in these results", field="figure", value=name, remedy="choose another")
+            raise InputError("nothing to show in these results", field="figure", value=name, remedy=entry.remedy)
         if not isinstance(found, xr.Dataset) or "time" not in found.dims:
             return print_figure(entry, charts)
         return print_figure(entry, charts, found["time"].values, names_of(found, "mode"))
@@ -221,7 +222,7 @@ def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: Displ
     if axis.names:
         list_lines(panel, axis.names)
     elif axis.linear_below:
-        _symmetrical(panel, direction, axis.linear_below * unit.factor)
+        _symmetrical(panel, direction, axis, unit)
     elif is_logarithmic(axis, values):
         mark_powers(panel, direction)
         positive = values[np.isfinite(values) & (values > 0.0)]
@@ -243,12 +244,12 @@ def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: Displ
         (panel.axhline if direction == "y" else panel.axvline)(0.0, **ZERO)
 
 
-def _symmetrical(panel: Axes, direction: str, least: float) -> None:
-    """Make an axis linear below a magnitude and logarithmic beyond it, with numbers at powers of ten."""
-    axis, set_scale = (panel.yaxis, panel.set_yscale) if direction == "y" else (panel.xaxis, panel.set_xscale)
-    set_scale("symlog", linthresh=least, linscale=0.5)
-    axis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=least))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
+def _symmetrical(panel: Axes, direction: str, axis: Axis, unit: DisplayUnit) -> None:
+    """Make an axis linear below a magnitude and logarithmic beyond it."""
+    own, set_scale = (panel.yaxis, panel.set_yscale) if direction == "y" else (panel.xaxis, panel.set_xscale)
+    set_scale("symlog", linthresh=axis.linear_below * unit.factor, linscale=0.5)
+    own.set_major_locator(FixedLocator(unit.factor * symmetrical_numbers(axis)))
+    own.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
 
 
 def _plane(cell: _Cell, time: Any) -> Figure:

@@ -32,8 +32,6 @@ from paraflex.writing import write_text
 
 # Number of notices from which they are folded.
 _FOLDED = 3
-# Largest number of decades of a symmetrical logarithmic axis that are all numbered.
-_DECADES = 4
 _ORIGIN = "How these results were made"
 _STYLES = ("page.css",)
 _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
@@ -385,8 +383,8 @@ def _described(chart: described.Chart, series: Series, time: int) -> dict[str, A
         "identity": chart.identity, "title": chart.title, "y": labels, "x": chart.x.label(units.x),
         "curves": [curve(one) for one in chart.curves], "choices": list(chart.choices), "choosing": chart.choosing,
         "log": described.is_logarithmic(chart.axis(None), ys), "log_x": described.is_logarithmic(chart.x, xs),
-        "equal": chart.equal, "over_time": chart.over_time, "note": chart.note, "layout": _layout(chart, units),
-        "figure": None, "drawer": "", "pickers": [],
+        "equal": chart.equal or bool(chart.x.linear_below), "over_time": chart.over_time, "note": chart.note,
+        "layout": _layout(chart, units), "figure": None, "drawer": "", "pickers": [],
     }  # fmt: skip
 
 
@@ -422,14 +420,10 @@ def _placed(axis: described.Axis, unit: DisplayUnit, values: ArrayLike) -> descr
 
 
 def _symmetrical(axis: described.Axis, unit: DisplayUnit) -> dict[str, Any]:
-    """Return Plotly's layout of a symmetrical logarithmic axis with limits, numbered every decade or every other."""
-    low, high = axis.low or 0.0, axis.high or 0.0
-    count = int(np.log10(max(-low, high) / axis.linear_below)) + 1
-    # The first decade has no number because it would touch that of zero.
-    decades = axis.linear_below * 10.0 ** np.arange(1, count, 1 if count <= _DECADES else 2)
-    ticks = np.concatenate([-decades[::-1], [0.0], decades])
+    """Return Plotly's layout of a symmetrical logarithmic axis."""
+    ticks, limits = described.symmetrical_numbers(axis), [axis.low or 0.0, axis.high or 0.0]
     return {
-        "tickvals": _placed(axis, unit, ticks).tolist(), "range": _placed(axis, unit, [low, high]).tolist(),
+        "tickvals": _placed(axis, unit, ticks).tolist(), "range": _placed(axis, unit, limits).tolist(),
         "ticktext": list(map(logarithmic_number, unit.factor * ticks)), "zeroline": axis.zero, "tickangle": 0,
     }  # fmt: skip
 
