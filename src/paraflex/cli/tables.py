@@ -245,11 +245,12 @@ def loads(console: Console, figures: Mapping[str, Any]) -> None:
 
 def reductions(console: Console, summaries: Mapping[str, Any]) -> None:
     """Print errors and times of runs with few flexible coordinates relative to those with all, if there are any."""
-    from paraflex.figures.reduction import reduced_runs_table
+    from paraflex.figures.reduction import reduced_runs_table, reduced_words
     from paraflex.results.following import HEADLINE, ErrorSpan
 
     error = HEADLINE[ErrorSpan(next(iter(summaries.values()))["error"])]
-    print_table(console, reduced_runs_table(_texts(summaries), _runs(summaries), error))
+    sizes = [reduced_words(mode["reduction"]) for _, mode in _runs(summaries) if mode.get("reduction") is not None]
+    print_table(console, reduced_runs_table(_texts(summaries), _runs(summaries), error), "".join(sizes[:1]))
 
 
 def reduction(console: Console, summary: Mapping[str, Any]) -> None:

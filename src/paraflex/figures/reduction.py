@@ -199,7 +199,7 @@ def _frequency_table(data: xr.Dataset) -> Table:
                Column("motors", [HOLDINGS[h] for h, _, _ in rows]), Column("model", [models[v] for _, _, v in rows]),
                *(Column(str(k + 1), list(values[:, k]), "Hz", below=[one[k] for one in below], below_unit="%")
                  for k in range(values.shape[1]))]  # fmt: skip
-    return Table("Frequencies", columns, "Frequencies above zero; below, the deviations of reduced models.")
+    return Table("Frequencies, and deviations of reduced models", columns, "Frequencies above zero.")
 
 
 def _along_table(data: xr.Dataset) -> Table:
@@ -226,12 +226,13 @@ def _along_table(data: xr.Dataset) -> Table:
     *cells, within = zip(*rows, strict=True)
     columns = [Column(head, list(each), digits=2) for head, each in zip(heads, cells, strict=True)]
     limit = f"{number(100.0 * float(data.attrs['accuracy']))} %"
-    note = (
-        f"Largest errors of {data.attrs['along_method']} at {places.size} poses along "
-        f"{quantity(float(places[-1]), data.attrs['place_unit'], padded=False)}, of responses up to "
-        f"{number(float(data.attrs['until']))} Hz and of frequencies with motors free and held."
+    title = (
+        f"{_BASES}, {data.attrs['along_method']}: errors at {places.size} poses along "
+        f"{quantity(float(places[-1]), data.attrs['place_unit'], padded=False)} up to "
+        f"{number(float(data.attrs['until']))} Hz"
     )
-    return Table(_BASES, [*columns, Column(limit, list(within), f"at [{unit.name}]")], note)
+    note = "Largest errors of responses, and of frequencies with motors free and held."
+    return Table(title, [*columns, Column(limit, list(within), f"at [{unit.name}]")], note)
 
 
 def bound_sentences(data: xr.Dataset) -> Iterator[str]:
@@ -287,8 +288,8 @@ def reduced_runs_table(
     columns += [Column("distance", [full["distance"] for _, _, full in found], "m", digits=2),
                 Column("relative time", combined(lambda few, full: few / full, "wall_time"), digits=2)]  # fmt: skip
     whose = "the end-effector" if error else "a named point"
-    title = f"Reduced bodies: {reduced_words(found[0][2])}" if found else ""
-    return Table(title, columns, f"Distance: the largest of {whose} from its place with all flexible coordinates.",
+    words = reduced_words(found[0][2]) if found else ""
+    return Table("Reduced bodies", columns, f"{words}. Distance: the largest of {whose} from its place with all.",
                  {names[-1]: r for r, (names, _, _) in enumerate(found)} if error else None)  # fmt: skip
 
 
