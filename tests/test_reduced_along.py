@@ -204,7 +204,7 @@ def test_the_command_along_a_path(tmp_path):
     done = paraflex("reduce", "raparm_i", "--mode", "+-+-", "--path", "line", "--along", "5", "--basis", "0,0.264",
                     "--no-report", "--out", "r", cwd=tmp_path)  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "Bases of other poses, craig-bampton: errors at 5 poses along 0.1 m up to 40 Hz" in done.stdout
+    assert "Bases of other poses, craig-bampton: errors at 5 poses along 100 mm up to 40 Hz" in done.stdout
     data = load_results(tmp_path / "r" / "reduced.nc")
     error = data["along_error"].sel(mode="+-+-", static="carried", basis="of one pose").values
     # The basis is that of the middle.

@@ -22,7 +22,7 @@ def test_tables_tiles_and_charts_have_the_numbers_of_the_dataset(reduced):
     most = float(reduced["states"].sel(reduction="craig-bampton").max())
     assert ("states needed, craig-bampton", f"{most:.0f}", "for every mode and output") in page.figures
     charts = {chart.identity: chart for panel in page.panels for chart in panel.charts}
-    assert len(charts) == reduced.sizes["output"] + 1
+    assert len(charts) == reduced.sizes["output"] + 2
     full = charts["gain-2"].curves[0]
     assert np.asarray(full.y) == pytest.approx(reduced["gain"].isel(mode=0, variant=0, output=2).values)
     titles = [title for title, _ in page.more]

@@ -142,7 +142,9 @@ def power_of_ten(value: float) -> str:
 
 def logarithmic_number(value: float) -> str:
     """Format a number of a logarithmic axis: plain from 0.001 up to below 10⁴, else as "10⁻⁵" or "2·10⁻⁵"."""
-    if value <= 0.0 or 0.999e-3 <= value < 0.999e4:
+    if value < 0.0:
+        return f"−{logarithmic_number(-value)}"
+    if value == 0.0 or 0.999e-3 <= value < 0.999e4:
         return f"{value:g}"
     exponent = math.floor(math.log10(value) + 1e-9)
     digits = f"{value / 10.0**exponent:.3g}"

@@ -20,6 +20,7 @@ from paraflex.dynamics import State, build_system, pose_at_rest, standing_system
 from paraflex.errors import ActuationError, AssemblyError, InputError
 from paraflex.files import Model, library_names
 from paraflex.files.fields import number_in
+from paraflex.formatting import number, quantity
 from paraflex.kinematics import pose_at
 from paraflex.linear import LinearModel, linearise
 from paraflex.mechanism import ActuationMode, Mechanism
@@ -222,7 +223,7 @@ def _at_rest(model: Model, pose: State, mode: ActuationMode, balanced: bool, por
         remain = "one motion remains" if free == 1 else f"{free} motions remain"
         raise InputError(
             f"it does not hold the mechanism in this pose: with its motors held {remain} free, and when released it "
-            f"would start with {found.unbalanced:.3g} m/s^2",
+            f"would start with {quantity(found.unbalanced, 'm/s^2', padded=False)}",
             field="--mode", value=mode.name, remedy="name more motors, or give --balanced for a pose in equilibrium",
         )  # fmt: skip
     return found
@@ -244,7 +245,7 @@ def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
             "is not a time of the motion",
             field="--at",
             value=request.at,
-            remedy=f"choose one up to {study.duration:g} s",
+            remedy=f"choose one up to {number(study.duration, 6)} s",
         )
     compile_kernels_for(model.mechanism, plain_console(stderr=True).print)
     until = study.duration if request.along is not None or not request.at else request.at

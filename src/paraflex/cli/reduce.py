@@ -13,7 +13,8 @@ from paraflex.cli.reduce_tables import print_reduction
 from paraflex.errors import InputError, renamed
 from paraflex.linear import PosesAlong, poses_along
 from paraflex.linear.reduced import ReductionMethod
-from paraflex.results.reduction_data import reduction_dataset, reduction_summary
+from paraflex.results.reduction_data import reduction_dataset
+from paraflex.results.reduction_summary import reduction_summary
 
 _METHODS = (ReductionMethod.CRAIG_BAMPTON.value, ReductionMethod.MODAL.value)
 

@@ -13,13 +13,20 @@ from rich.table import Table
 from paraflex.cli.collected import printed
 from paraflex.errors import printable
 from paraflex.findings import DONE_STATUSES, Finding
+from paraflex.formatting import number as text_of, quantity
 
 if TYPE_CHECKING:
-    from paraflex.figures.tables import Table as Described
+    from paraflex.figures.tables import Column, Table as Described
 
     # Their import takes as long as all of `paraflex info`.
     from paraflex.studies import StudyResult
     from paraflex.tracking import TrackingTask
+
+
+# Number of letters from which words of a table may be broken.
+_LONG = 32
+# Torques below this share of the largest are rounding errors.
+_ROUNDING = 1e-9
 
 
 class _PlainConsole(Console):
@@ -141,13 +148,18 @@ def print_table(console: Console, shown: Described, title: str | None = None) ->
              for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
     table = plain_table()
     for head, column in zip(heads, shown.columns, strict=True):
-        table.add_column(head, justify="right" if column.is_numeric else "left", no_wrap=True)
+        table.add_column(head, justify="right" if column.is_numeric else "left", no_wrap=not _is_long(column))
     for row in shown.texts():
         table.add_row(*row)
     title = shown.title if title is None else title
     if title:
         console.print(title, soft_wrap=True)
     console.print(table)
+
+
+def _is_long(column: Column) -> bool:
+    """Check whether a column has sentences or lists, which may be broken."""
+    return any(isinstance(cell, str) and len(cell) > _LONG for cell in column.cells)
 
 
 def print_titled(console: Console, title: str, table: Table) -> None:
@@ -189,36 +201,24 @@ def loads(console: Console, figures: Mapping[str, Any]) -> None:
 
 def reductions(console: Console, summaries: Mapping[str, Any]) -> None:
     """Print errors and times of runs with few flexible coordinates relative to those with all, if there are any."""
+    from paraflex.figures.reduction import reduced_runs_table, reduced_words
     from paraflex.results.following import HEADLINE, ErrorSpan
 
-    rows, title, key = [], "", HEADLINE[ErrorSpan(next(iter(summaries.values()))["error"])]
-    for names, mode in _runs(summaries):
-        if (one := mode.get("reduction")) is None:
-            continue
-        error, exact, times = mode[key], one[f"full_{key}"], (mode["wall_time"], one["full_wall_time"])
-        off = None if error is None or exact is None else error - exact
-        rows.append([*names, number(exact, ".4e"), number(off, "+.1e"), number(one["distance"], ".1e"),
-                     "" if None in times else f"{times[0] / times[1]:.2f}"])  # fmt: skip
-        title = _reduced_words(one)
-    if rows:
-        heads = ("full error\n[m]", "off\n[m]", "distance\n[m]", "time of\nfull run")
-        print_titled(console, title, plain_table(*_texts(summaries), numbers=heads, rows=rows))
+    error = HEADLINE[ErrorSpan(next(iter(summaries.values()))["error"])]
+    sizes = [reduced_words(mode["reduction"]) for _, mode in _runs(summaries) if mode.get("reduction") is not None]
+    print_table(console, reduced_runs_table(_texts(summaries), _runs(summaries), error), "".join(sizes[:1]))
 
 
 def reduction(console: Console, summary: Mapping[str, Any]) -> None:
     """Print error and time of a run without a path with few flexible coordinates, relative to the full run."""
+    from paraflex.figures.reduction import reduced_words
+
     if (one := summary.get("reduction")) is not None:
         console.print(
-            f"{_reduced_words(one)}: points are up to {one['distance']:.1e} m from their positions in the full run, in "
-            f"{summary['wall_time'] / one['full_wall_time']:.2f} of its time", soft_wrap=True,
-        )  # fmt: skip
-
-
-def _reduced_words(one: Mapping[str, Any]) -> str:
-    return (
-        f"{one['flexible_coordinates']} of {one['full_flexible_coordinates']} flexible coordinates, {one['states']} of "
-        f"{one['full_states']} states"
-    )
+            f"{reduced_words(one)}: points are up to {quantity(one['distance'], 'm', digits=2)} from their positions "
+            f"in the full run, in {text_of(summary['wall_time'] / one['full_wall_time'], 2)} of its time",
+            soft_wrap=True,
+        )
 
 
 def stresses(console: Console, summaries: Mapping[str, Any]) -> None:

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import xarray as xr
 
 from paraflex.figures.charts import Chart, Panel
-from paraflex.figures.selection import as_runs
+from paraflex.figures.selection import as_runs, names_of, place_of
 from paraflex.folders.kinds import RESULT_KINDS
 
 Charts = Callable[..., Iterable[Chart]]
@@ -24,6 +24,10 @@ Charts = Callable[..., Iterable[Chart]]
 Takes = Literal["results", "mode", "models", "run", "designs", "nothing"]
 # Panels of the printed figure: one for each chart; one for each choice and chart; one for each run.
 Panels = Literal["charts", "choices", "runs"]
+
+
+# Problem of results without charts of a figure.
+NOTHING = "nothing to show in these results"
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ class Figure:
     columns: int = 0
     height: float = 48.0
     shared: bool = False
-    missing: tuple[str, str] = ("nothing to show in these results", "choose another figure")
+    missing: tuple[str, str] = (NOTHING, "choose another figure")
     defaults: Callable[[Any], Mapping[str, Any]] = lambda _: {}
 
     def can_show(self, data: Any) -> bool:
@@ -99,7 +103,7 @@ def prepared(data: Any, mode: str | None = None) -> Any:
     """
     if isinstance(data, xr.Dataset) and "time" in data.dims and "model" not in data.dims:
         return as_runs(data, mode)
-    return data if mode is None else data.sel(mode=[mode])
+    return data if mode is None else data.isel(mode=[place_of(mode, names_of(data, "mode"), "mode")])
 
 
 _MODULES: dict[str, dict[str, Figure]] = {}

@@ -24,6 +24,8 @@ DASHED, DOTTED = 1, 2
 _DASH_ORDER = (0, 1, 3, 4, 2)
 # Ratio of the largest to the smallest positive value above which an axis that may be logarithmic is.
 _DECADE = 10.0
+# Number of powers of ten on a symmetrical logarithmic axis above which some are left out.
+_MOST_POWERS = 4
 
 
 class Look(NamedTuple):
@@ -59,7 +61,7 @@ class Axis:
     log : bool
         Whether the axis is logarithmic if its values span more than a decade.
     linear_below : float
-        Magnitude below which a symmetrical logarithmic axis is linear; 0 (default) for other axes.
+        Magnitude below which a symmetrical logarithmic axis, which needs limits, is linear; 0 (default) for others.
     zero : bool
         Whether a line marks zero.
     extent : float
@@ -128,6 +130,8 @@ class Curve:
         Whether the curve is omitted from the label at the pointer.
     mark : str
         Marks at its points, "ring", "cross", "square" or "dot", or horizontal bars, "bar"; empty (default) for none.
+    size : float
+        Size of the marks relative to the usual one.
     line : bool
         Whether a line joins the points; by default only if they have no marks.
     texts : sequence of str
@@ -145,6 +149,7 @@ class Curve:
     stopped: bool = False
     quiet: bool = False
     mark: Literal["", "ring", "cross", "square", "dot", "bar"] = ""
+    size: float = 1.0
     line: bool = False
     texts: Sequence[str] = ()
 
@@ -284,6 +289,16 @@ def is_wide(values: ArrayLike, ratio: float = _DECADE) -> bool:
 def is_logarithmic(axis: Axis, values: ArrayLike) -> bool:
     """Check whether an axis with these values is logarithmic: it may be, and the values span more than a decade."""
     return axis.log and is_wide(values)
+
+
+def symmetrical_numbers(axis: Axis) -> Array:
+    """Return the numbers of a symmetrical logarithmic axis with limits: zero and powers of ten, fewer if many fit.
+
+    The first power of ten is left out because it would touch zero.
+    """
+    count = int(np.log10(max(-(axis.low or 0.0), axis.high or 0.0) / axis.linear_below)) + 1
+    powers = axis.linear_below * 10.0 ** np.arange(1, count, -(-count // _MOST_POWERS))
+    return np.concatenate([-powers[::-1], [0.0], powers])
 
 
 def stairs(times: Array, values: Array) -> tuple[Array, Array]:

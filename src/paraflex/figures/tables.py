@@ -29,9 +29,11 @@ class Column:
     unit : str
         SI unit of the values, or a text below the heading for columns of words; empty if there is none.
     below : sequence of float or None, optional
-        Second value of each cell, in the same unit, which stands below the first.
+        Second value of each cell, which stands below the first; None where there is none.
     errors : sequence of float or None, optional
         Error of each value, in the same unit, which is written behind ±; None where it is not.
+    below_unit : str
+        Unit in which second values are given, which is written after each; by default that of the first ones.
     beside : float
         Magnitude of the quantities whose differences the values are; values within their rounding are 0.
     digits : int
@@ -47,6 +49,7 @@ class Column:
     unit: str = ""
     below: Sequence[float | None] = ()
     errors: Sequence[float | None] = ()
+    below_unit: str = ""
     beside: float = 0.0
     digits: int = 4
     infinite: str = "inf"
@@ -60,7 +63,9 @@ class Column:
     @property
     def shown_unit(self) -> DisplayUnit:
         """Unit in which the values are shown."""
-        values = [float(cell) for cell in (*self.cells, *self.below) if isinstance(cell, float)]
+        values = [
+            float(cell) for cell in (*self.cells, *(() if self.below_unit else self.below)) if isinstance(cell, float)
+        ]
         return self.shown or common_unit(self.unit, values, beside=self.beside)
 
     def texts(self) -> list[str]:
@@ -72,12 +77,15 @@ class Column:
                 return str(cell)
             return number(cell, self.digits, factor=factor, beside=self.beside, infinite=self.infinite)
 
+        def second(value: float | None) -> str:
+            if value is None:
+                return ""
+            return "\n" + (f"{number(value, 3)} {self.below_unit}" if self.below_unit else text(value))
+
         texts = list(map(text, self.cells))
         for k, error in enumerate(self.errors):
             texts[k] += error_text(error, factor)
-        if not self.below:
-            return texts
-        return [f"{first}\n{text(second)}" for first, second in zip(texts, self.below, strict=True)]
+        return [first + second(value) for first, value in zip(texts, self.below or [None] * len(texts), strict=True)]
 
 
 @dataclass(frozen=True)

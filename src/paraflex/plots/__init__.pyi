@@ -7,7 +7,9 @@ from .agreement import (
 )
 from .charts import (
     actuation_condition as actuation_condition,
+    bases_along_path as bases_along_path,
     beam_stresses as beam_stresses,
+    bode as bode,
     controllers as controllers,
     coordinates as coordinates,
     drive_efforts as drive_efforts,
@@ -17,12 +19,21 @@ from .charts import (
     force_travel as force_travel,
     frame_loads as frame_loads,
     free_travels as free_travels,
+    held_frequency_by_states as held_frequency_by_states,
     joint_force_travel as joint_force_travel,
-    joint_forces as joint_forces,
-    joint_motions as joint_motions,
-    link_deflections as link_deflections,
-    link_motions as link_motions,
-    link_phases as link_phases,
+    pole_zero_map as pole_zero_map,
+    poles_along_path as poles_along_path,
+    reduced_responses as reduced_responses,
+    reduction_errors as reduction_errors,
+    singular_values as singular_values,
+    stiffness_travel as stiffness_travel,
+    stress_travel as stress_travel,
+)
+from .controlled import controllers as controllers
+from .derivatives import elasticities as elasticities
+from .drawing import mechanism_drawing as mechanism_drawing
+from .driving import (
+    actuation_condition as actuation_condition,
     mode_comparison as mode_comparison,
     mode_conditions as mode_conditions,
     motion_overview as motion_overview,
@@ -38,27 +49,13 @@ from .charts import (
     tracking_distance as tracking_distance,
     tracking_errors as tracking_errors,
 )
-from .derivatives import elasticities as elasticities
-from .drawing import mechanism_drawing as mechanism_drawing
 from .equilibria import buckling_shapes as buckling_shapes, deformed_shapes as deformed_shapes
 from .laws import law_comparison as law_comparison
-from .linear import (
-    bode as bode,
-    pole_zero_map as pole_zero_map,
-    poles_along_path as poles_along_path,
-    singular_values as singular_values,
-)
 from .maps import response_map as response_map
 from .methods import work_precision as work_precision
 from .mode_shapes import mode_shapes as mode_shapes
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
 from .parallel import parallel_coordinates as parallel_coordinates
-from .reduction import (
-    bases_along_path as bases_along_path,
-    held_frequency_by_states as held_frequency_by_states,
-    reduced_responses as reduced_responses,
-    reduction_errors as reduction_errors,
-)
 from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
 from .spectra import numerical_damping as numerical_damping

@@ -11,11 +11,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullLocator, SymmetricalLogLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from paraflex.errors import InputError
 from paraflex.figures.catalogue import Figure as CatalogueFigure, all_figures, prepared
-from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined
+from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
 from paraflex.figures.selection import default_mode, names_of
 from paraflex.formatting import ROUNDING, logarithmic_number, peak
 from paraflex.plots.given import drawn
@@ -196,32 +196,32 @@ def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
         panel.axhline(units.of(cell.choice).factor * level, **_LEVEL)
     if chart.over_time and time is not None and time[0] < time[-1]:
         panel.set_xlim(time[0], time[-1])
-    for span in chart.spans:
-        label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
-        low, high = units.x.factor * span.low, units.x.factor * span.high
-        panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
     if not chart.over_time and any(curve.mark for curve in shown):
         panel.margins(x=_BESIDE)
     values = joined(units.of(cell.choice).factor * np.asarray(curve.y, dtype=float) for curve in shown)
     _set_scale(panel, "y", axis, values, units.of(cell.choice))
     _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x,
                flush=not all(curve.mark for curve in shown))  # fmt: skip
+    for span in chart.spans:
+        label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
+        low, high = units.x.factor * span.low, units.x.factor * span.high
+        panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
     panel.set_title(mathematics(title))
     panel.set_ylabel(mathematics(axis.label(units.of(cell.choice), short=cell.title.endswith(f": {axis.name}"))))
     panel.set_xlabel(mathematics(chart.x.label(units.x)))
 
 
 def _largest(curves: Sequence[Curve]) -> tuple[list[Curve], str]:
-    """Return the curves of at most `MOST_LINES` names, those with the largest peaks, and "7 of 8, the largest"."""
+    """Return marks, the lines with the largest peaks (at most `MOST_LINES` names), and "7 of 8, the largest"."""
     peaks: dict[str, float] = {}
     for curve in curves:
-        if curve.name and not curve.desired:
+        if curve.name and not (curve.desired or curve.mark):
             peaks[curve.name] = max(peaks.get(curve.name, 0.0), peak(curve.y))
     if len(peaks) <= MOST_LINES:
         return list(curves), ""
-    kept = sorted(peaks, key=lambda name: -peaks[name])[:MOST_LINES]
-    shown = [curve for curve in curves if curve.desired or not curve.name or curve.name in kept]
-    return shown, f"{MOST_LINES} of {len(peaks)}, the largest"
+    left_out = sorted(peaks, key=lambda name: -peaks[name])[MOST_LINES:]
+    kept = [curve for curve in curves if curve.desired or curve.name not in left_out]
+    return kept, f"{MOST_LINES} of {len(peaks)}, the largest"
 
 
 def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit: DisplayUnit, *, single: bool) -> None:
@@ -235,7 +235,7 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
     if curve.mark:
         style, inside = _DASHES[curve.look.dash] if curve.line else "", "white" if curve.mark == "ring" else colour
         panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], color=colour, label=label,
-                   markersize=_SIZES[curve.mark == "square"], markerfacecolor=inside)  # fmt: skip
+                   markersize=curve.size * _SIZES[curve.mark == "square"], markerfacecolor=inside)  # fmt: skip
         return
     if curve.desired and single:
         panel.plot(x, y, label=label, **_DESIRED)
@@ -253,7 +253,7 @@ def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: Displ
         list_lines(panel, axis.names)
         panel.grid(axis="x", color="0.9", linewidth=0.4)
     elif axis.linear_below:
-        _symmetrical(panel, direction, axis.linear_below * unit.factor)
+        _symmetrical(panel, direction, axis, unit)
     elif is_logarithmic(axis, values):
         mark_powers(panel, direction)
         positive = values[np.isfinite(values) & (values > 0.0)]
@@ -275,18 +275,12 @@ def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: Displ
         (panel.axhline if direction == "y" else panel.axvline)(0.0, **ZERO)
 
 
-def _symmetrical(panel: Axes, direction: str, least: float) -> None:
-    """Make an axis linear below a magnitude and logarithmic beyond it, with numbers at powers of ten."""
-    axis, set_scale = (panel.yaxis, panel.set_yscale) if direction == "y" else (panel.xaxis, panel.set_xscale)
-    set_scale("symlog", linthresh=least, linscale=0.5)
-    axis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=least))
-    axis.set_major_formatter(FuncFormatter(_signed_power))
-
-
-def _signed_power(value: float, _: Any) -> str:
-    if value == 0.0:
-        return "0"
-    return ("\N{MINUS SIGN}" if value < 0.0 else "") + logarithmic_number(abs(value))
+def _symmetrical(panel: Axes, direction: str, axis: Axis, unit: DisplayUnit) -> None:
+    """Make an axis linear below a magnitude and logarithmic beyond it."""
+    own, set_scale = (panel.yaxis, panel.set_yscale) if direction == "y" else (panel.xaxis, panel.set_xscale)
+    set_scale("symlog", linthresh=axis.linear_below * unit.factor, linscale=0.5)
+    own.set_major_locator(FixedLocator(unit.factor * symmetrical_numbers(axis)))
+    own.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
 
 
 def _plane(cell: _Cell, time: Any) -> Figure:

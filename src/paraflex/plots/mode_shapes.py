@@ -10,15 +10,15 @@ from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
 from paraflex.figures.selection import default_mode, names_of, place_of
+from paraflex.formatting import number
 from paraflex.plots.drawing import Sketch, bare
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain
 from paraflex.plots.layout import MM, TWO_COLUMNS, is_narrow, page_width
 from paraflex.plots.scene import Scene, common_limits, scene
 from paraflex.plots.themes import theme
-from paraflex.results.linear_data import HOLDINGS
 from paraflex.results.linear_motion import SWING, DrawnMode, drawn_modes, modal_motion
-from paraflex.results.linear_summary import HELD_WORDS
+from paraflex.results.linear_summary import HELD_WORDS, HOLDINGS
 
 # Heights of the titles of a panel and of a row [mm].
 _TITLE, _ROW = 4.5, 5.0
@@ -75,6 +75,6 @@ def _panels(rows: dict[str, list[DrawnMode]], scenes: dict[DrawnMode, Scene], mo
                 figure.add_axes((column / columns, bottom / height, 1.0 / columns, wide * aspect / height)), limits
             )
             Sketch(axes, scenes[one], limits, look, width=0.45).show(0)
-            axes.set_title(f"{one.frequency:.4g} Hz", fontsize=8.0, color=look.ink, pad=1.0)
+            axes.set_title(f"{number(one.frequency)} Hz", fontsize=8.0, color=look.ink, pad=1.0)
         top -= lines[holding] * high
     return figure

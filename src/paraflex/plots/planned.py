@@ -58,8 +58,6 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
         run["status"] == "complete" for method in found["methods"].values() for run in method["runs"]
     ),
     "law_comparison": lambda found: bool((found["status"] == "complete").any()),
-    **dict.fromkeys(("singular_values", "pole_zero_map"), lambda found: found.sizes["map"] > 0),
-    "bode": lambda found: found.sizes["output"] > 0,
     "mode_shapes": _vibrates,
 }
 

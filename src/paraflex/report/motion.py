@@ -9,6 +9,7 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.figures.catalogue import page_panels
+from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of
 from paraflex.figures.run_tables import Runs, solver_table
 from paraflex.figures.runs import thinned
@@ -19,8 +20,7 @@ from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
-from paraflex.report.reduced_runs import reduction_tables
-from paraflex.report.text import pairs, table_pairs
+from paraflex.report.text import pairs, sections, table_pairs
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
@@ -47,7 +47,7 @@ def motion_page(data: xr.Dataset) -> Page:
         figures=_figures(data),
         more=[
             *load_tables(data),
-            *reduction_tables(data),
+            *sections(reduced_runs(data)),
             ("Integration", _table(data, few)),
         ],
         panels=page_panels("motion", few),

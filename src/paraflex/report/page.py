@@ -23,10 +23,11 @@ from paraflex.errors import InputError
 from paraflex.figures import charts as described
 from paraflex.figures.charts import Panel
 from paraflex.folders import added_to
-from paraflex.formatting import typeset
+from paraflex.formatting import logarithmic_number, typeset
 from paraflex.plots.themes import THEMES
 from paraflex.report.film import Animation
 from paraflex.report.packing import Series
+from paraflex.units import DisplayUnit
 from paraflex.writing import write_text
 
 # Number of notices from which they are folded.
@@ -370,9 +371,10 @@ def _described(chart: described.Chart, series: Series, time: int) -> dict[str, A
     labels = [axis.label(unit) for axis, unit in zip(chart.axes, units.y, strict=False)]
 
     def curve(one: described.Curve) -> dict[str, Any]:
-        x = time if one.x is None else series.add(units.x.factor * np.asarray(one.x, dtype=float))
-        y = series.add(units.of(one.choice).factor * np.asarray(one.y, dtype=float))
-        return _fields(one, "look", "desired", "stopped") | one.look._asdict() | {"x": x, "y": y}
+        x = time if one.x is None else series.add(_placed(chart.x, units.x, one.x))
+        y = series.add(_placed(chart.axis(one.choice), units.of(one.choice), one.y))
+        texts = list(map(typeset, one.texts))
+        return _fields(one, "look", "desired", "stopped") | one.look._asdict() | {"x": x, "y": y, "texts": texts}
 
     ys, xs = (described.joined(each) for each in (
         (one.y for one in chart.curves), (one.x for one in chart.curves if one.x is not None)
@@ -381,13 +383,13 @@ def _described(chart: described.Chart, series: Series, time: int) -> dict[str, A
         "identity": chart.identity, "title": chart.title, "y": labels, "x": chart.x.label(units.x),
         "curves": [curve(one) for one in chart.curves], "choices": list(chart.choices), "choosing": chart.choosing,
         "log": described.is_logarithmic(chart.axis(None), ys), "log_x": described.is_logarithmic(chart.x, xs),
-        "equal": chart.equal, "over_time": chart.over_time, "note": chart.note, "layout": _layout(chart, units),
-        "figure": None, "drawer": "", "pickers": [],
+        "equal": chart.equal or bool(chart.x.linear_below), "over_time": chart.over_time, "note": chart.note,
+        "layout": _layout(chart, units), "figure": None, "drawer": "", "pickers": [],
     }  # fmt: skip
 
 
 def _layout(chart: described.Chart, units: described.ShownUnits) -> dict[str, Any]:
-    """Return additional parts of Plotly's layout: shaded ranges and levels."""
+    """Return additional parts of Plotly's layout: shaded ranges, levels, and numbers of symmetrical axes and names."""
     shade = {"type": "rect", "xref": "x", "yref": "paper", "y0": 0.0, "y1": 1.0, "fillcolor": "rgba(128,128,128,0.14)",
              "line": {"width": 0}, "layer": "below"}  # fmt: skip
     level = {
@@ -397,12 +399,33 @@ def _layout(chart: described.Chart, units: described.ShownUnits) -> dict[str, An
         "x1": 1.0,
         "line": {"width": 1, "dash": "dash", "color": "grey"},
     }
-    shapes = [shade | {"x0": units.x.factor * span.low, "x1": units.x.factor * span.high} for span in chart.spans]
+    end = chart.x.high or described.joined(one.x for one in chart.curves if one.x is not None).max(initial=0.0)
+    ends = ([x if np.isfinite(x) else end for x in span[:2]] for span in chart.spans)
+    shapes = [shade | dict(zip(("x0", "x1"), _placed(chart.x, units.x, each).tolist(), strict=True)) for each in ends]
     shapes += [level | {"y0": units.of(None).factor * y, "y1": units.of(None).factor * y} for y in chart.levels]
     out: dict[str, Any] = {"shapes": shapes} if shapes else {}
+    both = {"xaxis": (chart.x, units.x), "yaxis": (chart.axis(None), units.of(None))}
+    out |= {key: _symmetrical(axis, unit) for key, (axis, unit) in both.items() if axis.linear_below}
     if names := chart.axis(None).names:
         out["yaxis"] = {"tickvals": list(range(len(names))), "ticktext": list(names), "range": [len(names) - 0.4, -0.6]}
     return out
+
+
+def _placed(axis: described.Axis, unit: DisplayUnit, values: ArrayLike) -> described.Array:
+    """Return values in the unit of an axis, or the places of values on a symmetrical logarithmic axis."""
+    values = np.asarray(values, dtype=float)
+    if not axis.linear_below:
+        return unit.factor * values
+    return np.sign(values) * np.log10(1.0 + np.abs(values) / axis.linear_below)
+
+
+def _symmetrical(axis: described.Axis, unit: DisplayUnit) -> dict[str, Any]:
+    """Return Plotly's layout of a symmetrical logarithmic axis."""
+    ticks, limits = described.symmetrical_numbers(axis), [axis.low or 0.0, axis.high or 0.0]
+    return {
+        "tickvals": _placed(axis, unit, ticks).tolist(), "range": _placed(axis, unit, limits).tolist(),
+        "ticktext": list(map(logarithmic_number, unit.factor * ticks)), "zeroline": axis.zero, "tickangle": 0,
+    }  # fmt: skip
 
 
 def _chart(chart: Chart | described.Chart, series: Series, time: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.figures.catalogue import page_panels
+from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of, effort_axis
 from paraflex.figures.run_tables import Runs, after_table, result_table, solver_table
 from paraflex.figures.runs import thinned
@@ -21,7 +22,6 @@ from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, common_facts, run_command_line, summary_beside, verdict_word
-from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import sections
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.following import headline
@@ -72,7 +72,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         more=[
             *sections([result_table(rows), after_table(rows)]),
             *load_tables(data, default_mode(data)),
-            *reduction_tables(data),
+            *sections(reduced_runs(data)),
             *sections([solver_table(rows)]),
         ],
         panels=page_panels("tracking", few),

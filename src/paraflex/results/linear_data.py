@@ -17,11 +17,9 @@ from paraflex.linear.branches import pole_branches
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import Motions
 from paraflex.results.drawing import Drawing, drawing_coordinates, system_drawing
+from paraflex.results.linear_summary import ENCODERS, END_EFFECTOR, HOLDINGS
 from paraflex.results.storage import origin
 
-# Motors are free, or those of the actuation mode are held.
-HOLDINGS = ("free", "held")
-ENCODERS, END_EFFECTOR = "encoders", "end_effector"
 # Number of undamped modes with mode shapes, and of logarithmically spaced frequencies of the response.
 _SHAPES, _EVEN = 8, 300
 # The response ranges from _BELOW times the lowest natural frequency to _ABOVE times that of the last mode shape, with

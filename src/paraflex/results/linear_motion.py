@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array
-from paraflex.results.linear_data import DRAWN, HOLDINGS
-from paraflex.results.linear_summary import common_poles
+from paraflex.results.linear_data import DRAWN
+from paraflex.results.linear_summary import HOLDINGS, common_poles
 
 # Variables of a drawn run and of its undeformed base, by their names in `Drawing`.
 _VARIABLES = {

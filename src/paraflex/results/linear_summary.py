@@ -11,10 +11,12 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex
-from paraflex.dynamics.linearise import BALANCED
+from paraflex.formatting import number, quantity
 from paraflex.results.kinds import check_kind
-from paraflex.results.linear_data import ENCODERS, END_EFFECTOR, HOLDINGS
 
+# Motors are free, or those of the actuation mode are held.
+HOLDINGS = ("free", "held")
+ENCODERS, END_EFFECTOR = "encoders", "end_effector"
 # A value whose real part is below this fraction of its magnitude is on the imaginary axis, within rounding.
 _ON_AXIS = 1e-4
 # Zeros with a real part below this fraction of their magnitude do not limit the bandwidth. They occur in motion, and
@@ -31,7 +33,7 @@ MAP_WORDS = {ENCODERS: "motors to their encoders", END_EFFECTOR: "motors to the 
 HELD_WORDS = {"free": "motors free", "held": "motors held"}
 SOURCES = {
     "a pose at rest": "about a pose at rest", "static equilibrium": "about static equilibrium",
-    "a planned motion": "about the planned motion at t = {time:.6g} s", "a run": "about the run at t = {time:.6g} s",
+    "a planned motion": "about the planned motion at t = {time} s", "a run": "about the run at t = {time} s",
 }  # fmt: skip
 
 
@@ -54,22 +56,17 @@ class Root(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Printed form: "51.35 Hz", "±1409 rad/s", "-3.20 ± 45.1i rad/s"; an asterisk marks the right half-plane."""
+        """Text: "51.35 Hz", "±1409 rad/s", "-3.20 ± 45.1i rad/s"; an asterisk marks the right half-plane."""
         size = abs(self.value)
         times = f" ×{self.times}" if self.times > 1 else ""
         if size == 0.0:
             return f"0{times}"
         if self.on_axis:
-            return f"{_digits(size / (2.0 * np.pi))} Hz{times}"
+            return f"{number(size / (2.0 * np.pi))} Hz{times}"
         sign = "±" if self.mirrored else "-" if self.value.real < 0.0 else "+"
-        real = f"{sign}{_digits(abs(self.value.real))}"
-        imaginary = f" ± {_digits(self.value.imag)}i" if self.value.imag > _ON_AXIS * size else ""
+        real = f"{sign}{number(abs(self.value.real))}"
+        imaginary = f" ± {number(self.value.imag)}i" if self.value.imag > _ON_AXIS * size else ""
         return f"{real}{imaginary} rad/s{times}{'*' if self.right else ''}"
-
-
-def _digits(value: float) -> str:
-    """Format a number to four digits, without an exponent below a million."""
-    return f"{value:.4g}" if value < 1e4 or value >= 1e6 else f"{value:.0f}"
 
 
 def roots(values: Complex) -> list[Root]:
@@ -185,7 +182,7 @@ def motors_of_mode(data: xr.Dataset, mode: str) -> list[str]:
 
 def about(data: xr.Dataset) -> str:
     """Return the operating point of the linear models in words."""
-    return SOURCES[data.attrs["about"]].format(time=data.attrs["time"])
+    return SOURCES[data.attrs["about"]].format(time=number(float(data.attrs["time"]), 6))
 
 
 @checked_arguments()
@@ -256,7 +253,7 @@ def phase_sentences(data: xr.Dataset) -> Iterator[str]:
         said: dict[str, list[str]] = {}
         for mode in data["mode"].values.tolist():
             if limit := limiting_zero(zeros_of(data, mode, name)):
-                said.setdefault(_digits(limit), []).append(mode)
+                said.setdefault(number(limit), []).append(mode)
         if said:
             listed = "; ".join(f"{', '.join(modes)} from {limit} rad/s on" for limit, modes in said.items())
             yield (
@@ -267,13 +264,16 @@ def phase_sentences(data: xr.Dataset) -> Iterator[str]:
 
 def remarks(data: xr.Dataset) -> list[str]:
     """Return remarks on the models: a pose that is not in equilibrium, non-minimum phase, or motion frozen in time."""
+    from paraflex.dynamics.linearise import BALANCED  # imported late: it loads the kernels
+
     values = {str(mode): float(data["unbalanced"].sel(mode=mode)) for mode in data["mode"].values}
     largest = max(values, key=lambda mode: values[mode])
     out = []
     if values[largest] > BALANCED:
         of = f" (mode {largest})" if len(values) > 1 else ""
         out.append(
-            f"not in equilibrium: if released, the mechanism would start with {values[largest]:.3g} m/s^2{of}; "
+            f"not in equilibrium: if released, the mechanism would start with "
+            f"{quantity(values[largest], 'm/s^2', padded=False)}{of}; "
             "here constant forces hold it (--balanced linearises about equilibrium)"
         )
     out += phase_sentences(data)

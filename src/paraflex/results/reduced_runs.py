@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.findings import Finding
+from paraflex.formatting import number, quantity
 from paraflex.results.doubts import MODE, keep_findings, verdict_of
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.numbers import finite_or_none
@@ -70,8 +71,8 @@ def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
             what, whose = ("its tracking error", "the end-effector") if along else ("the largest deflection", "a point")
             yield Finding(
                 "reduced-too-far", f"{MODE}{mode}" if along else "study.reduced",
-                f"with {kept} flexible coordinates {whose} is up to {distance:.2g} m from its place with all {whole}, "
-                f"{100.0 * distance / size:.0f} % of {what}", "keep more of them",
+                f"with {kept} flexible coordinates {whose} is up to {quantity(distance, 'm', digits=2)} from its place "
+                f"with all {whole}, {number(100.0 * distance / size, 2)} % of {what}", "keep more of them",
             )  # fmt: skip
 
 

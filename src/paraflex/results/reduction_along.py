@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array, Complex
@@ -16,12 +15,9 @@ from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
 from paraflex.linear.reduction import reduce
 from paraflex.linear.states_needed import DAMPING
-from paraflex.results.linear_data import HOLDINGS, motors_of
-from paraflex.results.numbers import finite_or_none
+from paraflex.results.linear_data import motors_of
+from paraflex.results.reduction_summary import ONE, OWN, STATIC
 
-OWN, ONE = "of each pose", "of one pose"
-# Static shapes: those of each pose ("renewed"), or those of the other poses ("carried"), like the vibration modes.
-STATIC = ("renewed", "carried")
 # Numbers of poses between which bases are interpolated: each halves the distances, until errors are below the limit.
 _COUNTS = (2, 3, 5, 9, 17, 33)
 # Largest difference of the coordinates of equal poses, in their units.
@@ -165,82 +161,3 @@ def _relative(few: Array, full: Array) -> float:
     if few[chosen].size < full[chosen].size or not full[chosen].size:
         return np.nan
     return float(np.max(np.abs(few[chosen] / full[chosen] - 1.0)))
-
-
-def along_summary(data: xr.Dataset, mode: str) -> dict[str, Any]:
-    """Return the errors along a path of reduced models of a mode as plain numbers, by static shapes and basis."""
-    error = float(data.attrs["accuracy"])
-
-    def of(run: xr.Dataset) -> dict[str, Any]:
-        frequency = run["along_frequency_error"].max("place")
-        return {
-            "largest_error": float(run["along_error"].max()),
-            **{f"frequency_error_{name}": finite_or_none(float(frequency.sel(holding=name))) for name in HOLDINGS},
-            "within": within(run["along_error"].values, data["place"].values, error),
-        }
-
-    bases = {static: {str(name): data.sel(mode=mode, static=static, basis=name) for name in data["basis"].values}
-             for static in STATIC}  # fmt: skip
-    return {static: {name: of(run) for name, run in runs.items() if run["along_error"].notnull().all()}
-            for static, runs in bases.items()}  # fmt: skip
-
-
-class AlongRow(NamedTuple):
-    """Errors along a path of the reduced models of a mode with bases of some poses.
-
-    `within` is the longest interval of the path in which the errors of the responses are below the limit.
-    """
-
-    mode: str
-    static_shapes: str
-    vibrations: str
-    response: float
-    free: float | None
-    held: float | None
-    within: str
-
-
-def along_rows(data: xr.Dataset) -> Iterator[AlongRow]:
-    """Yield the rows of a table of all bases; none if no path was requested."""
-    places = data["place"].values if "along_error" in data else np.zeros(0)
-    for mode in map(str, data["mode"].values) if places.size else ():
-        for static, runs in along_summary(data, mode).items():
-            for name, found in runs.items():
-                if name == OWN and static != STATIC[0]:
-                    continue
-                shapes = OWN if static == STATIC[0] else name
-                free, held = (found[f"frequency_error_{holding}"] for holding in HOLDINGS)
-                stretch = _stretch(found["within"], places)
-                yield AlongRow(mode, shapes, name, found["largest_error"], free, held, stretch)
-
-
-def _stretch(at: tuple[float, float] | None, places: Array) -> str:
-    if at is None:
-        return "nowhere"
-    return "all" if at == (places[0], places[-1]) else f"{at[0]:.2g}-{at[1]:.2g}"
-
-
-def along_heads(data: xr.Dataset) -> tuple[str, str]:
-    """Return the title of the table of `along_rows`, and the head of its last column."""
-    attrs, unit = data.attrs, data.attrs["place_unit"]
-    title = (
-        f"Bases of other poses, {attrs['along_method']}: errors at {data.sizes['place']} poses along "
-        f"{float(data['place'][-1]):.3g} {unit} up to {float(attrs['until']):g} Hz"
-    )
-    return title, f"{100.0 * float(attrs['accuracy']):.3g} % at [{unit}]"
-
-
-def basis_name(static: str, name: str) -> str:
-    """Return the legend of a line in a figure: which shapes are those of which poses."""
-    kept = "" if name == OWN else "vibrations " if static == STATIC[0] else "all shapes "
-    return f"{kept}{name}"
-
-
-def within(errors: Array, places: Array, error: float) -> tuple[float, float] | None:
-    """Return the ends of the longest interval of places where errors (k,) do not exceed a limit; None without one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], errors <= error, [False]]).astype(int)))
-    if not edges.size:
-        return None
-    firsts, lasts = edges[::2], edges[1::2] - 1
-    longest = int(np.argmax(places[lasts] - places[firsts]))
-    return float(places[firsts[longest]]), float(places[lasts[longest]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,19 +17,16 @@ from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
 from paraflex.linear.reduction import CARRIED, reduce
 from paraflex.linear.states_needed import DAMPING, states_needed
-from paraflex.results.kinds import check_kind
-from paraflex.results.linear_data import HOLDINGS, motors_of
-from paraflex.results.numbers import by_label, finite_or_none
-from paraflex.results.reduction_along import UNITS_ALONG, along_summary, along_variables, output_errors
+from paraflex.results.linear_data import motors_of
+from paraflex.results.linear_summary import HOLDINGS
+from paraflex.results.reduction_along import UNITS_ALONG, along_variables, output_errors
+from paraflex.results.reduction_summary import FULL
 from paraflex.results.storage import origin
 
-FULL = "full"
 # Number of frequencies of responses, and lowest and highest one relative to `until`.
 _FREQUENCIES, _LOWEST, _BEYOND = 400, 1e-2, 2.5
 # Number of natural frequencies, with motors free and held, that are compared.
 _COMPARED = 6
-# A smaller relative deviation is printed as zero.
-_ROUNDING = 1e-7
 # Largest number of states for which the lowest frequency with motors held is computed.
 _MOST = 48
 UNITS = {
@@ -185,58 +181,3 @@ def _held(models: Sequence[LinearModel], names: Sequence[str], counts: NDArray[n
         return above[0] if above.size else np.nan
 
     return np.array([[[lowest(model, int(count), name) for count in counts] for name in names] for model in models])
-
-
-@checked_arguments()
-def reduction_summary(data: xr.Dataset) -> dict[str, Any]:
-    """Return reduced models as plain numbers for JSON.
-
-    Raises
-    ------
-    InputError
-        The dataset is of another kind.
-    """
-    check_kind(data, "reduction")
-
-    def of(mode: str, name: str) -> dict[str, Any]:
-        run = data.sel(mode=mode, reduction=name)
-        frequencies = data["natural_frequency"].sel(mode=mode, variant=name)
-        return {
-            "states_needed": by_label(run["states"], "output"),
-            "largest_error": by_label(run["largest_error"], "output"),
-            "bound": finite_or_none(float(run["bound"])),
-            "held_frequency_by_states": by_label(run["held_frequency"], "kept"),
-            **{f"frequencies_{holding}": _list(frequencies.sel(holding=holding)) for holding in HOLDINGS},
-        }
-
-    modes = [str(mode) for mode in data["mode"].values]
-    return {
-        "mechanism": data.attrs["mechanism"],
-        "about": data.attrs["about"],
-        "states": int(data.attrs["kept_states"]),
-        "full_states": int(data.attrs["full_states"]),
-        "until": float(data.attrs["until"]),
-        "accuracy": float(data.attrs["accuracy"]),
-        "modes": {
-            mode: {
-                FULL: {f"frequencies_{holding}": _list(data["natural_frequency"].sel(mode=mode, variant=FULL,
-                                                                                     holding=holding))
-                       for holding in HOLDINGS},
-                **{str(name): of(mode, str(name)) for name in data["reduction"].values},
-                **({"along": along_summary(data, mode)} if "along_error" in data else {}),
-            }
-            for mode in modes
-        },
-        "parameters": json.loads(data.attrs["parameters"]),
-        "version": data.attrs["paraflex_version"],
-    }  # fmt: skip
-
-
-def percent_off(value: float, exact: float) -> str:
-    """Format the relative deviation of a number from the exact one in per cent, "0 %" within rounding."""
-    part = value / exact - 1.0
-    return "0 %" if abs(part) < _ROUNDING else f"{100.0 * part:+{'.2g' if abs(part) < 1.0 else '.0f'}} %"
-
-
-def _list(values: xr.DataArray) -> list[float]:
-    return [float(x) for x in values.values if np.isfinite(x)]

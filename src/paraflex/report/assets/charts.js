@@ -3,6 +3,8 @@ const charts = (() => {
   const { page, state, element } = report;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
   const MARKS = { ring: "circle-open", cross: "x-thin-open", square: "square", dot: "circle" };
+  const CIRCLE = "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0";
+  const SHAPES = { ring: CIRCLE, dot: CIRCLE, cross: "M9 1L17 9M9 9L17 1", square: "M10 2h6v6h-6z", bar: "M2 3h22v4h-22z" };
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
   // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
   const PAPER = 640, LOW = 200, LOW_TITLE = 10;
@@ -38,7 +40,7 @@ const charts = (() => {
       };
       if (curve.mark) return {
         type: "scatter", mode: curve.line ? "lines+markers" : "markers", line: { color: lineColour(curve), dash: DASHES[curve.dash], width: 1.4 }, name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y),
-        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: curve.mark === "ring" ? 9 : 8, line: { width: 1.6, color: lineColour(curve) } },
+        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: (curve.size ?? 1) * (curve.mark === "ring" ? 9 : 8), line: { width: 1.6, color: lineColour(curve) } },
         text: curve.texts.map(plain), hovertemplate: `${curve.texts.length ? "%{text}" : "%{x:.4~g}, %{y:.4~g}"}<extra>%{fullData.name}</extra>`, visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       return {
@@ -106,7 +108,7 @@ const charts = (() => {
       ...common,
       hovermode: overTime ? "x unified" : "closest",
       xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : logX ? { type: "log", dtick: 1, tickformat: "~g", hoverformat: ".4~g" } : added.xaxis || {}),
-      yaxis: axis(yLabel(chart), { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g", ...added.yaxis }),
+      yaxis: axis(yLabel(chart), { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal && !added.xaxis ? { scaleanchor: "x" } : {}), hoverformat: ".4~g", ...added.yaxis }),
       shapes: added.shapes || [],
     };
   }
@@ -137,13 +139,13 @@ const charts = (() => {
     svg.setAttribute("width", "26"); svg.setAttribute("height", "10"); svg.setAttribute("aria-hidden", "true");
     const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
     for (const [name, value] of Object.entries({ x1: 0, x2: 26, y1: 5, y2: 5, stroke, "stroke-width": 2, "stroke-dasharray": SAMPLES[curve.dash] })) line.setAttribute(name, value);
+    if (!curve.mark || curve.line) svg.append(line);
     if (curve.mark) {
       const mark = document.createElementNS("http://www.w3.org/2000/svg", "path");
-      const round = "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0", square = "M10 2h6v6h-6z";
-      const d = { ring: round, dot: round, square, bar: square, cross: "M9 1L17 9M9 9L17 1" }[curve.mark];
-      for (const [name, value] of Object.entries({ d, stroke, "stroke-width": 1.6, fill: curve.mark === "ring" ? "none" : stroke })) mark.setAttribute(name, value);
+      const filled = curve.mark !== "ring" && curve.mark !== "cross";
+      for (const [name, value] of Object.entries({ d: SHAPES[curve.mark], stroke, "stroke-width": 1.6, fill: filled ? stroke : "none" })) mark.setAttribute(name, value);
       svg.append(mark);
-    } else svg.append(line);
+    }
     return svg;
   }
 
