@@ -9,15 +9,15 @@ from itertools import combinations, islice
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
 from paraflex.cli.commands.models import ModesRequest
 from paraflex.cli.request import asked_model, find_path
-from paraflex.cli.tables import framed_table, plain_console
+from paraflex.cli.tables import plain_console, print_table
 from paraflex.dynamics import build_system, closure_of, mobility, reach
 from paraflex.errors import ActuationError
+from paraflex.figures.modes import mode_table
 from paraflex.files import Model
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
 
@@ -47,7 +47,8 @@ def modes_command(request: ModesRequest) -> None:
     if request.json:
         print(json.dumps(rows, indent=2))
     elif rows:
-        plain_console().print(_table(model, rows))
+        what = "actuation modes" if rows[0]["declared"] else "sets of motors"
+        print_table(plain_console(), mode_table(f"{model.mechanism.name}: {what}", rows))
 
 
 def _effort(model: Model, path: str | None) -> Effort | None:
@@ -124,21 +125,3 @@ def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: i
     elif mechanism.end_effector is None:
         lines.append(f"{mechanism.name} has no [end_effector] to follow a path: what drives it cannot be determined")
     return lines
-
-
-def _table(model: Model, rows: list[dict[str, Any]]) -> Table:
-    declared = rows[0]["declared"]
-    title = f"{model.mechanism.name}: {'actuation modes' if declared else 'sets of motors'}"
-    heads = ("mode", "active motors", "redundancy", "worst condition number", "drives the path")
-    table = framed_table(title, heads)
-    for row in rows:
-        drives = {True: "yes", False: row.get("reason", "no"), None: ""}[row.get("drives_path")]
-        table.add_row(row["mode"], ", ".join(row["motors"]), str(row.get("redundancy", "")), _condition(row), drives)
-    return table
-
-
-def _condition(row: dict[str, Any]) -> str:
-    if "condition_max" not in row:
-        return ""
-    worst = row["condition_max"]
-    return "infinite" if worst is None else f"{worst:.3g}"

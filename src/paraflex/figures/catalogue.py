@@ -6,7 +6,7 @@ gallery of the documentation and the functions of `paraflex.plots` are made from
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -15,7 +15,7 @@ from typing import Any, Literal
 import xarray as xr
 
 from paraflex.figures.charts import Chart, Panel
-from paraflex.figures.selection import as_runs
+from paraflex.figures.selection import as_runs, names_of, place_of
 from paraflex.folders.kinds import RESULT_KINDS
 
 Charts = Callable[..., Iterable[Chart]]
@@ -52,6 +52,12 @@ class Figure:
         Option that selects named points, "point" or "points"; empty if there is none.
     panels : str
         Panels of the printed figure, see `Panels`.
+    members : int
+        Largest number of choices in print, the first ones; 0 (default) for all.
+    curves : int
+        Largest number of curves in a printed panel, those with the largest peaks.
+    nothing : (str, str)
+        Problem and remedy of results that have nothing to show.
     columns : int
         Number of columns of panels in print; 0 (default) for one of charts over time, else for as many as fit.
     height : float
@@ -68,6 +74,9 @@ class Figure:
     variables: tuple[str, ...] = ()
     points: Literal["", "point", "points"] = ""
     panels: Panels = "charts"
+    members: int = 0
+    curves: int = 7
+    nothing: tuple[str, str] = ("nothing to show in these results", "choose another")
     columns: int = 0
     height: float = 48.0
 
@@ -75,15 +84,17 @@ class Figure:
         """Check whether the results have the variables of the figure and, unless it is a drawing, any charts of it."""
         if not all(name in data for name in self.variables):
             return False
-        return bool(self.module) or any(True for _ in self.charts(prepared(data)))
+        return bool(self.module) or self.takes == "nothing" or any(True for _ in self.charts(prepared(data)))
 
 
-def prepared(data: Any, mode: str | None = None) -> Any:
+def prepared(data: Any, mode: str | None = None, models: Sequence[str] | None = None) -> Any:
     """Return results as functions of charts take them: runs with a dimension of modes, others unchanged.
 
-    If a mode is given, the results are those of this mode.
+    If a mode or models are given, the results are those of this mode and these models.
     """
-    if isinstance(data, xr.Dataset) and "time" in data.dims and "model" not in data.dims:
+    if models is not None:
+        data = data.isel(model=[place_of(model, names_of(data, "model"), "model") for model in models])
+    if isinstance(data, xr.Dataset) and "time" in data.dims:
         return as_runs(data, mode)
     return data if mode is None else data.sel(mode=[mode])
 

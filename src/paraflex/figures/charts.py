@@ -89,9 +89,10 @@ class Axis:
         """Return the unit in which values are shown."""
         return self.shown or (common_unit if is_logarithmic(self, values) else display_unit)(self.unit, values)
 
-    def label(self, unit: DisplayUnit) -> str:
-        """Return the label of the axis in a unit: "torque τ [N m]"."""
-        return labelled(" ".join(filter(None, (self.name, self.symbol))), unit.name)
+    def label(self, unit: DisplayUnit, beside: str = "") -> str:
+        """Return the label of the axis in a unit: "torque τ [N m]", or "τ [N m]" beside a title with its name."""
+        named = self.name and not (self.symbol and self.name in beside)
+        return labelled(" ".join(filter(None, (self.name if named else "", self.symbol))), unit.name)
 
 
 TIME = Axis("time", "s", "t")
@@ -124,7 +125,8 @@ class Curve:
     quiet : bool
         Whether the curve is omitted from the label at the pointer.
     mark : str
-        Marks at its points, "ring", "cross", "square" or "dot", or horizontal bars, "bar"; empty (default) for none.
+        Marks at its points, "ring", "cross", "square", "dot", "triangle" or "diamond", or horizontal bars, "bar"; empty
+        (default) for none.
     line : bool
         Whether a line joins the points; by default only if they have no marks.
     texts : sequence of str
@@ -141,7 +143,7 @@ class Curve:
     desired: bool = False
     stopped: bool = False
     quiet: bool = False
-    mark: Literal["", "ring", "cross", "square", "dot", "bar"] = ""
+    mark: Literal["", "ring", "cross", "square", "dot", "triangle", "diamond", "bar"] = ""
     line: bool = False
     texts: Sequence[str] = ()
 

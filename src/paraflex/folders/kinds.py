@@ -111,17 +111,16 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
                drawings=("sobol_bars", *_DESIGN_DRAWINGS)),
     ResultKind("verification", VERIFICATION, ("verify.json", "verify.nc"), "verify.nc", "Verification.dataset",
                page="verification.report_of_folder", with_folder=True,
-               drawings=("compared_links", "compared_paths", "model_distances", "compared_deflections")),
+               figures=("verification",)),
     ResultKind("methods", COMPARISON, ("compare-methods.json",), "compare-methods.json",
                marks={"methods": ..., "reference": ..., "fastest": ...},
-               drawings=("work_precision", "numerical_damping")),
+               figures=("methods",)),
     ResultKind("laws", LAW_COMPARISON, ("laws.json", "laws.nc", "laws.csv"), "laws.nc", "compare_laws", None, refusals={
         "motion": ("a comparison of control laws keeps no motions",
                    "paraflex plot draws law_comparison; paraflex run --controller NAME keeps the motion of one law"),
         "page": ("a comparison of control laws has no report",
                  "laws.csv has its table, and paraflex plot draws law_comparison"),
-    },
-               drawings=("law_comparison",)),
+    }, figures=("laws",)),
     ResultKind("runs", RUN_COMPARISON, ("compare.json",)),
     ResultKind("sensitivity", SENSITIVITY, ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
                "sensitivity.json", marks={"parameters": ..., "units": ..., "runs": ...},
@@ -151,7 +150,7 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
         *_RUN_DRAWINGS,
     )),
     ResultKind("modes", "", marks={"mode": ..., "motors": ...}, listed=True,
-               drawings=("mode_conditions",)),
+               figures=("modes",)),
 )}  # fmt: skip
 # Files by which a folder without a manifest, from an earlier release, is recognised, by the kind of the folder.
 FOLDER_FILES: dict[str, tuple[str, ...]] = {kind.folder: kind.files for kind in RESULT_KINDS.values() if kind.folder}

@@ -1,16 +1,21 @@
 # Each figure from the module that its function is in.
-from .agreement import (
+from .charts import (
     compared_deflections as compared_deflections,
+    compared_energies as compared_energies,
     compared_links as compared_links,
     compared_paths as compared_paths,
-    model_distances as model_distances,
-)
-from .charts import (
+    compared_torques as compared_torques,
     force_travel as force_travel,
     free_travels as free_travels,
     joint_force_travel as joint_force_travel,
+    law_comparison as law_comparison,
+    link_differences as link_differences,
+    mode_conditions as mode_conditions,
+    model_distances as model_distances,
+    numerical_damping as numerical_damping,
     stiffness_travel as stiffness_travel,
     stress_travel as stress_travel,
+    work_precision as work_precision,
 )
 from .controlled import controllers as controllers
 from .derivatives import elasticities as elasticities
@@ -18,7 +23,6 @@ from .drawing import mechanism_drawing as mechanism_drawing
 from .driving import (
     actuation_condition as actuation_condition,
     mode_comparison as mode_comparison,
-    mode_conditions as mode_conditions,
     tracking_distance as tracking_distance,
 )
 from .energy import energies as energies
@@ -29,7 +33,6 @@ from .free_motion import (
     point_motions as point_motions,
     point_paths as point_paths,
 )
-from .laws import law_comparison as law_comparison
 from .linear import (
     bode as bode,
     pole_zero_map as pole_zero_map,
@@ -38,7 +41,6 @@ from .linear import (
 )
 from .maps import response_map as response_map
 from .measured import sensors as sensors
-from .methods import work_precision as work_precision
 from .mode_shapes import mode_shapes as mode_shapes
 from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
 from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
@@ -52,7 +54,6 @@ from .reduction import (
 )
 from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
-from .spectra import numerical_damping as numerical_damping
 from .stress import (
     beam_stresses as beam_stresses,
     drive_efforts as drive_efforts,

@@ -169,32 +169,6 @@ _DRAWINGS: Mapping[str, Figure] = {
         Figure("coordinates", "generalised coordinates, including modal coordinates of bodies", module="free_motion"),
         Figure("point_paths", "paths of named points in the plane", module="free_motion", points="points"),
         Figure(
-            "compared_links",
-            "angle and speed of links in two models (Fig. 22)",
-            module="agreement",
-            takes="models",
-            written_as="compared_links",
-        ),
-        Figure(
-            "compared_paths",
-            "path of the end-effector in two models (Fig. 23)",
-            module="agreement",
-            takes="models",
-            written_as="compared_paths",
-        ),
-        Figure(
-            "model_distances",
-            "distances of all models from the desired position and from the reference",
-            module="agreement",
-            written_as="model_distances",
-        ),
-        Figure(
-            "compared_deflections",
-            "transverse displacement of links' ends in all models",
-            module="agreement",
-            takes="mode",
-        ),
-        Figure(
             "singular_values",
             "gains from motors to their encoders and to the end-effector over frequency, all modes",
             module="linear",
@@ -270,24 +244,6 @@ _DRAWINGS: Mapping[str, Figure] = {
             written_as="buckling_shapes",
             variables=("buckling_shape",),
         ),
-        Figure(
-            "law_comparison",
-            "error, vibration and largest torque of control laws in all modes",
-            module="laws",
-            written_as="law_comparison",
-        ),
-        Figure(
-            "work_precision",
-            "wall time and number of steps against error",
-            module="methods",
-            written_as="work_precision",
-        ),
-        Figure(
-            "numerical_damping",
-            "damping ratio, period error and spectral radius of methods",
-            module="spectra",
-            takes="nothing",
-        ),
         Figure("response_curves", "metrics against parameters", module="responses", takes="designs"),
         Figure("response_map", "contours of metrics over two parameters", module="maps", takes="designs"),
         Figure(
@@ -319,7 +275,6 @@ _DRAWINGS: Mapping[str, Figure] = {
             takes="run",
             written_as="elasticities",
         ),
-        Figure("mode_conditions", "worst condition number of every mode along the path", module="driving"),
     )
 }
 

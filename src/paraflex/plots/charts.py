@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -13,10 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator, SymmetricalLogLocator
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.figures.catalogue import Figure as CatalogueFigure, all_figures, prepared
 from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined
-from paraflex.figures.selection import default_mode, names_of
+from paraflex.figures.selection import default_mode, names_of, prototype_pair
 from paraflex.formatting import logarithmic_number, peak
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import mathematics
@@ -31,14 +32,16 @@ from paraflex.plots.layout import (
     panel_grid,
 )
 from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
-from paraflex.plots.style import BLACK, COLOURS, SHADE, ZERO, keep_flat
+from paraflex.plots.style import BLACK, COLOURS, SHADE, ZERO, journal_style, keep_flat
 from paraflex.units import DisplayUnit
 
-# Largest number of curves that are distinguishable in one panel.
-MOST_LINES = 7
+# Largest number of members of a figure in one column.
+_MOST_NARROW = 6
 # Decades of a logarithmic axis shown below its largest value.
 _DECADES = 9.0
-_MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o"}
+_MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o", "triangle": "^", "diamond": "D"}
+# Share by which an axis with marks is longer than its values, and height of one of several marks beside a name [mm].
+_MARK_MARGIN, _MARK_LINE = 0.06, 2.6
 # Height of a bar, as a share of the distance of two names.
 _BAR = 0.6
 # Dashes by their numbers in a look.
@@ -64,31 +67,43 @@ class _Cell:
     def curves(self) -> list[Curve]:
         """Curves of the panel: those of other runs are left out if a run is selected."""
         found = self.chart.shown(self.run, self.choice)
-        return [curve for curve in found if self.run is None or curve.run in (None, self.run)]
+        return [curve for curve in found
+                if self.run is None or curve.shown is not None or curve.run in (None, self.run)]  # fmt: skip
 
 
 @cache
 def plotting_function(name: str) -> Callable[..., Figure]:
-    """Return the plotting function of a figure of the catalogue: of results or their folder, a mode, and options."""
+    """Return the plotting function of a figure: of results or their folder, a mode, models, and options."""
     entry = all_figures()[name]
+    chosen = {"mode": ["mode"], "models": ["mode", "models"]}.get(entry.takes, [])
 
-    def plot(data: Any, mode: str | None = None, **options: Any) -> Figure:
-        if entry.takes == "mode" and mode is None and "mode" in getattr(data, "dims", ()):
+    def plot(data: Any = None, *args: Any, **options: Any) -> Figure:
+        options = dict(list(shown.bind(data, *args, **options).arguments.items())[1:])
+        mode, models = (options.pop(one, None) if one in chosen else None for one in ("mode", "models"))
+        if chosen and mode is None and "mode" in getattr(data, "dims", ()):
             mode = default_mode(data)
-        found = prepared(data, mode)
+        if "models" in chosen and models is None:
+            models = prototype_pair(data)
+        found = prepared(data, mode, models)
         charts = list(entry.charts(found, **options))
         if not charts:
-            raise InputError("nothing to show in these results", field="figure", value=name, remedy="choose another")
+            raise InputError(entry.nothing[0], field="figure", value=name, remedy=entry.nothing[1])
         if not isinstance(found, xr.Dataset) or "time" not in found.dims:
             return print_figure(entry, charts)
-        return print_figure(entry, charts, found["time"].values, names_of(found, "mode"))
+        # Runs of a verification are those of all models in the first mode, then in the next one.
+        return print_figure(entry, charts, found["time"].values, names_of(found, "mode"), found.sizes.get("model", 1))
 
     own = list(inspect.signature(entry.charts).parameters.values())
-    modes = [inspect.Parameter("mode", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None)]
+    kinds: dict[str, Any] = {"mode": str | None, "models": Sequence[str] | None}
+    modes = [inspect.Parameter(one, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None, annotation=kinds[one])
+             for one in chosen]  # fmt: skip
+    shown = inspect.Signature([own[0], *modes, *own[1:]])
     plot.__name__ = plot.__qualname__ = name
+    # Annotations are evaluated where they are written.
+    plot.__module__ = entry.charts.__module__
     plot.__doc__ = f"Plot {entry.shows}.\n\n{inspect.getdoc(entry.charts)}"
-    plot.__signature__ = inspect.Signature([own[0], *(modes if entry.takes == "mode" else []), *own[1:]])  # type: ignore[attr-defined]
-    return drawn(plot)
+    plot.__signature__ = shown  # type: ignore[attr-defined]
+    return drawn(plot) if entry.takes != "nothing" else journal_style()(checked_arguments()(plot))
 
 
 def __getattr__(name: str) -> Callable[..., Figure]:
@@ -97,7 +112,9 @@ def __getattr__(name: str) -> Callable[..., Figure]:
     return plotting_function(name)
 
 
-def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = None, runs: Sequence[str] = ()) -> Figure:
+def print_figure(
+    entry: CatalogueFigure, charts: Sequence[Chart], time: Any = None, modes: Sequence[str] = (), each: int = 1
+) -> Figure:
     """Draw the charts of a figure.
 
     Parameters
@@ -108,23 +125,40 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
         Charts.
     time : (k,) array, optional
         Times of the runs [s], for curves without abscissae.
-    runs : sequence of str
-        Names of the runs.
+    modes : sequence of str
+        Modes of the runs.
+    each : int
+        Number of runs in each mode.
     """
-    rows = _cells(entry, charts, runs)
+    rows = _cells(entry, charts, {mode: each * k for k, mode in enumerate(modes)})
     if len(rows[0]) == 1 and rows[0][0].chart.equal and len(rows) == 1:
-        return _plane(rows[0][0], time)
-    columns = len(rows[0]) if entry.panels == "choices" else _columns(entry, sum(map(len, rows)), charts)
+        return _plane(rows[0][0], time, entry.curves)
+    several = len(charts) > 1 and entry.panels == "runs"
+    columns = len(rows[0]) if several or entry.panels == "choices" else _columns(entry, sum(map(len, rows)), charts)
     cells = [cell for row in rows for cell in row]
     figure, axes = panel_grid(
         len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS
     )
-    for panel, cell in zip(axes.flat, cells, strict=False):
-        _draw(panel, cell, time)
+    for k, (panel, cell) in enumerate(zip(axes.flat, cells, strict=False)):
+        # Panels side by side share the names on their axes.
+        named = k % columns == 0 or cell.chart.axis(None).names != cells[k - 1].chart.axis(None).names
+        _draw(panel, cell, time, entry.curves, named=named)
     if all(cell.chart.over_time for cell in cells):
+        for panel in axes.flat:
+            panel.set_xlabel("")
         label_outer_time(axes)
-    names = max(len(chart.axis(None).names) for chart in charts)
-    return lay_out(figure, axes, panel_height=LIST_LINE * names + 2.0 if names else entry.height)
+    return lay_out(figure, axes, panel_height=max(map(_list_height, charts)) or entry.height)
+
+
+def _list_height(chart: Chart) -> float:
+    """Return the height of a panel that lists names, with room for all marks beside each [mm]; 0 without names."""
+    names = len(chart.axis(None).names)
+    return max(LIST_LINE, _MARK_LINE * _marks(chart) + 1.5) * names + 2.0 if names else 0.0
+
+
+def _marks(chart: Chart) -> int:
+    """Return the number of marks beside each name of a list."""
+    return sum(curve.mark not in ("", "bar") and bool(curve.name and np.size(curve.y)) for curve in chart.curves)
 
 
 def _columns(entry: CatalogueFigure, count: int, charts: Sequence[Chart]) -> int:
@@ -133,15 +167,17 @@ def _columns(entry: CatalogueFigure, count: int, charts: Sequence[Chart]) -> int
     return entry.columns or (min(count, 3) if not charts[0].over_time else 1)
 
 
-def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Sequence[str]) -> list[list[_Cell]]:
-    """Return rows of panels."""
+def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Mapping[str, int]) -> list[list[_Cell]]:
+    """Return rows of panels; `runs` are the first runs of all modes."""
     run = 0 if entry.takes in ("mode", "models") else None
+    several = len(charts) > 1
     if entry.panels == "runs":
-        return [[_Cell(chart, r, 0, name) for r, name in enumerate(runs)] for chart in charts]
+        return [[_Cell(chart, r, 0, f"{name}: {_lower(chart.title)}" if several else name) for name, r in runs.items()]
+                for chart in charts]  # fmt: skip
     if entry.panels == "choices":
         members = max(len(chart.choices) - chart.overview for chart in charts)
+        members = min(members, entry.members or members, _MOST_NARROW if is_narrow() else members)
         return [[_member(chart, run, k) for chart in charts] for k in range(max(members, 1))]
-    several = len(charts) > 1
     return [[_Cell(chart, run, 0 if chart.choices else None, chart.title if several else "")] for chart in charts]
 
 
@@ -153,11 +189,15 @@ def _member(chart: Chart, run: int | None, k: int) -> _Cell:
     return _Cell(chart, run, choice, f"{chart.choices[choice]}: {chart.axis(choice).name}")
 
 
-def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
+def _lower(title: str) -> str:
+    return title[:1].lower() + title[1:]
+
+
+def _draw(panel: Axes, cell: _Cell, time: Any, most: int, *, named: bool = True) -> None:
     """Draw the curves, marks and axes of a panel."""
     chart, curves = cell.chart, cell.curves
     units, axis = chart.shown_units(), chart.axis(cell.choice)
-    shown, note = _largest(curves)
+    shown, note = _largest(curves, most)
     title = ", ".join(filter(None, (cell.title, note)))
     single = len({curve.look.colour for curve in shown if not curve.desired}) == 1
     for curve in shown:
@@ -172,23 +212,31 @@ def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
         panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
     values = joined(units.of(cell.choice).factor * np.asarray(curve.y, dtype=float) for curve in shown)
     _set_scale(panel, "y", axis, values, units.of(cell.choice))
-    _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x)
+    xs = joined(units.x.factor * np.asarray(curve.x, dtype=float) for curve in shown if curve.x is not None)
+    _set_scale(panel, "x", chart.x, xs, units.x,
+               marked=bool(shown) and all(curve.mark for curve in shown))  # fmt: skip
+    if axis.names:
+        list_lines(panel, axis.names if named else [""] * len(axis.names))
+        for line in range(len(axis.names) - 1 if _marks(chart) > 1 else 0):
+            panel.axhline(line + 0.5, color="0.85", linewidth=0.5, zorder=0.5)
+    if axis.names or panel.get_xscale() == panel.get_yscale() == "log":
+        panel.grid(axis="x" if axis.names else "both", color="0.9", linewidth=0.4)
     panel.set_title(mathematics(title))
-    panel.set_ylabel(mathematics(axis.label(units.of(cell.choice))))
+    panel.set_ylabel(mathematics(axis.label(units.of(cell.choice), title)))
     panel.set_xlabel(mathematics(chart.x.label(units.x)))
 
 
-def _largest(curves: Sequence[Curve]) -> tuple[list[Curve], str]:
-    """Return the curves of at most `MOST_LINES` names, those with the largest peaks, and "7 of 8, the largest"."""
+def _largest(curves: Sequence[Curve], most: int) -> tuple[list[Curve], str]:
+    """Return the curves of at most `most` names, those with the largest peaks, and "7 of 8, the largest"."""
     peaks: dict[str, float] = {}
     for curve in curves:
         if curve.name and not curve.desired:
             peaks[curve.name] = max(peaks.get(curve.name, 0.0), peak(curve.y))
-    if len(peaks) <= MOST_LINES:
+    if len(peaks) <= most:
         return list(curves), ""
-    kept = sorted(peaks, key=lambda name: -peaks[name])[:MOST_LINES]
+    kept = sorted(peaks, key=lambda name: -peaks[name])[:most]
     shown = [curve for curve in curves if curve.desired or not curve.name or curve.name in kept]
-    return shown, f"{MOST_LINES} of {len(peaks)}, the largest"
+    return shown, f"{most} of {len(peaks)}, the largest"
 
 
 def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit: DisplayUnit, *, single: bool) -> None:
@@ -202,9 +250,10 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
     if curve.mark:
         style = _DASHES[curve.look.dash] if curve.line else ""
         panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], markersize=4.0, color=colour, label=label,
-                   markerfacecolor="white" if curve.mark == "ring" else colour)  # fmt: skip
+                   markerfacecolor="white" if curve.mark == "ring" else colour,
+                   clip_on=curve.mark != "cross")  # fmt: skip
         return
-    if curve.desired and single:
+    if curve.desired and (single or curve.look.colour is None):
         panel.plot(x, y, label=label, **_DESIRED)
         return
     panel.plot(x, y, color=colour, linestyle=_DASHES[curve.look.dash], label=label)
@@ -213,22 +262,26 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         panel.plot(x[known[-1]], y[known[-1]], **_STOPPED)
 
 
-def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: DisplayUnit) -> None:
+def _set_scale(
+    panel: Axes, direction: Any, axis: Axis, values: Any, unit: DisplayUnit, *, marked: bool = False
+) -> None:
     """Set scale, limits and lines of an axis."""
     set_limits = panel.set_ylim if direction == "y" else panel.set_xlim
-    if axis.names:
-        list_lines(panel, axis.names)
-    elif axis.linear_below:
+    if axis.linear_below:
         _symmetrical(panel, direction, axis.linear_below * unit.factor)
     elif is_logarithmic(axis, values):
-        mark_powers(panel, direction)
+        # Numbers side by side need more room.
+        mark_powers(panel, direction, wide=40.0 if direction == "x" else 200.0)
         positive = values[np.isfinite(values) & (values > 0.0)]
         if direction == "y":
             panel.yaxis.set_minor_locator(NullLocator())
             top = positive.max()
             set_limits(max(0.5 * np.percentile(positive, 0.5), top * 10.0**-_DECADES), 2.0 * top)
         else:
-            set_limits(positive.min(), positive.max())
+            margin = (positive.max() / positive.min()) ** _MARK_MARGIN if marked else 1.0
+            set_limits(positive.min() / margin, positive.max() * margin)
+    elif marked and direction == "x":
+        panel.margins(x=_MARK_MARGIN)
     elif axis.extent:
         keep_flat(panel, unit.factor * axis.extent, direction)
     if axis.low is not None:
@@ -255,12 +308,12 @@ def _signed_power(value: float, _: Any) -> str:
     return ("\N{MINUS SIGN}" if value < 0.0 else "") + logarithmic_number(abs(value))
 
 
-def _plane(cell: _Cell, time: Any) -> Figure:
+def _plane(cell: _Cell, time: Any, most: int) -> Figure:
     """Draw the only panel of a figure, with equal scales and a margin, and a minimum size for a line or a point."""
     figure, axes = panel_grid(1, 1, width=ONE_COLUMN)
     panel: Axes = axes[0, 0]
     panel.set_aspect("equal")
-    _draw(panel, cell, time)
+    _draw(panel, cell, time, most)
     box = panel.dataLim
     width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
     width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0

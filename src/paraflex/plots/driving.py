@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,12 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paraflex.errors import InputError
 from paraflex.figures.selection import names_of, select_run
 from paraflex.formatting import display_unit
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import axis_label, effort_label, plain
-from paraflex.plots.layout import ONE_COLUMN, lay_out, panels
+from paraflex.plots.layout import lay_out, panels
 from paraflex.plots.runs import draw_curves, finish_over_time
 from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
 from paraflex.plots.style import BLUE, GREEN, VERMILLION
@@ -81,34 +79,6 @@ def mode_comparison(data: xr.Dataset) -> Figure:
     _bars(axes[0, 2], names, peaks, VERMILLION)
     axes[0, 2].set_title(f"largest {label.partition(' [')[0]}")
     axes[0, 2].set_xlabel(label)
-    return lay_out(figure, axes, panel_height=LIST_LINE * len(names) + 2.0)
-
-
-@drawn
-def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Plot the worst condition number of the actuation matrix along a path, one bar per mode.
-
-    Bars of modes that cannot drive the path are pale.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Rows of the output of `paraflex modes --json`.
-    """
-    # An infinite condition number is written as None.
-    known = [row for row in rows if np.isfinite(row.get("condition_max") or np.nan)]
-    if not known:
-        raise InputError("no condition numbers: the mechanism has no path", field="modes", remedy="name one: --path")
-    figure, axes = panels(1, 1, width=ONE_COLUMN)
-    panel = axes[0, 0]
-    names = [plain(str(row["mode"])) for row in known]
-    for drives, colour, label in ((True, BLUE, "drives the path"), (False, "0.75", "does not")):
-        values = [row["condition_max"] if row.get("drives_path", True) == drives else np.nan for row in known]
-        if np.isfinite(values).any():
-            _bars(panel, names, np.array(values), colour, label=label)
-    mark_powers(panel, "x")
-    panel.set_xlim(1.0, None)
-    panel.set_xlabel(axis_label("condition") + ", worst along the path")
     return lay_out(figure, axes, panel_height=LIST_LINE * len(names) + 2.0)
 
 

@@ -54,16 +54,11 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
     "convergence": lambda found: any(value is not None for _, value, _ in found.get("history", ())),
     "targets_reached": lambda found: any(target["value"] != 0.0 for target in found.get("targets", ())),
     "sobol_bars": lambda found: any(row["first"] is not None for row in found.get("indices", ())),
-    "work_precision": lambda found: any(
-        run["status"] == "complete" for method in found["methods"].values() for run in method["runs"]
-    ),
     "link_deflections": lambda found: bool(found["tip_transverse"].any()),
     "controllers": lambda found: bool(controller_names(found)),
-    "law_comparison": lambda found: bool((found["status"] == "complete").any()),
     **dict.fromkeys(("singular_values", "pole_zero_map"), lambda found: found.sizes["map"] > 0),
     "bode": lambda found: found.sizes["output"] > 0,
     "mode_shapes": _vibrates,
-    "mode_conditions": lambda found: any("condition_max" in row for row in found),
 }
 
 

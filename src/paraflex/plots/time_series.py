@@ -9,7 +9,15 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.errors import InputError
-from paraflex.figures.selection import moving_directions, of_point, one_run, point_label, run_label, select_run
+from paraflex.figures.selection import (
+    most_deflected,
+    moving_directions,
+    of_point,
+    one_run,
+    point_label,
+    run_label,
+    select_run,
+)
 from paraflex.formatting import display_unit, peak
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import QUANTITIES, axis_label, symbol
@@ -17,8 +25,6 @@ from paraflex.plots.layout import is_narrow, panels
 from paraflex.plots.runs import END_EFFECTOR, draw_actual, draw_desired, finish_over_time, largest_over_time
 from paraflex.plots.style import keep_flat
 
-# Ratio of peak tip displacements above which bodies count as twins of a symmetric mechanism and are shown once.
-_ALIKE = 0.9
 # Largest number of links whose motions fit on a page in one column.
 _MOST_NARROW = 4
 
@@ -62,23 +68,6 @@ def tip_deflections(data: xr.Dataset, mode: str, bodies: Sequence[str] | None = 
 
 def _bends(run: xr.Dataset, name: str) -> bool:
     return any(peak(run[variable].sel(body=name)) > 0.0 for variable in ("tip_axial", "tip_transverse", "tip_slope"))
-
-
-def most_deflected(run: xr.Dataset) -> list[str]:
-    """Return the two bodies with the largest transverse tip displacements, in the order of the mechanism.
-
-    Twins of a symmetric mechanism are counted once, unless there are no others.
-    """
-    peaks = {str(name): peak(run["tip_transverse"].sel(body=name)) for name in run["body"].values}
-    chosen: list[str] = []
-    rest = dict(peaks)
-    while rest and len(chosen) < 2:
-        alike = [name for name in rest if rest[name] >= _ALIKE * max(rest.values())]
-        chosen.append(alike[0])
-        rest = {name: value for name, value in rest.items() if name not in alike}
-    ranked = sorted((name for name in peaks if name not in chosen), key=lambda name: -peaks[name])
-    chosen += ranked[: 2 - len(chosen)]
-    return [name for name in peaks if name in chosen]
 
 
 @drawn

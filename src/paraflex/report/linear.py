@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,7 +15,7 @@ from paraflex.figures.selection import default_mode, names_of
 from paraflex.report.curves import DOTTED, look
 from paraflex.report.film import Animation, animation
 from paraflex.report.page import PLAIN_LOOK, Chart, Curve, Page, Panel
-from paraflex.report.provenance import asked, model_words, repeated
+from paraflex.report.provenance import asked, command_line
 from paraflex.report.text import NO_VALUE, number, table
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import END_EFFECTOR, HOLDINGS
@@ -66,7 +65,7 @@ def linear_page(data: xr.Dataset) -> Page:
         kind="linear models",
         subtitle=f"Linear models {about(data)}, {data.sizes['state']} states",
         facts=_facts(data),
-        command=_command(asked(data)),
+        command=command_line(asked(data)),
         figures=_tiles(data),
         more=[("Frequencies and damping", _frequencies(data)), *_zero_tables(data)],
         panels=[Panel("Responses, poles and zeros", [*of_maps, *_branch_charts(data)])],
@@ -117,20 +116,6 @@ def _facts(data: xr.Dataset) -> list[tuple[str, str]]:
         ("about", about(data)), ("states", str(data.sizes["state"])), ("inputs", listed("input")),
         ("outputs", listed("output")), ("paraflex", str(data.attrs["paraflex_version"])),
     ]  # fmt: skip
-
-
-def _command(run: dict[str, Any]) -> str:
-    """Return the command that reproduces these models; empty if it is not known."""
-    if not run.get("linearise"):
-        return ""
-    words = ["paraflex", "linearise", *([run["results"]] if "results" in run else model_words(run))]
-    for name, flag in (("modes", "--mode"), ("forces", "--force-at"), ("prescribed", "--prescribed")):
-        words += repeated(flag, run.get(name))
-    for name in ("pose", "at", "along", "path", "assembly", "coordinates"):
-        if name in run:
-            # A value may begin with a minus.
-            words += [f"--{name}={run[name]}"] if str(run[name]).startswith("-") else [f"--{name}", str(run[name])]
-    return shlex.join([*words, *(["--balanced"] if run.get("balanced") else [])])
 
 
 def _tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:

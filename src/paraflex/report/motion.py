@@ -27,7 +27,7 @@ from paraflex.report.curves import (
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
+from paraflex.report.provenance import asked, command_line, common_facts, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import count, number, pairs, quantity
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
@@ -55,7 +55,7 @@ def motion_page(data: xr.Dataset) -> Page:
         subtitle=_subtitle(data),
         verdict=verdict_word(data),
         facts=common_facts(data),
-        command=run_command_line(asked(data)),
+        command=command_line(asked(data)),
         figures=_figures(data),
         more=[*controller_tables(data), *load_tables(data), *reduction_tables(data), ("Integration", _table(data))],
         panels=_panels(few),

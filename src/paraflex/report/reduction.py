@@ -13,6 +13,7 @@ from paraflex.figures.selection import names_of
 from paraflex.formatting import text_symbol
 from paraflex.report.curves import look
 from paraflex.report.page import PLAIN_LOOK, Chart, Curve, Look, Page, Panel
+from paraflex.report.provenance import asked, command_line
 from paraflex.report.text import NO_VALUE, number, table
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_data import HOLDINGS
@@ -42,6 +43,7 @@ def reduction_page(data: xr.Dataset) -> Page:
             ("damping ratio of responses", f"{float(attrs['damping_ratio']):g}"),
             ("paraflex", str(attrs["paraflex_version"])),
         ],
+        command=command_line(asked(data)),
         figures=_tiles(data),
         more=[
             (needed, _of_outputs(data, "states", needed, _states)),

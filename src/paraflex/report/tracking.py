@@ -37,7 +37,7 @@ from paraflex.report.curves import (
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_panel, load_tables, load_tiles
 from paraflex.report.page import Chart, Curve, Look, Page, Panel
-from paraflex.report.provenance import asked, common_facts, run_command_line, summary_beside, verdict_word
+from paraflex.report.provenance import asked, command_line, common_facts, summary_beside, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.controllers import controller_names
@@ -86,7 +86,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
         verdict=verdict_word(data, failed or {}),
         facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
-        command=run_command_line(run),
+        command=command_line(run),
         figures=_figures(data),
         more=[
             ("Modes" if len(runs) > 1 else "Run", mode_table(data, failed or {})),

@@ -2,7 +2,7 @@
 const charts = (() => {
   const { page, state, element } = report;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
-  const MARKS = { ring: "circle-open", cross: "x-thin-open", square: "square", dot: "circle" };
+  const MARKS = { ring: "circle-open", cross: "x-thin-open", square: "square", dot: "circle", triangle: "triangle-up", diamond: "diamond" };
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
   // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
   const PAPER = 640, LOW = 200, LOW_TITLE = 10;
