@@ -18,7 +18,7 @@ from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
 from paraflex.motion import simulate_motion
 from paraflex.plots.designs import read_designs
-from paraflex.plots.driving import mode_conditions
+from paraflex.plots import mode_conditions
 from paraflex.plots.film import FilmOptions, plan_film
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.scene import check_shapes, scene, select
@@ -79,7 +79,7 @@ def test_figures_that_are_not_there(motion, tmp_path):
         lambda: drawings(source, figure, ["++"]), "--mode", "this figure has no modes to choose from", "leave it out"
     )
     rows = [{"mode": "++", "condition_max": None}]
-    refused(lambda: mode_conditions(rows), "modes", "no condition numbers: the mechanism has no path", "--path")
+    refused(lambda: mode_conditions(rows), "figure", "no condition numbers: the mechanism has no path", "--path")
 
 
 def test_files_that_figures_cannot_be_made_of(motion, tmp_path):

@@ -201,7 +201,7 @@ def print_table(console: Console, shown: Described, title: str | None = None) ->
     names = max(1, numeric.index(True)) if any(numeric) else 1
     widths = [max(map(len, "\n".join(cells).split("\n"))) for cells in texts]
     if sum(max(width, *map(len, head)) + _BETWEEN for width, head in zip(widths, heads, strict=True)) > console.width:
-        heads = [[*textwrap.wrap(name, max(width, _HEAD), break_long_words=False), unit]
+        heads = [[*textwrap.wrap(name, max(width, _HEAD), break_long_words=False, break_on_hyphens=False), unit]
                  for width, (name, unit) in zip(widths, heads, strict=True)]  # fmt: skip
     widths = [max(width, *map(len, head)) + _BETWEEN for width, head in zip(widths, heads, strict=True)]
     first = sum(min(width, _WRAPPED) for width in widths[:names])

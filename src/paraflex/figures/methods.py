@@ -127,13 +127,12 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Table]:
         ]  # fmt: skip
 
     yield Table("Error, time, violation of constraints, imbalance of energy", columns(
-        ("error", "error", "m"), ("wall time", "wall_time", "s"),
-        ("constraint violation", "constraint_position_max", "m"),
-        ("its rate", "constraint_velocity_max", "m/s"), ("energy imbalance", "energy_balance_max", "J"),
+        ("error", "error", "m"), ("wall time", "wall_time", "s"), ("violation", "constraint_position_max", "m"),
+        ("its rate", "constraint_velocity_max", "m/s"), ("energy", "energy_balance_max", "J"),
     )).filled()  # fmt: skip
     yield Table("Work", columns(
-        ("steps", "steps", ""), ("rejected", "rejected", ""), ("Newton iterations", "newton_iterations", ""),
-        ("factorisations", "factorisations", ""), ("evaluations", "evaluations", ""),
+        ("steps", "steps", ""), ("rejected", "rejected", ""), ("Newton steps", "newton_iterations", ""),
+        ("matrices factored", "factorisations", ""), ("evaluations", "evaluations", ""),
     )).filled()  # fmt: skip
     names = list(dict.fromkeys(name for name, _ in done))
     reached = [figures["methods"][name] for name in names]

@@ -32,4 +32,6 @@ def __getattr__(name: str) -> Any:
         # A figure of the catalogue that the stub does not list.
         from paraflex.plots import charts
 
-        return getattr(charts, name)
+        if name not in charts.all_figures():
+            raise
+        return charts.plotting_function(name)
