@@ -8,7 +8,7 @@ from typer.main import get_command
 import paraflex as pf
 from paraflex.cli import app as program
 from paraflex.errors import InputError
-from paraflex.report.provenance import run_command_line
+from paraflex.report.provenance import command_line
 
 COMMANDS = program.all_commands(get_command(program.app))
 NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}
@@ -102,7 +102,7 @@ def asked_for(tmp_path, *line):
     """The command in the results of a run that is as quick as it can be."""
     out = tmp_path / "out"
     COMMANDS["run"].main([*line, "--no-report", "--out", str(out)], standalone_mode=False)
-    return run_command_line(json.loads((out / "summary.json").read_text())["parameters"]["run"])
+    return command_line(json.loads((out / "summary.json").read_text())["parameters"]["run"])
 
 
 def test_the_command_that_repeats_a_run_has_every_option_that_decides_it(tmp_path):
@@ -129,7 +129,7 @@ def test_every_option_of_a_run_is_in_the_command_that_repeats_it_or_shows_result
         "controllers": ["joint"], "tolerance_per": "run", "control": "forces", "allow_outside": True,
     }  # fmt: skip
     lines = " ".join(
-        run_command_line(each)
+        command_line(each)
         for each in (run, run | {"automatic_gains": True},
                      run | {"geometry": "linear", "rigid": False, "ked": False, "segments": None})
     )  # fmt: skip

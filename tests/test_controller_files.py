@@ -21,7 +21,7 @@ from paraflex.files import model_from
 from paraflex.files.schema import model_schema
 from paraflex.plots.planned import figures_of
 from paraflex.plots.sources import open_source
-from paraflex.report.provenance import asked, run_command_line
+from paraflex.report.provenance import asked, command_line
 from paraflex.results.controllers import controllers_of
 from paraflex.studies import TrackingStudy
 from rotors import ROTOR, rotor
@@ -259,7 +259,7 @@ def test_run_takes_controllers(robot, tmp_path):
     assert set(told(tmp_path / "out")["controllers"]) == {"pd", "brake"}
     # The figures that a run writes; they are drawn below.
     assert "controllers" in {figure.written_as for figure in figures_of(open_source(tmp_path / "out"))}
-    assert run_command_line(asked(data)).count("--controller") == 2
+    assert command_line(asked(data)).count("--controller") == 2
 
 
 def test_the_study_names_controllers_and_none_is_none_of_them(robot, tmp_path):
@@ -272,7 +272,7 @@ def test_the_study_names_controllers_and_none_is_none_of_them(robot, tmp_path):
     )
     assert list(told(tmp_path / "study")["controllers"]) == ["pd"]
     assert "controllers" not in told(tmp_path / "none")
-    assert "--controller none" in run_command_line(asked(pf.open_results(tmp_path / "none")))
+    assert "--controller none" in command_line(asked(pf.open_results(tmp_path / "none")))
     # Linearised along a run it is made again, under its controllers.
     _, runs = repeated_runs(str(tmp_path / "study"))
     (run,) = runs

@@ -355,7 +355,7 @@ def test_the_command_prints_a_block_for_each_mode(done, compared):
     at = next(k for k, line in enumerate(lines) if line.split()[:3] == ["++++", "open", "loop"])
     assert [line.split()[0] for line in lines[at : at + 6]] == ["++++", "pd", "pd+gauges", "-+-+", "pd", "pd+gauges"]
     error = 1e3 * float(cell(compared, "pd", "++++")["tracking_rms_motion"])
-    assert lines[at + 1].split()[1] == f"{error:.3g}"
+    assert lines[at + 1].split()[1:3] == ["complete", f"{error:.3g}"]
     assert lines[at + 5].split()[1] == "invalid"
     assert "pd+gauges in -+-+: invalid, controller.gauges.outputs: unknown motor (got 'tau1')" in done[0].stdout
     assert all(len(line) <= 80 for line in lines[: at + 6])
@@ -368,8 +368,8 @@ def test_what_has_room_is_one_table(compared, capsys):
     printed = capsys.readouterr().out
     assert "continued" not in printed
     row = next(line for line in printed.splitlines() if line.split()[:1] == ["unprojected"])
-    # Law and nine numbers.
-    assert len(row.split()) == 10
+    # Law, status and nine numbers.
+    assert len(row.split()) == 11
 
 
 def test_a_second_comparison_says_what_it_replaces(done, file):

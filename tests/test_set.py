@@ -12,7 +12,7 @@ from paraflex.cli.sensitivity import _values
 from paraflex.designs.sweep import load_sweep
 from paraflex.files import load_data
 from paraflex.files.overlay import find_place, value_of, with_values
-from paraflex.report.provenance import asked, run_command_line
+from paraflex.report.provenance import asked, command_line
 from paraflex.studies import load_sensitivities
 from shell import paraflex
 
@@ -112,7 +112,7 @@ def test_commands_set_values_and_results_tell_them(tmp_path, monkeypatch):
     assert told["model"]["section"]["bar"]["thickness"] == "6 mm"
     assert told["run"]["set"] == {"bar.thickness": "6 mm", "study.samples": 11}
     assert data.sizes["time"] == 11
-    words = shlex.split(run_command_line(asked(data)))
+    words = shlex.split(command_line(asked(data)))
     assert words[:7] == ["paraflex", "run", "five_bar", *given]
     again = paraflex(*words[1:], "--out", "again")
     assert again.returncode == 0, again.stderr

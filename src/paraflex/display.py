@@ -57,6 +57,20 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str =
     return f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
+class _Number(str):
+    """Text of a number, which is aligned right."""
+
+
+def described(shown: Any) -> str:
+    """Return a described table, see `figures.tables.Table`; an empty text if it has no rows."""
+    numeric = [column.is_numeric for column in shown.columns]
+    heads = [
+        f"{name} [{unit}]" if unit and one else name for (name, unit), one in zip(shown.heads(), numeric, strict=True)
+    ]
+    rows = ([_Number(cell) if one else cell for cell, one in zip(row, numeric, strict=True)] for row in shown.texts())
+    return table(heads, rows, shown.title)
+
+
 def written(value: Any) -> str:
     """Format a value as text: floats to four digits, lists with commas, an empty text for None, NaN and infinities."""
     if isinstance(value, bool):
@@ -71,5 +85,5 @@ def written(value: Any) -> str:
 
 
 def _cell(value: Any) -> str:
-    numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return f'<td style="text-align: {"right" if numeric else "left"}">{escape(written(value))}</td>'
+    number = isinstance(value, (int, float, _Number)) and not isinstance(value, bool)
+    return f'<td style="text-align: {"right" if number else "left"}">{escape(written(value))}</td>'

@@ -205,7 +205,7 @@ def peak(values: ArrayLike) -> float:
 
 def labelled(name: str, unit: str) -> str:
     """Return the label of an axis or a column, with its unit if it has one: "torque [N m]"."""
-    return name if unit in ("1", "") else f"{name} [{unit[:LONGEST]}]"
+    return name if unit in ("1", "") else f"{name} [{unit[:LONGEST]}]".lstrip()
 
 
 # Names

@@ -1,86 +1,25 @@
-"""Tables that `paraflex control compare` prints."""
+"""Table and lines that `paraflex control compare` prints."""
 
 from __future__ import annotations
 
-import math
-import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import xarray as xr
 from rich.console import Console
 
-from paraflex.cli.tables import plain_table, print_titled
-from paraflex.results.metrics import VALIDITY, metric_label
-from paraflex.studies.law_comparison import LawComparison, unit_shown
-
-# Width of a line of a heading, and gap between two columns [characters].
-_HEAD, _BETWEEN = 9, 2
-# Internal torques below this share of the peak torque are rounding errors.
-_ROUNDING = 1e-8
+from paraflex.cli.tables import print_table
+from paraflex.figures.laws import law_table
+from paraflex.results.metrics import VALIDITY
+from paraflex.studies.law_comparison import LawComparison
 
 
 def print_laws(console: Console, result: LawComparison) -> None:
-    """Print a row for each law in each mode; columns that do not fit the console continue in further tables."""
-    data = result.data
-    metrics = [name for name in result.metrics if name != VALIDITY]
-    columns = {_heading(data, name): _column(data, name) for name in metrics}
-    cells = [(mode, law) for mode in range(data.sizes["mode"]) for law in range(data.sizes["law"])]
-    names = [["" if law else result.modes[mode], result.laws[law]] for mode, law in cells]
-    taken = sum(max(map(len, texts)) + _BETWEEN for texts in zip(*names, ("mode", "law"), strict=True))
-    title = f"{data.attrs['mechanism']}: control laws"
-    for heads in _fitting(columns, console.width - taken):
-        rows = ([*names[k], *(columns[head][cell] for head in heads)] for k, cell in enumerate(cells))
-        print_titled(console, title, plain_table("mode", "law", numbers=_level(heads), rows=rows))
-        title = "continued"
+    """Print a row for each law in each mode, and reasons of those that failed or are doubtful."""
+    print_table(console, law_table(result.data))
     for line in (*_reasons(result), *_doubtful(result)):
         console.print(line, soft_wrap=True)
     if result.interrupted:
         console.print("interrupted before all laws had run: the same command starts over", soft_wrap=True)
-
-
-def _heading(data: xr.Dataset, name: str) -> str:
-    unit = unit_shown(data, name).name
-    lines = textwrap.wrap(metric_label(name), _HEAD, break_long_words=False)
-    return "\n".join([*lines, f"[{unit}]" if unit else ""])
-
-
-def _column(data: xr.Dataset, name: str) -> dict[tuple[int, int], str]:
-    """Return texts by indices of mode and law; incomplete runs have their status instead, in the first column only."""
-    values = unit_shown(data, name).factor * _unless_rounding(data, name).transpose("mode", "law").values
-    status = data["status"].transpose("mode", "law").values
-    first = name == next(iter(data.data_vars))
-    out = {}
-    for k, mode in enumerate(values):
-        for j, value in enumerate(mode):
-            known = "-" if math.isnan(value) else f"{value:.3g}"
-            out[k, j] = known if status[k, j] == "complete" else str(status[k, j]) if first else ""
-    return out
-
-
-def _unless_rounding(data: xr.Dataset, name: str) -> xr.DataArray:
-    if (name, "peak_torque_max" in data) != ("internal_torque_max", True):
-        return data[name]
-    return data[name].where(~(data[name] < _ROUNDING * data["peak_torque_max"]), 0.0)
-
-
-def _level(heads: Sequence[str]) -> list[str]:
-    """Return headings padded to the same number of lines, with units on the last."""
-    most = max(head.count("\n") for head in heads)
-    return ["\n" * (most - head.count("\n")) + head for head in heads]
-
-
-def _fitting(columns: dict[str, dict[tuple[int, int], str]], room: int) -> Iterator[list[str]]:
-    """Yield the headings of columns that fit side by side into `room` characters, at least one at a time."""
-    heads: list[str] = []
-    left = room
-    for head, texts in columns.items():
-        width = max(map(len, (*head.split("\n"), *texts.values()))) + _BETWEEN
-        if heads and width > left:
-            yield heads
-            heads, left = [], room
-        heads.append(head)
-        left -= width
-    yield heads
 
 
 def _reasons(result: LawComparison) -> Iterator[str]:

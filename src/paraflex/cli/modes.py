@@ -17,7 +17,7 @@ from paraflex.cli.request import asked_model, find_path
 from paraflex.cli.tables import plain_console, print_table
 from paraflex.dynamics import build_system, closure_of, mobility, reach
 from paraflex.errors import ActuationError
-from paraflex.figures.tables import Column, Table
+from paraflex.figures.modes import mode_table
 from paraflex.files import Model
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
 
@@ -47,7 +47,8 @@ def modes_command(request: ModesRequest) -> None:
     if request.json:
         print(json.dumps(rows, indent=2))
     elif rows:
-        print_table(plain_console(), _table(model, rows))
+        what = "actuation modes" if rows[0]["declared"] else "sets of motors"
+        print_table(plain_console(), mode_table(f"{model.mechanism.name}: {what}", rows))
 
 
 def _effort(model: Model, path: str | None) -> Effort | None:
@@ -124,17 +125,3 @@ def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: i
     elif mechanism.end_effector is None:
         lines.append(f"{mechanism.name} has no [end_effector] to follow a path: what drives it cannot be determined")
     return lines
-
-
-def _table(model: Model, rows: list[dict[str, Any]]) -> Table:
-    title = f"{model.mechanism.name}: {'actuation modes' if rows[0]['declared'] else 'sets of motors'}"
-    worst = [np.inf if row.get("condition_max", np.nan) is None else row.get("condition_max") for row in rows]
-    drives = [{True: "yes", False: row.get("reason", "no"), None: ""}[row.get("drives_path")] for row in rows]
-    columns = [
-        Column("mode", [row["mode"] for row in rows]),
-        Column("active motors", [", ".join(row["motors"]) for row in rows]),
-        Column("redundancy", [row.get("redundancy") for row in rows]),
-        Column("worst condition\nnumber", worst, digits=3, infinite="infinite"),
-        *([Column("drives the path", drives)] if any(drives) else []),
-    ]
-    return Table(title, columns).filled()

@@ -24,7 +24,7 @@ from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.mechanism import parse_mode
 from paraflex.motion import MotionRun
-from paraflex.report.provenance import asked, run_command_line
+from paraflex.report.provenance import asked, command_line
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results
 from paraflex.tracking import TrackingRun, simulate
@@ -80,7 +80,7 @@ def _request(data: xr.Dataset, results: str) -> RunRequest:
     app = Typer(add_completion=False)
     app.command("run")(with_options(RunRequest, lambda _: None))
     command = get_command(app)
-    return filled(RunRequest, command.make_context("run", shlex.split(run_command_line(run))[2:]).params)
+    return filled(RunRequest, command.make_context("run", shlex.split(command_line(run))[2:]).params)
 
 
 def _runs(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,15 +17,15 @@ from paraflex.findings import DONE_STATUSES, Finding
 from paraflex.formatting import number as text_of, quantity
 
 if TYPE_CHECKING:
-    from paraflex.figures.tables import Column, Table as Described
+    from paraflex.figures.tables import Table as Described
 
     # Their import takes as long as all of `paraflex info`.
     from paraflex.studies import StudyResult
     from paraflex.tracking import TrackingTask
 
 
-# Number of letters from which words of a table may be broken.
-_LONG = 32
+# Gap between two columns, width at which headings are broken, and above which columns of words are [characters].
+_BETWEEN, _HEAD, _WRAPPED = 2, 9, 26
 # Torques below this share of the largest are rounding errors.
 _ROUNDING = 1e-9
 
@@ -141,25 +142,47 @@ def print_tables(console: Console, tables: Iterable[Described]) -> None:
 
 
 def print_table(console: Console, shown: Described, title: str | None = None) -> None:
-    """Print a table below a title, by default its own; nothing if it has no rows."""
+    """Print a described table below its title; nothing if it has no rows.
+
+    Columns that do not fit the console continue in further tables, behind the columns of words that name the rows.
+    """
     if not shown:
         return
-    heads = [f"{name}\n[{unit}]" if unit and column.is_numeric else "\n".join(filter(None, (name, unit)))
+    heads = [[name, f"[{unit}]" if unit and column.is_numeric else unit]
              for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
-    table = plain_table()
-    for head, column in zip(heads, shown.columns, strict=True):
-        table.add_column(head, justify="right" if column.is_numeric else "left", no_wrap=not _is_long(column))
-    for row in shown.texts():
-        table.add_row(*row)
-    title = shown.title if title is None else title
-    if title:
-        console.print(title, soft_wrap=True)
-    console.print(table)
+    numeric, texts = [column.is_numeric for column in shown.columns], list(zip(*shown.texts(), strict=True))
+    names = max(1, numeric.index(True)) if any(numeric) else 1
+    widths = [max(map(len, "\n".join(cells).split("\n"))) for cells in texts]
+    if sum(max(width, *map(len, head)) + _BETWEEN for width, head in zip(widths, heads, strict=True)) > console.width:
+        heads = [[*textwrap.wrap(name, max(width, _HEAD), break_long_words=False, break_on_hyphens=False), unit]
+                 for width, (name, unit) in zip(widths, heads, strict=True)]  # fmt: skip
+    widths = [max(width, *map(len, head)) + _BETWEEN for width, head in zip(widths, heads, strict=True)]
+    first = sum(min(width, _WRAPPED) for width in widths[:names])
+    for k, part in enumerate(_fitting(widths, names, console.width - first)):
+        kept = [*range(names), *part]
+        most = max(len(list(filter(None, heads[c]))) for c in kept)
+        table = plain_table()
+        for c in kept:
+            lines = list(filter(None, heads[c]))
+            lines = [""] * (most - len(lines)) + lines if numeric[c] else lines
+            table.add_column("\n".join(lines), justify="right" if numeric[c] else "left",
+                             no_wrap=widths[c] <= _WRAPPED)  # fmt: skip
+        for row in zip(*(texts[c] for c in kept), strict=True):
+            table.add_row(*row)
+        print_titled(console, "continued" if k else shown.title if title is None else title, table)
 
 
-def _is_long(column: Column) -> bool:
-    """Check whether a column has sentences or lists, which may be broken."""
-    return any(isinstance(cell, str) and len(cell) > _LONG for cell in column.cells)
+def _fitting(widths: Sequence[int], first: int, room: int) -> Iterator[list[int]]:
+    """Yield the columns from the `first` on that fit side by side into `room` characters, at least one at a time."""
+    part: list[int] = []
+    left = room
+    for c in range(first, len(widths)):
+        if part and widths[c] > left:
+            yield part
+            part, left = [], room
+        part.append(c)
+        left -= widths[c]
+    yield part
 
 
 def print_titled(console: Console, title: str, table: Table) -> None:

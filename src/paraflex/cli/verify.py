@@ -7,22 +7,23 @@ from dataclasses import asdict
 
 from rich.console import Console
 
-from paraflex.cli.agreement import print_agreement
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import VerifyRequest
 from paraflex.cli.ending import exit_code, say_where, tell
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import asked_model, asked_of, find_mode, find_modes, find_path, plan_study, with_frames
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import plain_console, print_table
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
+from paraflex.figures.verification import distance_table, link_tables, model_table, path_extent, printed
 from paraflex.files import Model
 from paraflex.folders import VERIFICATION, ResultsFolder
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry
+from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.studies import FIDELITIES, VerificationOptions, VerificationStudy, check_model
 
 
@@ -66,8 +67,13 @@ def _verify(
         verification.save_in(folder)
 
     def show(out: Console) -> None:
+        span, extent = SPAN_WORDS[ErrorSpan(summary["error"])], path_extent(data)
+        out.print(f"{summary['mechanism']}: RMS tracking error {span}, and distances from the path of "
+                  f"{printed(summary['reference'])}", soft_wrap=True)  # fmt: skip
         for mode in summary["modes"]:
-            print_agreement(out, summary, mode)
+            for table in (model_table(summary, mode, extent), distance_table(summary, mode, extent),
+                          *link_tables(summary, mode)):  # fmt: skip
+                print_table(out, table)
 
     tell(summary, show, as_json=request.json)
     try:

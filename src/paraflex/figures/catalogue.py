@@ -6,7 +6,7 @@ gallery of the documentation and the functions of `paraflex.plots` are made from
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -55,6 +55,10 @@ class Figure:
         Option that selects named points, "point" or "points"; empty if there is none.
     panels : str
         Panels of the printed figure, see `Panels`.
+    members : int
+        Largest number of choices in print, the first ones; 0 (default) for all.
+    curves : int
+        Largest number of curves in a printed panel, those with the largest peaks.
     columns : int
         Number of columns of panels in print; 0 (default) for one of charts over time, else for as many as fit.
     height : float
@@ -76,6 +80,8 @@ class Figure:
     variables: tuple[str, ...] = ()
     points: Literal["", "point", "points"] = ""
     panels: Panels = "charts"
+    members: int = 0
+    curves: int = 7
     columns: int = 0
     height: float = 48.0
     shared: bool = False
@@ -84,7 +90,9 @@ class Figure:
 
     def can_show(self, data: Any) -> bool:
         """Check whether the results have the variables of the figure and, unless it is a drawing, any charts of it."""
-        return self.has_variables(data) and (self.charts is None or any(True for _ in self.charts(prepared(data))))
+        if self.charts is None or self.takes == "nothing":
+            return self.has_variables(data)
+        return self.has_variables(data) and any(True for _ in self.charts(prepared(data)))
 
     def has_variables(self, data: Any) -> bool:
         """Check whether the results have the variables of the figure."""
@@ -96,12 +104,14 @@ class Figure:
         return list(self.charts(data, **options))
 
 
-def prepared(data: Any, mode: str | None = None) -> Any:
+def prepared(data: Any, mode: str | None = None, models: Sequence[str] | None = None) -> Any:
     """Return results as functions of charts take them: runs with a dimension of modes, others unchanged.
 
-    If a mode is given, the results are those of this mode.
+    If a mode or models are given, the results are those of this mode and these models.
     """
-    if isinstance(data, xr.Dataset) and "time" in data.dims and "model" not in data.dims:
+    if models is not None:
+        data = data.isel(model=[place_of(model, names_of(data, "model"), "model") for model in models])
+    if isinstance(data, xr.Dataset) and "time" in data.dims:
         return as_runs(data, mode)
     return data if mode is None else data.isel(mode=[place_of(mode, names_of(data, "mode"), "mode")])
 

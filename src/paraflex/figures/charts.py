@@ -129,9 +129,8 @@ class Curve:
     quiet : bool
         Whether the curve is omitted from the label at the pointer.
     mark : str
-        Marks at its points, "ring", "cross", "square" or "dot", or horizontal bars, "bar"; empty (default) for none.
-    size : float
-        Size of the marks relative to the usual one.
+        Marks at its points, "ring", "cross", "square", "dot", "triangle" or "diamond", or horizontal bars, "bar"; empty
+        (default) for none.
     line : bool
         Whether a line joins the points; by default only if they have no marks.
     texts : sequence of str

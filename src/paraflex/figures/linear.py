@@ -180,7 +180,8 @@ def pole_zero_map(data: xr.Dataset) -> Iterator[Chart]:
 
 @figure(
     "frequencies and real parts of poles along the motion", heading=_HEADING, takes="mode", panels="choices",
-    written_as="poles_along_path", variables=("branch_real",), missing=(NOTHING, "linearise with --along, or give along="),
+    written_as="poles_along_path", variables=("branch_real",),
+    missing=(NOTHING, "linearise with --along, or give along="),
 )  # fmt: skip
 def poles_along_path(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of frequencies and real parts of the lowest poles along a motion, motors free and held.

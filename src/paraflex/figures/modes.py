@@ -1,4 +1,4 @@
-"""Chart of actuation modes: how well each drives a path."""
+"""Chart and table of actuation modes: how well each drives a mechanism along a path."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import numpy as np
 
 from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Axis, Chart, Curve, Look
+from paraflex.figures.tables import Column, Table
 
 
 @figure("worst condition number of every mode along the path", columns=1,
         missing=("no condition numbers: the mechanism has no path", "name one: --path"))  # fmt: skip
 def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Iterator[Chart]:
     """Yield the chart of the worst condition number of the actuation matrix along a path, one bar per mode.
-
-    Bars of modes that cannot drive the path have another colour.
 
     Parameters
     ----------
@@ -25,11 +24,28 @@ def mode_conditions(rows: Sequence[Mapping[str, Any]]) -> Iterator[Chart]:
     """
     # An infinite condition number is written as None.
     known = [row for row in rows if np.isfinite(row.get("condition_max") or np.nan)]
-    curves = []
-    for drives, colour, name in ((True, 0, "drives the path"), (False, 6, "does not")):
-        values = [row["condition_max"] if row.get("drives_path", True) == drives else np.nan for row in known]
-        if np.isfinite(values).any():
-            curves.append(Curve(name, np.arange(len(known)), values, Look(colour), mark="bar"))
+    curves = [
+        Curve(word, np.flatnonzero(drives), [known[k]["condition_max"] for k in np.flatnonzero(drives)], Look(colour),
+              mark="bar")
+        for colour, word, drives in (
+            (0, "drives the path", [row.get("drives_path", True) for row in known]),
+            (1, "does not", [not row.get("drives_path", True) for row in known]),
+        ) if any(drives)
+    ]  # fmt: skip
     if curves:
-        yield Chart("modes", "Condition of modes", Axis("", names=[str(row["mode"]) for row in known]), curves,
+        yield Chart("conditions", "", Axis("", names=[str(row["mode"]) for row in known]), curves,
                     Axis("condition number, worst along the path", log=True, low=1.0))  # fmt: skip
+
+
+def mode_table(title: str, rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return the table of modes or sets of motors."""
+    words = {True: "yes", False: "no", None: None}
+    worst = [np.inf if row.get("condition_max", 0.0) is None else row.get("condition_max") for row in rows]
+    drives = [words[row.get("drives_path")] for row in rows]
+    return Table(title, [
+        Column("mode", [row["mode"] for row in rows]),
+        Column("active motors", [", ".join(row["motors"]) for row in rows]),
+        Column("redundancy", [row.get("redundancy") for row in rows]),
+        Column("worst condition number", worst, digits=3, infinite="infinite"),
+        Column("drives the path", [row.get("reason", word) for row, word in zip(rows, drives, strict=True)]),
+    ]).filled()  # fmt: skip

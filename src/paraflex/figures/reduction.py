@@ -101,7 +101,8 @@ def held_frequency_by_states(data: xr.Dataset) -> Iterator[Chart]:
 
 @figure(
     "errors along the path with bases of one and of several poses", heading=_BASES, takes="mode",
-    written_as="bases_along_path", variables=("along_error",), height=62.0, missing=(NOTHING, "reduce along a path: --along 21"),
+    written_as="bases_along_path", variables=("along_error",), height=62.0,
+    missing=(NOTHING, "reduce along a path: --along 21"),
 )  # fmt: skip
 def bases_along_path(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of errors of responses and of frequencies along a path.

@@ -8,10 +8,12 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.formatting import is_signs
+from paraflex.formatting import is_signs, peak
 
 # Ratio of speeds along the two axes below which the end-effector is at rest along one of them, up to rounding.
 _STILL = 1e-9
+# Ratio of peak tip displacements above which bodies count as twins of a symmetric mechanism and are shown once.
+_ALIKE = 0.9
 
 
 def place_of(name: str, names: Sequence[str], what: str, field: str = "") -> int:
@@ -127,3 +129,20 @@ def as_runs(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
     if mode is not None:
         data = data.isel(mode=[place_of(mode, names_of(data, "mode"), "mode")])
     return data.transpose("mode", "time", ...)
+
+
+def most_deflected(run: xr.Dataset) -> list[str]:
+    """Return the two bodies with the largest transverse tip displacements, in the order of the mechanism.
+
+    Twins of a symmetric mechanism are counted once, unless there are no others.
+    """
+    peaks = {str(name): peak(run["tip_transverse"].sel(body=name)) for name in run["body"].values}
+    chosen: list[str] = []
+    rest = dict(peaks)
+    while rest and len(chosen) < 2:
+        alike = [name for name in rest if rest[name] >= _ALIKE * max(rest.values())]
+        chosen.append(alike[0])
+        rest = {name: value for name, value in rest.items() if name not in alike}
+    ranked = sorted((name for name in peaks if name not in chosen), key=lambda name: -peaks[name])
+    chosen += ranked[: 2 - len(chosen)]
+    return [name for name in peaks if name in chosen]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paraflex.formatting import common_unit, error_text, number
+from paraflex.formatting import NO_VALUE, common_unit, error_text, number
 from paraflex.units import DisplayUnit
 
 Cell = float | int | str | None
@@ -40,6 +40,8 @@ class Column:
         Number of significant digits.
     infinite : str
         Text of an infinite value.
+    least : float
+        Magnitude below which values are not known; they are written as "<1e-08".
     shown : DisplayUnit or None
         Unit for display; by default one in which all values have few digits.
     """
@@ -53,6 +55,7 @@ class Column:
     beside: float = 0.0
     digits: int = 4
     infinite: str = "inf"
+    least: float = 0.0
     shown: DisplayUnit | None = None
 
     @property
@@ -61,12 +64,15 @@ class Column:
         return not any(isinstance(cell, str) for cell in self.cells)
 
     @property
+    def values(self) -> list[float]:
+        """Numbers with a unit."""
+        cells = (*self.cells, *(() if self.below_unit else self.below))
+        return [float(cell) for cell in cells if isinstance(cell, float)]
+
+    @property
     def shown_unit(self) -> DisplayUnit:
         """Unit in which the values are shown."""
-        values = [
-            float(cell) for cell in (*self.cells, *(() if self.below_unit else self.below)) if isinstance(cell, float)
-        ]
-        return self.shown or common_unit(self.unit, values, beside=self.beside)
+        return self.shown or common_unit(self.unit, self.values, beside=self.beside)
 
     def texts(self) -> list[str]:
         """Return the cells as text."""
@@ -75,6 +81,8 @@ class Column:
         def text(cell: Cell) -> str:
             if isinstance(cell, str | int | np.integer):
                 return str(cell)
+            if cell is not None and abs(cell) < self.least:
+                return f"<{number(self.least, 1, factor=factor)}"
             return number(cell, self.digits, factor=factor, beside=self.beside, infinite=self.infinite)
 
         def second(value: float | None) -> str:
@@ -125,6 +133,16 @@ class Table:
         kept = [c for c in self.columns if not c.is_numeric or any(_is_known(cell) for cell in c.cells)]
         return replace(self, columns=kept)
 
+    def in_one_unit(self) -> Table:
+        """Return the table with a common unit for all columns of numbers that have the same SI unit."""
+        values: dict[str, list[float]] = {}
+        for one in self.columns:
+            values.setdefault(one.unit, []).extend(one.values)
+        return replace(self, columns=[
+            replace(one, shown=one.shown or common_unit(one.unit, values[one.unit], beside=one.beside))
+            if one.is_numeric else one for one in self.columns
+        ])  # fmt: skip
+
     def thinned(self, rows: Sequence[int]) -> Table:
         """Return the table with some of its rows; the title has their number and that of all rows."""
         count = len(self.columns[0].cells)
@@ -142,6 +160,17 @@ class Table:
             for one in self.columns
         ]
         return replace(self, title=f"{self.title} ({len(rows)} of {count})", columns=columns)
+
+
+def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column]:
+    """Return columns whose rows have different SI units in units for display, followed by the column of these units."""
+    shown = [common_unit(unit, [column.cells[k] for column in columns]) for k, unit in enumerate(units)]  # type: ignore[misc]
+    converted = [
+        replace(column, cells=[None if cell is None else unit.factor * cell
+                               for cell, unit in zip(column.cells, shown, strict=True)])  # type: ignore[operator]
+        for column in columns
+    ]  # fmt: skip
+    return [*converted, Column("unit", [NO_VALUE if unit.name in ("", "1") else unit.name for unit in shown])]
 
 
 def _is_known(cell: Cell) -> bool:

@@ -1,15 +1,13 @@
 # Each figure from the module that its function is in.
-from .agreement import (
-    compared_deflections as compared_deflections,
-    compared_links as compared_links,
-    compared_paths as compared_paths,
-    model_distances as model_distances,
-)
 from .charts import (
     actuation_condition as actuation_condition,
     bases_along_path as bases_along_path,
     beam_stresses as beam_stresses,
     bode as bode,
+    compared_deflections as compared_deflections,
+    compared_energies as compared_energies,
+    compared_links as compared_links,
+    compared_paths as compared_paths,
     controllers as controllers,
     coordinates as coordinates,
     drive_efforts as drive_efforts,
@@ -21,6 +19,7 @@ from .charts import (
     free_travels as free_travels,
     held_frequency_by_states as held_frequency_by_states,
     joint_force_travel as joint_force_travel,
+    model_distances as model_distances,
     pole_zero_map as pole_zero_map,
     poles_along_path as poles_along_path,
     reduced_responses as reduced_responses,
@@ -28,6 +27,7 @@ from .charts import (
     singular_values as singular_values,
     stiffness_travel as stiffness_travel,
     stress_travel as stress_travel,
+    work_precision as work_precision,
 )
 from .controlled import controllers as controllers
 from .derivatives import elasticities as elasticities

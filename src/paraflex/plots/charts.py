@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -13,10 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.figures.catalogue import Figure as CatalogueFigure, all_figures, prepared
 from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
-from paraflex.figures.selection import default_mode, names_of
+from paraflex.figures.selection import default_mode, names_of, prototype_pair
 from paraflex.formatting import ROUNDING, logarithmic_number, peak
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import mathematics
@@ -31,20 +32,20 @@ from paraflex.plots.layout import (
     panel_grid,
 )
 from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
-from paraflex.plots.style import BLACK, COLOURS, SHADE, ZERO, keep_flat
+from paraflex.plots.style import BLACK, COLOURS, SHADE, ZERO, journal_style, keep_flat
 from paraflex.units import DisplayUnit
 
-# Largest number of curves that are distinguishable in one panel.
-MOST_LINES = 7
-# Largest number of panels for members below one another in a figure of one column.
-_MOST_BELOW = 12
+# Largest number of panels for members below one another in a figure of one column, and of those of designs.
+_MOST_BELOW, _MOST_STACKED = 12, 4
 # Decades of a logarithmic axis shown below its largest value.
 _DECADES = 9.0
-_MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o"}
-# Sizes of marks and of squares, which lie on curves [pt], and room beside marks as a share of the panel's width.
-_SIZES, _BESIDE = (4.0, 3.0), 0.06
-# Height of a bar, as a share of the distance of two names.
-_BAR = 0.6
+_MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o", "triangle": "^", "diamond": "D"}
+# Number of marks from which they are smaller; sizes of few, of many and of faint marks, and of squares on curves [pt].
+_MANY, _SIZE, _SMALL, _FAINT, _SQUARE = 30, 4.0, 2.8, 2.4, 3.0
+# Share by which an axis with marks is longer than its values.
+_BESIDE = 0.06
+# Heights of the thinnest bars, and of one of several marks beside a name [mm].
+_THINNEST, _MARK_LINE = 1.8, 2.6
 # Dashes by their numbers in a look.
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)), (0, (9, 2)))
 _DESIRED: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 0.8, "zorder": 2.5}
@@ -68,35 +69,45 @@ class _Cell:
     def curves(self) -> list[Curve]:
         """Curves of the panel: those of other runs are left out if a run is selected."""
         found = self.chart.shown(self.run, self.choice)
-        return [curve for curve in found if self.run is None or curve.run in (None, self.run)]
+        return [curve for curve in found
+                if self.run is None or curve.shown is not None or curve.run in (None, self.run)]  # fmt: skip
 
 
 @cache
 def plotting_function(name: str) -> Callable[..., Figure]:
-    """Return the plotting function of a figure of the catalogue: of results or their folder, a mode, and options."""
+    """Return the plotting function of a figure: of results or their folder, a mode, models, and options."""
     entry = all_figures()[name]
+    assert entry.charts is not None
+    own = list(inspect.signature(entry.charts).parameters.values())
+    kinds: dict[str, Any] = {"mode": str | None, "models": Sequence[str] | None}
+    chosen = {"mode": ["mode"], "models": ["mode", "models"]}.get(entry.takes, [])
+    more = [inspect.Parameter(one, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None, annotation=kinds[one])
+            for one in chosen]  # fmt: skip
+    shown = inspect.Signature([own[0], *more, *own[1:]])
 
     def plot(*args: Any, **given: Any) -> Figure:
         options = shown.bind(*args, **given).arguments
-        data, mode = options.pop(own[0].name), options.pop("mode", None)
-        if entry.takes == "mode" and mode is None and "mode" in getattr(data, "dims", ()):
+        data = options.pop(own[0].name, None)
+        mode, models = (options.pop(one, None) if one in chosen else None for one in ("mode", "models"))
+        if chosen and mode is None and "mode" in getattr(data, "dims", ()):
             mode = default_mode(data)
-        found = prepared(data, mode)
+        if "models" in chosen and models is None:
+            models = prototype_pair(data)
+        found = prepared(data, mode, models)
         charts = entry.describe(found, **{**entry.defaults(found), **options}) if entry.has_variables(found) else []
         if not charts:
             raise InputError(entry.missing[0], field="figure", value=name, remedy=entry.missing[1])
         if not isinstance(found, xr.Dataset) or "time" not in found.dims:
             return print_figure(entry, charts)
-        return print_figure(entry, charts, found["time"].values, names_of(found, "mode"))
+        # Runs of a verification are those of all models in the first mode, then in the next one.
+        return print_figure(entry, charts, found["time"].values, names_of(found, "mode"), found.sizes.get("model", 1))
 
-    assert entry.charts is not None
-    own = list(inspect.signature(entry.charts).parameters.values())
-    modes = [inspect.Parameter("mode", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None)]
     plot.__name__ = plot.__qualname__ = name
+    # Annotations are evaluated where they are written.
+    plot.__module__ = entry.charts.__module__
     plot.__doc__ = f"Plot {entry.shows}.\n\n{inspect.getdoc(entry.charts)}"
-    shown = inspect.Signature([own[0], *(modes if entry.takes == "mode" else []), *own[1:]])
     plot.__signature__ = shown  # type: ignore[attr-defined]
-    return drawn(plot)
+    return drawn(plot) if entry.takes != "nothing" else journal_style()(checked_arguments()(plot))
 
 
 def __getattr__(name: str) -> Callable[..., Figure]:
@@ -105,7 +116,9 @@ def __getattr__(name: str) -> Callable[..., Figure]:
     return plotting_function(name)
 
 
-def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = None, runs: Sequence[str] = ()) -> Figure:
+def print_figure(
+    entry: CatalogueFigure, charts: Sequence[Chart], time: Any = None, modes: Sequence[str] = (), each: int = 1
+) -> Figure:
     """Draw the charts of a figure.
 
     Parameters
@@ -116,35 +129,62 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
         Charts.
     time : (k,) array, optional
         Times of the runs [s], for curves without abscissae.
-    runs : sequence of str
-        Names of the runs.
+    modes : sequence of str
+        Modes of the runs.
+    each : int
+        Number of runs in each mode.
     """
-    rows = _cells(entry, charts, runs)
-    if len(rows[0]) == 1 and rows[0][0].chart.equal and len(rows) == 1:
-        return _plane(rows[0][0], time)
+    rows = _cells(entry, charts, {mode: each * k for k, mode in enumerate(modes)})
+    if len(rows) == len(rows[0]) == 1 and rows[0][0].chart.equal:
+        return _plane(rows[0][0], time, entry.curves)
     cells = [cell for row in rows for cell in row]
     columns = _columns(entry, len(cells), charts)
     figure, axes = panel_grid(
         len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS
     )
-    for panel, cell in zip(axes.flat, cells, strict=False):
-        _draw(panel, cell, time)
+    for k, (panel, cell) in enumerate(zip(axes.flat, cells, strict=False)):
+        # Panels side by side share the names on their axes.
+        named = k % columns == 0 or cell.chart.axis(None).names != cells[k - 1].chart.axis(None).names
+        _draw(panel, cell, time, entry.curves, named=named)
     if entry.shared:
         _share_scales(axes)
+    if entry.panels == "choices":
+        _label_rows(axes)
     if all(cell.chart.over_time for cell in cells):
+        for panel in axes.flat:
+            panel.set_xlabel("")
         label_outer_time(axes)
-    names = max(len(chart.axis(None).names) for chart in charts)
-    return lay_out(figure, axes, panel_height=LIST_LINE * names + 2.0 if names else entry.height)
+    return lay_out(figure, axes, panel_height=max(map(_list_height, charts)) or entry.height)
+
+
+def _list_height(chart: Chart) -> float:
+    """Return the height of a panel that lists names, with room for all marks and bars of each [mm]; 0 without names."""
+    names = len(chart.axis(None).names)
+    bars = [_THINNEST / one.thickness for one in chart.curves if one.mark == "bar"]
+    return max(LIST_LINE, _MARK_LINE * _marks(chart) + 1.5, *bars) * names + 2.0 if names else 0.0
+
+
+def _marks(chart: Chart) -> int:
+    """Return the number of marks beside each name of a list."""
+    return sum(curve.mark not in ("", "bar") and bool(curve.name and np.size(curve.y)) for curve in chart.curves)
 
 
 def _columns(entry: CatalogueFigure, count: int, charts: Sequence[Chart]) -> int:
-    if entry.panels == "choices" and len(charts) > 1:
-        return len(charts)
+    if len(charts) > 1 and entry.panels != "charts":
+        return len(charts) if entry.panels == "choices" else count // len(charts)
     if entry.panels == "runs":
-        return 2 if count == 4 or (is_narrow() and count > 1) else min(count, entry.columns)
+        return 2 if count == 4 or (is_narrow() and count > 1) else min(count, entry.columns or 3)
     if is_narrow():
         return 1
-    return min(count, entry.columns or (3 if not charts[0].over_time else 1))
+    return min(count, entry.columns or (1 if charts[0].over_time else 3))
+
+
+def _label_rows(axes: Any) -> None:
+    """Remove the label of the vertical axis from panels beside one with the same label."""
+    for row in axes:
+        for panel in row[1:]:
+            if panel.get_ylabel() == row[0].get_ylabel():
+                panel.set_ylabel("")
 
 
 def _share_scales(axes: Any) -> None:
@@ -156,23 +196,26 @@ def _share_scales(axes: Any) -> None:
             panel.set_ylim(*((-1.08 * largest, 1.08 * largest) if largest > ROUNDING else (-1.0, 1.0)))
 
 
-def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Sequence[str]) -> list[list[_Cell]]:
-    """Return rows of panels."""
+def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Mapping[str, int]) -> list[list[_Cell]]:
+    """Return rows of panels; `runs` are the first runs of all modes."""
     run = 0 if entry.takes in ("mode", "models") else None
+    several = len(charts) > 1 or entry.takes == "run"
     if entry.panels == "runs":
-        return [
-            [
-                _Cell(chart, r, 0, ": ".join(filter(None, (name, *chart.of_runs[r : r + 1]))))
-                for r, name in enumerate(runs)
-            ]
-            for chart in charts
-        ]
+        return [[_Cell(chart, r, 0, _title_of_run(chart, k, name, several)) for k, (name, r) in enumerate(runs.items())]
+                for chart in charts]  # fmt: skip
     if entry.panels == "choices":
         members = max(1, *(len(chart.choices) - chart.overview for chart in charts))
-        members = min(members, max(1, _MOST_BELOW // len(charts))) if is_narrow() else members
+        members = min(members, entry.members or members)
+        if is_narrow():
+            below = _MOST_STACKED if entry.takes == "designs" else _MOST_BELOW
+            members = min(members, max(1, below // len(charts)))
         return [[_member(chart, run, k) for chart in charts] for k in range(members)]
-    several = len(charts) > 1
     return [[_Cell(chart, run, 0 if chart.choices else None, chart.title if several else "")] for chart in charts]
+
+
+def _title_of_run(chart: Chart, k: int, name: str, several: bool) -> str:
+    words = [name, *([chart.title[:1].lower() + chart.title[1:]] if several else []), *chart.of_runs[k : k + 1]]
+    return ": ".join(filter(None, words))
 
 
 def _member(chart: Chart, run: int | None, k: int) -> _Cell:
@@ -180,48 +223,55 @@ def _member(chart: Chart, run: int | None, k: int) -> _Cell:
     if not chart.choices:
         return _Cell(chart, run, None, chart.title)
     choice = k + chart.overview
-    return _Cell(chart, run, choice, f"{chart.choices[choice]}: {chart.axis(choice).name}")
+    title, name = chart.choices[choice], chart.axis(choice).name
+    return _Cell(chart, run, choice, "" if title == name else f"{title}: {name}" if name else title)
 
 
-def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
+def _draw(panel: Axes, cell: _Cell, time: Any, most: int, *, named: bool = True) -> None:
     """Draw the curves, marks and axes of a panel."""
     chart, curves = cell.chart, cell.curves
     units, axis = chart.shown_units(), chart.axis(cell.choice)
-    shown, note = _largest(curves)
+    unit = units.of(cell.choice)
+    shown, note = _largest(curves, most)
     title = ", ".join(filter(None, (cell.title, note)))
     single = len({curve.look.colour for curve in shown if not (curve.desired or curve.mark)}) == 1
     for curve in shown:
-        _draw_curve(panel, curve, time, units.x, units.of(cell.choice), single=single)
+        _draw_curve(panel, curve, time, units.x, unit, single=single)
     for level in chart.levels:
-        panel.axhline(units.of(cell.choice).factor * level, **_LEVEL)
+        panel.axhline(unit.factor * level, **_LEVEL)
     if chart.over_time and time is not None and time[0] < time[-1]:
         panel.set_xlim(time[0], time[-1])
     if not chart.over_time and any(curve.mark for curve in shown):
         panel.margins(x=_BESIDE)
-    values = joined(units.of(cell.choice).factor * np.asarray(curve.y, dtype=float) for curve in shown)
-    _set_scale(panel, "y", axis, values, units.of(cell.choice))
-    _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x,
-               flush=not all(curve.mark for curve in shown))  # fmt: skip
+    _set_scale(panel, "y", axis, joined(unit.factor * np.asarray(curve.y, dtype=float) for curve in shown), unit)
+    xs = joined(units.x.factor * np.asarray(curve.x, dtype=float) for curve in shown if curve.x is not None)
+    _set_scale(panel, "x", chart.x, xs, units.x, marked=bool(shown) and all(curve.mark for curve in shown))
     for span in chart.spans:
         label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
         low, high = units.x.factor * span.low, units.x.factor * span.high
         panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
+    if axis.names:
+        list_lines(panel, axis.names if named else [""] * len(axis.names))
+        for line in range(len(axis.names) - 1 if _marks(chart) > 1 else 0):
+            panel.axhline(line + 0.5, color="0.85", linewidth=0.5, zorder=0.5)
+    if axis.names or panel.get_xscale() == panel.get_yscale() == "log":
+        panel.grid(axis="x" if axis.names else "both", color="0.9", linewidth=0.4)
     panel.set_title(mathematics(title))
-    panel.set_ylabel(mathematics(axis.label(units.of(cell.choice), short=cell.title.endswith(f": {axis.name}"))))
+    panel.set_ylabel(mathematics(axis.label(unit, short=cell.title.endswith(f": {axis.name}"))))
     panel.set_xlabel(mathematics(chart.x.label(units.x)))
 
 
-def _largest(curves: Sequence[Curve]) -> tuple[list[Curve], str]:
-    """Return marks, the lines with the largest peaks (at most `MOST_LINES` names), and "7 of 8, the largest"."""
+def _largest(curves: Sequence[Curve], most: int) -> tuple[list[Curve], str]:
+    """Return marks, the lines with the largest peaks (at most `most` names), and "7 of 8, the largest"."""
     peaks: dict[str, float] = {}
     for curve in curves:
         if curve.name and not (curve.desired or curve.mark):
             peaks[curve.name] = max(peaks.get(curve.name, 0.0), peak(curve.y))
-    if len(peaks) <= MOST_LINES:
+    if len(peaks) <= most:
         return list(curves), ""
-    left_out = sorted(peaks, key=lambda name: -peaks[name])[MOST_LINES:]
+    left_out = sorted(peaks, key=lambda name: -peaks[name])[most:]
     kept = [curve for curve in curves if curve.desired or curve.name not in left_out]
-    return kept, f"{MOST_LINES} of {len(peaks)}, the largest"
+    return kept, f"{most} of {len(peaks)}, the largest"
 
 
 def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit: DisplayUnit, *, single: bool) -> None:
@@ -230,14 +280,18 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
     colour = BLACK if curve.look.colour is None else COLOURS[curve.look.colour % len(COLOURS)]
     label = mathematics(curve.name) if curve.name else None
     if curve.mark == "bar":
-        panel.barh(y, x, height=_BAR, color=colour, linewidth=0.0, label=label)
+        panel.barh(y, x, height=curve.thickness, color=colour, linewidth=0.0, label=label)
         return
     if curve.mark:
-        style, inside = _DASHES[curve.look.dash] if curve.line else "", "white" if curve.mark == "ring" else colour
-        panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], color=colour, label=label,
-                   markersize=curve.size * _SIZES[curve.mark == "square"], markerfacecolor=inside)  # fmt: skip
+        size = _SQUARE if curve.mark == "square" else _SIZE if y.size <= _MANY else _SMALL
+        pale: dict[str, Any] = {}
+        if curve.faint:
+            size, pale = _FAINT, {"alpha": max(0.15, min(0.6, 40.0 / max(y.size, 1))), "markeredgewidth": 0.6}
+        panel.plot(x, y, linestyle=_DASHES[curve.look.dash] if curve.line else "", marker=_MARKS[curve.mark],
+                   color=colour, label=label, markersize=curve.size * size, clip_on=curve.mark != "cross",
+                   markerfacecolor="white" if curve.mark == "ring" else colour, **pale)  # fmt: skip
         return
-    if curve.desired and single:
+    if curve.desired and (single or curve.look.colour is None):
         panel.plot(x, y, label=label, **_DESIRED)
         return
     panel.plot(x, y, color=colour, linestyle=_DASHES[curve.look.dash], label=label)
@@ -246,23 +300,24 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         panel.plot(x[known[-1]], y[known[-1]], **_STOPPED)
 
 
-def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: DisplayUnit, *, flush: bool = True) -> None:
-    """Set scale, limits and lines of an axis; a logarithmic abscissa ends with its values if `flush`."""
+def _set_scale(
+    panel: Axes, direction: Any, axis: Axis, values: Any, unit: DisplayUnit, *, marked: bool = False
+) -> None:
+    """Set scale, limits and lines of an axis; if all of its values are `marked`, there is room beside them."""
     set_limits = panel.set_ylim if direction == "y" else panel.set_xlim
-    if axis.names:
-        list_lines(panel, axis.names)
-        panel.grid(axis="x", color="0.9", linewidth=0.4)
-    elif axis.linear_below:
+    if axis.linear_below:
         _symmetrical(panel, direction, axis, unit)
     elif is_logarithmic(axis, values):
-        mark_powers(panel, direction)
+        # Numbers side by side need more room.
+        mark_powers(panel, direction, wide=40.0 if direction == "x" else 200.0)
         positive = values[np.isfinite(values) & (values > 0.0)]
         if direction == "y":
             panel.yaxis.set_minor_locator(NullLocator())
             top = positive.max()
             set_limits(max(0.5 * np.percentile(positive, 0.5), top * 10.0**-_DECADES), 2.0 * top)
-        elif flush:
-            set_limits(positive.min(), positive.max())
+        else:
+            margin = (positive.max() / positive.min()) ** _BESIDE if marked else 1.0
+            set_limits(positive.min() / margin, positive.max() * margin)
     elif axis.extent:
         keep_flat(panel, unit.factor * axis.extent, direction)
     if axis.low is not None:
@@ -283,12 +338,12 @@ def _symmetrical(panel: Axes, direction: str, axis: Axis, unit: DisplayUnit) -> 
     own.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
 
 
-def _plane(cell: _Cell, time: Any) -> Figure:
+def _plane(cell: _Cell, time: Any, most: int) -> Figure:
     """Draw the only panel of a figure, with equal scales and a margin, and a minimum size for a line or a point."""
     figure, axes = panel_grid(1, 1, width=ONE_COLUMN)
     panel: Axes = axes[0, 0]
     panel.set_aspect("equal")
-    _draw(panel, cell, time)
+    _draw(panel, cell, time, most)
     box = panel.dataLim
     width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
     width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0

@@ -10,7 +10,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.figures.catalogue import page_panels
 from paraflex.folders.kinds import RESULT_KINDS
 from paraflex.report.page import Page
-from paraflex.report.provenance import verdict_word
+from paraflex.report.provenance import asked, command_line, verdict_word
 from paraflex.report.text import sections
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import kind_of
@@ -31,6 +31,7 @@ def kind_page(data: xr.Dataset) -> Page:
         kind=kind,
         verdict=verdict_word(data) if "status" in data else "",
         facts=[(name, str(data.attrs[name])) for name in ("paraflex_version",) if name in data.attrs],
+        command=command_line(asked(data)),
         figures=[tile for module in modules if hasattr(module, "tiles") for tile in module.tiles(data)],
         more=sections(tables),
         panels=page_panels(kind, data),

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -17,7 +15,7 @@ from paraflex.figures.selection import default_mode, names_of
 from paraflex.formatting import number
 from paraflex.report.film import Animation, animation
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, model_words, repeated
+from paraflex.report.provenance import asked, command_line
 from paraflex.report.text import sections
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_motion import DrawnMode, drawn_modes, modal_motion
@@ -53,7 +51,7 @@ def linear_page(data: xr.Dataset) -> Page:
         kind="linear models",
         subtitle=f"Linear models {about(data)}, {data.sizes['state']} states",
         facts=_facts(data),
-        command=_command(asked(data)),
+        command=command_line(asked(data)),
         figures=_tiles(data),
         more=sections(tables(data)),
         panels=page_panels("linear", data),
@@ -104,20 +102,6 @@ def _facts(data: xr.Dataset) -> list[tuple[str, str]]:
         ("about", about(data)), ("states", str(data.sizes["state"])), ("inputs", listed("input")),
         ("outputs", listed("output")), ("paraflex", str(data.attrs["paraflex_version"])),
     ]  # fmt: skip
-
-
-def _command(run: dict[str, Any]) -> str:
-    """Return the command that reproduces these models; empty if it is not known."""
-    if not run.get("linearise"):
-        return ""
-    words = ["paraflex", "linearise", *([run["results"]] if "results" in run else model_words(run))]
-    for name, flag in (("modes", "--mode"), ("forces", "--force-at"), ("prescribed", "--prescribed")):
-        words += repeated(flag, run.get(name))
-    for name in ("pose", "at", "along", "path", "assembly", "coordinates"):
-        if name in run:
-            # A value may begin with a minus.
-            words += [f"--{name}={run[name]}"] if str(run[name]).startswith("-") else [f"--{name}", str(run[name])]
-    return shlex.join([*words, *(["--balanced"] if run.get("balanced") else [])])
 
 
 def _tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:

@@ -19,7 +19,7 @@ from paraflex.formatting import number, peak, quantity, text_symbol, typeset
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
+from paraflex.report.provenance import asked, command_line, common_facts, verdict_word
 from paraflex.report.text import pairs, sections, table_pairs
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.kinds import check_kind
@@ -43,7 +43,7 @@ def motion_page(data: xr.Dataset) -> Page:
         subtitle=_subtitle(data),
         verdict=verdict_word(data),
         facts=common_facts(data),
-        command=run_command_line(asked(data)),
+        command=command_line(asked(data)),
         figures=_figures(data),
         more=[
             *load_tables(data),

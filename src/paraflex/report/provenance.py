@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,26 +16,29 @@ from paraflex.folders import check_listed
 from paraflex.results.doubts import FINDINGS, finished, verdict_of
 from paraflex.writing import read_json
 
-# Flags and fields of a request that the command line repeats.
-_RUN_FLAGS = ("rigid", "ked", "balanced")
-_REQUEST_FIELDS = (
-    "duration",
-    "samples",
-    "tolerance",
-    "tolerance_per",
-    "control",
-    "method",
-    "step",
-    "constraints",
-    "segments",
-    "reduced",
-    "reference",
-    "curvature",
-    "after",
-    "assembly",
-    "max_steps",
-)
-_GIVEN = {name: f"--{name.replace('_', '-')}" for name in _REQUEST_FIELDS} | {"tolerance": "--tol"}
+# Options of each command that are repeated, in order; "model" stands for the arguments that name it.
+_FRAMES, _PLAN = ("reference", "curvature"), ("duration", "samples", "assembly")
+_LINEAR = (
+    "results", "model", "modes", "forces", "prescribed", "pose", "at", "along", "path", "assembly", "coordinates",
+    "balanced",
+)  # fmt: skip
+_COMMANDS: Mapping[str, Sequence[str]] = {
+    "run": (
+        "model", "path", "modes", "controllers", *_PLAN, "tolerance", "tolerance_per", "control", "method", "step",
+        "constraints", "segments", "reduced", *_FRAMES, "after", "max_steps", "method_parameters", "alpha", "beta",
+        "automatic_gains", "rigid", "ked", "balanced", "geometry", "stop_at",
+    ),
+    "verify": ("model", "path", "modes", "fidelities", "engines", *_PLAN, "tolerance", "method", "segments", *_FRAMES),
+    "statics": ("model", "loads", "torques", "moved", "held", "stiffness", "steps", "buckling", "assembly"),
+    "linearise": _LINEAR,
+    "reduce": (*_LINEAR, "states", "methods", "until", "error", "basis"),
+}  # fmt: skip
+# Flags that are not the name of the option.
+_FLAGS = {
+    "tolerance": "--tol", "modes": "--mode", "controllers": "--controller", "method_parameters": "--method-parameter",
+    "fidelities": "--model", "engines": "--engine", "loads": "--load", "torques": "--torque", "moved": "--move",
+    "held": "--hold", "forces": "--force-at", "set": "--set", "methods": "--method",
+}  # fmt: skip
 
 
 def asked(data: xr.Dataset) -> dict[str, Any]:
@@ -91,55 +94,54 @@ def mechanism_argument(source: str) -> str:
     return name if name in library_names() else source
 
 
-def run_command_line(run: dict[str, Any]) -> str:
-    """Return the `paraflex run` command of a request; empty if it is not known."""
-    if "mechanism" not in run:
-        return ""
-    words = ["paraflex", "run", *model_words(run)]
-    if "path" in run:
-        words += ["--path", run["path"], *repeated("--mode", run.get("modes"))]
-    words += repeated("--controller", run.get("controllers"))
-    for name, flag in _GIVEN.items():
-        if run.get(name) is not None:
-            words += [flag, str(run[name])]
-    parameters = run.get("method_parameters") or {}
-    words += repeated("--method-parameter", (f"{name}={value}" for name, value in parameters.items()))
-    if run.get("constraints") == "baumgarte" and not run.get("automatic_gains"):
-        words += [f"--{name}={run[name]}" for name in ("alpha", "beta") if name in run]
-    if run.get("automatic_gains"):
-        words.append("--automatic-gains")
-    words += [f"--{name}" for name in _RUN_FLAGS if run.get(name)]
-    if run.get("geometry") and not any(run.get(name) for name in ("rigid", "ked", "segments")):
-        words += ["--geometry", run["geometry"]]
-    return shlex.join(words + repeated("--stop-at", run.get("stop_at")))
+def command_line(run: Mapping[str, Any]) -> str:
+    """Return the command that repeats a request: that whose name is an entry of it, else `paraflex run`.
 
-
-def verify_command_line(run: dict[str, Any], data: xr.Dataset, engines: Sequence[str]) -> str:
-    """Return the `paraflex verify` command of a request; empty if it is not known."""
-    if "mechanism" not in run:
+    It is empty if the request is not known.
+    """
+    if "mechanism" not in run and "results" not in run:
         return ""
-    words = ["paraflex", "verify", *model_words(run), "--path", run["path"], *repeated("--mode", run.get("modes"))]
-    for name in (str(model) for model in data["model"].values):
-        words += ["--engine" if name in engines else "--model", name]
-    time = data["time"].values
-    words += ["--duration", str(time[-1]), "--samples", str(time.size)]
-    for name in ("tolerance", "method", "segments", "reference", "curvature"):
-        if run.get(name) is not None:
-            words += [_GIVEN[name], str(run[name])]
+    command = next((name for name in _COMMANDS if run.get(name) is True), "run")
+    given = {name: run.get(name) for name in _COMMANDS[command] if name not in _without_effect(run)}
+    if command == "statics" and run.get("held") == []:
+        given["held"] = ["none"]
+    words = ["paraflex", command]
+    for name, value in given.items():
+        if name == "model":
+            words += _model_words(run)
+        elif name == "results":
+            words += [value] if value else []
+        else:
+            words += _option(_FLAGS.get(name, f"--{name.replace('_', '-')}"), value)
     return shlex.join(words)
 
 
-def model_words(run: dict[str, Any]) -> list[str]:
+def _without_effect(run: Mapping[str, Any]) -> set[str]:
+    """Return the kept options that have no effect beside others, and those that follow from them."""
+    without = {"model", "set"} if "results" in run else set()
+    without |= {"geometry"} if any(run.get(name) for name in ("rigid", "ked", "segments")) else set()
+    gains = run.get("constraints") == "baumgarte" and not run.get("automatic_gains")
+    return without if gains else without | {"alpha", "beta"}
+
+
+def _model_words(run: Mapping[str, Any]) -> list[str]:
     """Return the arguments of a command for a model, with its overridden values."""
-    given = run.get("set") or {}
-    texts = (f"{name}={value if isinstance(value, str) else json.dumps(value)}" for name, value in given.items())
-    outside = ["--allow-outside"] if run.get("allow_outside") else []
-    return [mechanism_argument(run["mechanism"]), *repeated("--set", texts), *outside]
+    given = {name: value if isinstance(value, str) else json.dumps(value) for name, value in run.get("set", {}).items()}
+    return [mechanism_argument(run["mechanism"]), *_option("--set", given),
+            *_option("--allow-outside", run.get("allow_outside"))]  # fmt: skip
 
 
-def repeated(flag: str, values: Iterable[str] | None) -> list[str]:
-    """Return the words of an option that is repeated for each value."""
-    return [word for value in values or () for word in (flag, value)]
+def _option(flag: str, value: Any) -> list[str]:
+    """Return the words of an option: a flag, a value, or one value after the other; none if it is not given."""
+    if value is None or value is False:
+        return []
+    if value is True:
+        return [flag]
+    values = [f"{name}={one}" for name, one in value.items()] if isinstance(value, Mapping) else value
+    values = [values] if isinstance(values, str | int | float) else values
+    # A value may begin with a minus.
+    return [word for one in map(str, values)
+            for word in ([f"{flag}={one}"] if one.startswith("-") else [flag, one])]  # fmt: skip
 
 
 def summary_beside(file: Path) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from paraflex.figures.reduction import bound_sentences, states_text, tables
 from paraflex.figures.selection import names_of
 from paraflex.formatting import number
 from paraflex.report.page import Page
+from paraflex.report.provenance import asked, command_line
 from paraflex.report.text import sections
 from paraflex.results.kinds import check_kind
 
@@ -30,6 +31,7 @@ def reduction_page(data: xr.Dataset) -> Page:
             ("damping ratio of responses", number(float(attrs["damping_ratio"]))),
             ("paraflex", str(attrs["paraflex_version"])),
         ],
+        command=command_line(asked(data)),
         figures=_tiles(data),
         more=sections(tables(data)),
         panels=page_panels("reduction", data),

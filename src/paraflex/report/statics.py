@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +17,7 @@ from paraflex.figures.equilibria import quantity_word, unit_of
 from paraflex.formatting import NO_VALUE, number, quantity, text_symbol
 from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, model_words, repeated, verdict_word
+from paraflex.report.provenance import asked, command_line, verdict_word
 from paraflex.report.text import sections
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.kinds import check_kind
@@ -47,7 +46,7 @@ def statics_page(data: xr.Dataset) -> Page:
         subtitle=_subtitle(data),
         verdict=verdict_word(data),
         facts=[("steps", str(summary["steps"])), ("paraflex", str(data.attrs["paraflex_version"]))],
-        command=_command(asked(data)),
+        command=command_line(asked(data)),
         figures=_tiles(data, summary),
         more=sections(equilibria.tables(data)),
         panels=_panels(data),
@@ -94,22 +93,6 @@ def _subtitle(data: xr.Dataset) -> str:
                if role == kind] for kind, word in words.items()
     }  # fmt: skip
     return "; ".join(f"{', '.join(names)} {word}" for word, names in found.items() if names) or "at rest"
-
-
-def _command(run: dict[str, Any]) -> str:
-    """Return the command that reproduces these equilibria; empty if it is not known."""
-    if not run.get("statics"):
-        return ""
-    words = ["paraflex", "statics", *model_words(run)]
-    for name, flag in (("loads", "--load"), ("torques", "--torque"), ("moved", "--move")):
-        words += repeated(flag, (f"{one}={value!r}" for one, value in run.get(name, {}).items()))
-    held = run.get("held")
-    for name, flag in (("held", "--hold"), ("stiffness", "--stiffness")):
-        words += repeated(flag, run.get(name))
-    words += ["--hold", "none"] if held == [] else []
-    for name in ("steps", "buckling", "assembly"):
-        words += [f"--{name}", str(run[name])] if name in run else []
-    return shlex.join(words)
 
 
 def _tiles(data: xr.Dataset, summary: dict[str, Any]) -> list[tuple[str, str, str]]:

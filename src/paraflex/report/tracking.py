@@ -21,7 +21,7 @@ from paraflex.formatting import number, peak, quantity
 from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, common_facts, run_command_line, summary_beside, verdict_word
+from paraflex.report.provenance import asked, command_line, common_facts, summary_beside, verdict_word
 from paraflex.report.text import sections
 from paraflex.results.doubts import doubt_lines, finished, verdict_of
 from paraflex.results.following import headline
@@ -67,7 +67,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
         verdict=verdict_word(data, failed or {}),
         facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
-        command=run_command_line(run),
+        command=command_line(run),
         figures=_figures(data),
         more=[
             *sections([result_table(rows), after_table(rows)]),

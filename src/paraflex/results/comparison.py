@@ -16,6 +16,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.folders import RUN, kind_of_folder
+from paraflex.formatting import number
 from paraflex.mechanism.quantities import known
 from paraflex.results.kinds import kind_of, wrong_kind
 from paraflex.results.loads import load_figures, ranked
@@ -305,7 +306,7 @@ def _differing_ends(data: tuple[xr.Dataset, xr.Dataset], names: tuple[str, str])
     first, second = (each["time"].values for each in data)
     if not np.array_equal(first, second):
         end = min(first[-1], second[-1])
-        how = f"motions are compared until {end:g} s, {names[1]} interpolated by cubic splines"
+        how = f"motions are compared until {number(end)} s, {names[1]} interpolated by cubic splines"
         yield f"samples at different times: {how}"
 
 

@@ -6,16 +6,19 @@ from collections.abc import Mapping
 from typing import Any
 
 from paraflex.designs.sweep import SweepResult
-from paraflex.display import facts, page, sentence, table
+from paraflex.display import described, facts, page, sentence, table
+from paraflex.figures.laws import law_table
+from paraflex.figures.methods import tables
+from paraflex.figures.verification import model_table, path_extent
+from paraflex.formatting import number, quantity
 from paraflex.late import view
 from paraflex.results import summary
 from paraflex.results.doubts import doubt_lines, verdict_of
 from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
-from paraflex.results.metrics import metric_label
 from paraflex.results.validity import validity_line
 from paraflex.studies.agreement import Verification
 from paraflex.studies.comparison import MethodComparison
-from paraflex.studies.law_comparison import LawComparison, unit_shown
+from paraflex.studies.law_comparison import LawComparison
 from paraflex.studies.optimisation.identify import IdentificationResult
 from paraflex.studies.optimisation.indices import IndicesResult
 from paraflex.studies.optimisation.optimise import OptimisationResult
@@ -147,13 +150,6 @@ def sensitivities_html(found: Sensitivities) -> str:
 def verification_html(verification: Verification) -> str:
     """Return tracking error, distance from the reference and wall time of every model in every mode as HTML."""
     found = verification.to_dict()
-    rows = [
-        (mode, name, run["status"], _millimetres(run.get("tracking_error")), _millimetres(run.get("distance_max")),
-         run.get("steps"), run.get("wall_time"))
-        for mode, each in found["modes"].items() for name, run in each["models"].items()
-    ]  # fmt: skip
-    heads = ("mode", "model", "status", "RMS tracking error [mm]", f"largest distance from {found['reference']} [mm]",
-             "steps", "wall time [s]")  # fmt: skip
     why = [
         sentence(f"{mode}, {name}: {run['message']}")
         for mode, each in found["modes"].items()
@@ -161,45 +157,30 @@ def verification_html(verification: Verification) -> str:
         if run["message"]
     ]
     state = _state(verification.complete, verification.interrupted)
-    return page(f"{found['mechanism']}, models compared: {state}", table(heads, rows), *why)
+    tables = [described(model_table(found, mode, path_extent(verification.data))) for mode in found["modes"]]
+    return page(f"{found['mechanism']}, models compared: {state}", *tables, *why)
 
 
 @view.register(MethodComparison)
 def comparison_html(comparison: MethodComparison) -> str:
     """Return error, wall time and number of steps of every run of every method as HTML."""
-    found = comparison.to_dict()
-    rows = [
-        (method["title"], run["tolerance"], run["step"], run["status"], run["error"], run["wall_time"], run["steps"])
-        for method in found["methods"].values()
-        for run in method["runs"]
-    ]
-    heads = ("method", "tolerance [m]", "step [s]", "status", "error [m]", "wall time [s]", "steps")
-    reference = comparison.reference
-    title = None if reference is None else f"{reference.method}, {reference.tolerance:g} m"
-    return page(
-        f"{comparison.mechanism}, {comparison.case}: methods compared",
-        facts([("reference", title), ("its uncertainty [m]", None if reference is None else reference.uncertainty)]),
-        table(heads, rows[:_MOST_LISTED]),
-        _more(len(rows)),
-    )
+    found, reference = comparison.to_dict(), comparison.reference
+    known = [] if reference is None else [
+        ("reference", f"{reference.method}, {number(reference.tolerance)} m"),
+        ("its uncertainty", quantity(reference.uncertainty, "m")),
+    ]  # fmt: skip
+    return page(f"{comparison.mechanism}, {comparison.case}: methods compared", facts(known),
+                *map(described, tables(found)))  # fmt: skip
 
 
 @view.register(LawComparison)
 def laws_html(comparison: LawComparison) -> str:
     """Return the status and the metrics of every control law in every mode as HTML."""
-    found, data = comparison.to_dict(), comparison.dataset
-    units = {name: unit_shown(data, name) for name in comparison.metrics}
-    cells = [(law, mode, cell) for law, one in found["laws"].items() for mode, cell in one["modes"].items()]
-    rows = [
-        (mode, law, cell["status"], *(cell[name] if cell[name] is None else unit.factor * cell[name]
-                                      for name, unit in units.items()))
-        for law, mode, cell in sorted(cells, key=lambda each: comparison.modes.index(each[1]))
-    ]  # fmt: skip
-    heads = [metric_label(name) + (f" [{unit.name}]" if unit.name else "") for name, unit in units.items()]
-    why = [sentence(f"{law} in {mode}: {cell['reason']}") for law, mode, cell in cells if "reason" in cell]
+    found = comparison.to_dict()
+    why = [sentence(f"{law} in {mode}: {cell['reason']}") for law, one in found["laws"].items()
+           for mode, cell in one["modes"].items() if "reason" in cell]  # fmt: skip
     state = _state(comparison.complete, comparison.interrupted)
-    return page(f"{found['mechanism']}, control laws compared: {state}", table(("mode", "law", "status", *heads), rows),
-                *why)  # fmt: skip
+    return page(f"{found['mechanism']}, control laws compared: {state}", described(law_table(comparison.data)), *why)
 
 
 def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:

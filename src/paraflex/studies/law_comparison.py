@@ -13,11 +13,11 @@ import xarray as xr
 
 from paraflex.campaign import Result, Row
 from paraflex.designs.run import STATUSES
+from paraflex.figures.laws import metrics_of
 from paraflex.folders import LAW_COMPARISON
 from paraflex.results.export import export, result_tables
 from paraflex.results.metrics import METRICS, Members, metric_unit
 from paraflex.results.numbers import finite_or_none
-from paraflex.units import DisplayUnit, printed_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +29,6 @@ NOT_RUN = "not run"
 CSV = "laws.csv"
 _TOGETHER = ", "
 _ROWS = ("law", "mode")
-_UNITS, _SHARE = {"m": DisplayUnit("mm", 1e3), "m/s": DisplayUnit("mm/s", 1e3)}, DisplayUnit("%", 100.0)
 _OUTCOME = {
     "status": f"how the run ended: {', '.join(STATUSES)}, or {NOT_RUN}",
     "reason": "why it is not complete, or is doubtful",
@@ -83,7 +82,7 @@ class LawComparison(Result):
     @property
     def metrics(self) -> tuple[str, ...]:
         """Names of the metrics, in the order of the columns."""
-        return tuple(str(name) for name in self.dataset.data_vars if str(name).partition(".")[0] in METRICS)
+        return metrics_of(self.dataset)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -133,12 +132,6 @@ def _plain_cell(cell: xr.Dataset, metrics: Sequence[str]) -> dict[str, Any]:
     reason = str(cell["reason"].item())
     words = {"status": str(cell["status"].item())} | ({"reason": reason} if reason else {})
     return words | {name: finite_or_none(float(cell[name].item())) for name in ("time_reached", *metrics)}
-
-
-def unit_shown(data: xr.Dataset, metric: str) -> DisplayUnit:
-    """Return the unit in which tables show a metric: mm and mm/s for lengths and speeds, % for shares."""
-    unit = data[metric].attrs["units"]
-    return _SHARE if metric.endswith("_share") else _UNITS.get(unit, printed_unit(unit))
 
 
 def law_dataset(

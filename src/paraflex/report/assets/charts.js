@@ -2,9 +2,9 @@
 const charts = (() => {
   const { page, state, element } = report;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
-  const MARKS = { ring: "circle-open", cross: "x-thin-open", square: "square", dot: "circle" };
-  const CIRCLE = "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0";
-  const SHAPES = { ring: CIRCLE, dot: CIRCLE, cross: "M9 1L17 9M9 9L17 1", square: "M10 2h6v6h-6z", bar: "M2 3h22v4h-22z" };
+  const MARKS = { ring: "circle-open", cross: "x-thin-open", square: "square", dot: "circle", triangle: "triangle-up", diamond: "diamond" };
+  const RING = "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0";
+  const SHAPES = { ring: RING, dot: RING, cross: "M9 1L17 9M9 9L17 1", square: "M10 2h6v6h-6z", triangle: "M13 1l4 7h-8z", diamond: "M13 1l4 4l-4 4l-4 -4z", bar: "M4 3h18v4h-18z" };
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
   // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
   const PAPER = 640, LOW = 200, LOW_TITLE = 10;
@@ -142,8 +142,8 @@ const charts = (() => {
     if (!curve.mark || curve.line) svg.append(line);
     if (curve.mark) {
       const mark = document.createElementNS("http://www.w3.org/2000/svg", "path");
-      const filled = curve.mark !== "ring" && curve.mark !== "cross";
-      for (const [name, value] of Object.entries({ d: SHAPES[curve.mark], stroke, "stroke-width": 1.6, fill: filled ? stroke : "none" })) mark.setAttribute(name, value);
+      const d = SHAPES[curve.mark], fill = curve.mark === "ring" ? "none" : stroke;
+      for (const [name, value] of Object.entries({ d, stroke, "stroke-width": 1.6, fill })) mark.setAttribute(name, value);
       svg.append(mark);
     }
     return svg;
