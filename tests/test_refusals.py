@@ -17,7 +17,7 @@ from paraflex.integrators.run import make_problem
 from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
 from paraflex.motion import simulate_motion
-from paraflex.plots.designs import read_designs
+from paraflex.figures.designs import read_designs
 from paraflex.plots.driving import mode_conditions
 from paraflex.plots.film import FilmOptions, plan_film
 from paraflex.plots.planned import drawings, figures_of, find_figure

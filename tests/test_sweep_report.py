@@ -11,7 +11,7 @@ from paraflex.designs.reopen import open_study, run_again
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
 from paraflex.files import library_file
-from paraflex.plots.designs import DesignTable, in_conflict, read_designs, undominated
+from paraflex.figures.designs import DesignTable, in_conflict, read_designs, undominated
 from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows, fronts
 from paraflex.report.designs import reasons
 from paraflex.report.film import frames_of

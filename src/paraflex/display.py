@@ -7,7 +7,7 @@ therefore registered by class with `view`, in higher modules, and `Shown` import
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from functools import singledispatch
 from html import escape
 from importlib import import_module
@@ -56,9 +56,9 @@ def facts(pairs: Iterable[tuple[str, Any]]) -> str:
     return f"<table>{cells}</table>" if cells else ""
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> str:
-    """Return a table with numbers aligned right and text aligned left, an empty text if there are no rows."""
-    body = "".join("<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows)
+def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "", right: Container[int] = ()) -> str:
+    """Return a table with numbers and the columns `right` aligned right, text left; an empty text without rows."""
+    body = "".join("<tr>" + "".join(_cell(value, k in right) for k, value in enumerate(row)) + "</tr>" for row in rows)
     if not body:
         return ""
     style = f'style="text-align: left; border-bottom: {_RULE}"'
@@ -80,6 +80,6 @@ def written(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _cell(value: Any) -> str:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+def _cell(value: Any, right: bool) -> str:
+    number = right or (isinstance(value, (int, float)) and not isinstance(value, bool))
     return f'<td style="text-align: {"right" if number else "left"}">{escape(written(value))}</td>'

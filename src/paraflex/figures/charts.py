@@ -125,6 +125,10 @@ class Curve:
         Whether the curve is omitted from the label at the pointer.
     mark : str
         Marks at its points, "ring", "cross", "square" or "dot", or horizontal bars, "bar"; empty (default) for none.
+    faint : bool
+        Whether the marks are small and pale, as those of many points.
+    thickness : float
+        Height of horizontal bars, as a share of the distance of two names.
     line : bool
         Whether a line joins the points; by default only if they have no marks.
     texts : sequence of str
@@ -142,6 +146,8 @@ class Curve:
     stopped: bool = False
     quiet: bool = False
     mark: Literal["", "ring", "cross", "square", "dot", "bar"] = ""
+    faint: bool = False
+    thickness: float = 0.6
     line: bool = False
     texts: Sequence[str] = ()
 

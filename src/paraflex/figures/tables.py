@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paraflex.formatting import common_unit, number
+from paraflex.formatting import NO_VALUE, common_unit, number
 from paraflex.units import DisplayUnit
 
 Cell = float | int | str | None
@@ -88,12 +88,15 @@ class Table:
         Sentence below the table.
     runs : mapping of str to int
         Runs of a page that rows select, by the name of the row.
+    sortable : bool
+        Whether readers of a page may sort the rows by a column.
     """
 
     title: str
     columns: Sequence[Column]
     note: str = ""
     runs: Mapping[str, int] | None = None
+    sortable: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.columns and self.columns[0].cells)
@@ -121,6 +124,17 @@ class Table:
             for one in self.columns
         ]
         return replace(self, title=f"{self.title} ({len(rows)} of {count})", columns=columns)
+
+
+def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column]:
+    """Return columns whose rows have different SI units in units for display, followed by the column of these units."""
+    shown = [common_unit(unit, [column.cells[k] for column in columns]) for k, unit in enumerate(units)]  # type: ignore[misc]
+    converted = [
+        replace(column, cells=[None if cell is None else unit.factor * cell
+                               for cell, unit in zip(column.cells, shown, strict=True)])  # type: ignore[operator]
+        for column in columns
+    ]  # fmt: skip
+    return [*converted, Column("unit", [NO_VALUE if unit.name in ("", "1") else unit.name for unit in shown])]
 
 
 def _is_known(cell: Cell) -> bool:

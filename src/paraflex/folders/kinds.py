@@ -44,7 +44,7 @@ class ResultKind:
     with_folder : bool
         Whether that function also takes the folder, for the summary in it.
     figures : tuple of str
-        Modules of `paraflex.figures` with the charts and tables of the results.
+        Modules of `paraflex.figures` with the charts and tables of the results, or "module.figure" for one chart.
     drawings : tuple of str
         Names of the figures of the results that Matplotlib draws without charts.
     refusals : mapping of str to (str, str)
@@ -94,21 +94,20 @@ _NOTHING_MOVES = (
     "these results are not a run and show no motion",
     "paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
 )
-_DESIGN_DRAWINGS = ("response_curves", "response_map", "parallel_coordinates", "pareto_front")
+_DESIGN_DRAWINGS = ("response_map", "parallel_coordinates")
 _RUN_DRAWINGS = (
     "mechanism_drawing", "energies", "joint_forces", "beam_stresses", "stress_envelope", "joint_motions",
     "drive_efforts", "frame_loads", "sensors", "controllers", "link_deflections", "point_motions", "link_phases",
 )  # fmt: skip
 _STUDY = ("study.json", "journal.sqlite", "results.parquet")
 RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
-    ResultKind("sweep", STUDY_OF_RUNS, _STUDY,
-               drawings=_DESIGN_DRAWINGS),
+    ResultKind("sweep", STUDY_OF_RUNS, _STUDY, figures=("designs",), drawings=_DESIGN_DRAWINGS),
     ResultKind("optimisation", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "optimisation"},
-               drawings=("convergence", *_DESIGN_DRAWINGS)),
+               figures=("search.convergence", "designs"), drawings=_DESIGN_DRAWINGS),
     ResultKind("identification", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "identification"},
-               drawings=("convergence", "targets_reached", *_DESIGN_DRAWINGS)),
+               figures=("search.convergence", "search.targets_reached", "designs"), drawings=_DESIGN_DRAWINGS),
     ResultKind("indices", STUDY_OF_RUNS, _STUDY, "indices.json", marks={"kind": "indices"},
-               drawings=("sobol_bars", *_DESIGN_DRAWINGS)),
+               figures=("search.sobol_bars", "designs"), drawings=_DESIGN_DRAWINGS),
     ResultKind("verification", VERIFICATION, ("verify.json", "verify.nc"), "verify.nc", "Verification.dataset",
                page="verification.report_of_folder", with_folder=True,
                drawings=("compared_links", "compared_paths", "model_distances", "compared_deflections")),
@@ -125,7 +124,7 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
     ResultKind("runs", RUN_COMPARISON, ("compare.json",)),
     ResultKind("sensitivity", SENSITIVITY, ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
                "sensitivity.json", marks={"parameters": ..., "units": ..., "runs": ...},
-               drawings=("elasticities",)),
+               figures=("sensitivity",)),
     ResultKind("linear", LINEAR_MODELS, ("linear.json", "linear.nc"), "linear.nc", "linear_dataset", None,
                "linear.linear_page", refusals={
         "motion": ("these are linear models, not a run",

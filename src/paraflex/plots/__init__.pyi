@@ -6,14 +6,19 @@ from .agreement import (
     model_distances as model_distances,
 )
 from .charts import (
+    convergence as convergence,
+    elasticities as elasticities,
     force_travel as force_travel,
     free_travels as free_travels,
     joint_force_travel as joint_force_travel,
+    pareto_front as pareto_front,
+    response_curves as response_curves,
+    sobol_bars as sobol_bars,
     stiffness_travel as stiffness_travel,
     stress_travel as stress_travel,
+    targets_reached as targets_reached,
 )
 from .controlled import controllers as controllers
-from .derivatives import elasticities as elasticities
 from .drawing import mechanism_drawing as mechanism_drawing
 from .driving import (
     actuation_condition as actuation_condition,
@@ -41,7 +46,6 @@ from .measured import sensors as sensors
 from .methods import work_precision as work_precision
 from .mode_shapes import mode_shapes as mode_shapes
 from .modes import motor_torques as motor_torques, tracking_errors as tracking_errors
-from .optimisation import convergence as convergence, sobol_bars as sobol_bars, targets_reached as targets_reached
 from .parallel import parallel_coordinates as parallel_coordinates
 from .phase import link_phases as link_phases, phase_diagrams as phase_diagrams
 from .reduction import (
@@ -50,7 +54,6 @@ from .reduction import (
     reduced_responses as reduced_responses,
     reduction_errors as reduction_errors,
 )
-from .responses import pareto_front as pareto_front, response_curves as response_curves
 from .save import save_figures as save_figures
 from .spectra import numerical_damping as numerical_damping
 from .stress import (

@@ -288,36 +288,12 @@ _DRAWINGS: Mapping[str, Figure] = {
             module="spectra",
             takes="nothing",
         ),
-        Figure("response_curves", "metrics against parameters", module="responses", takes="designs"),
         Figure("response_map", "contours of metrics over two parameters", module="maps", takes="designs"),
         Figure(
             "parallel_coordinates",
             "parameters and metrics of every design on parallel axes",
             module="parallel",
             takes="designs",
-        ),
-        Figure(
-            "pareto_front", "two metrics of every design, and the Pareto front", module="responses", takes="designs"
-        ),
-        Figure(
-            "convergence",
-            "objective of every design, and the least up to it",
-            module="optimisation",
-            written_as="convergence",
-        ),
-        Figure(
-            "targets_reached",
-            "every target at the start and at the best design",
-            module="optimisation",
-            written_as="targets",
-        ),
-        Figure("sobol_bars", "first-order and total Sobol indices", module="optimisation", written_as="indices"),
-        Figure(
-            "elasticities",
-            "elasticities: change of metrics in % per % of parameter",
-            module="derivatives",
-            takes="run",
-            written_as="elasticities",
         ),
         Figure("mode_conditions", "worst condition number of every mode along the path", module="driving"),
     )

@@ -38,9 +38,15 @@ from paraflex.units import DisplayUnit
 MOST_LINES = 7
 # Decades of a logarithmic axis shown below its largest value.
 _DECADES = 9.0
+# Largest number of panels of designs one below the other.
+_MOST_STACKED = 4
+# Number of marks from which they are smaller.
+_MANY = 30
+# Room left and right of marks and bars, as a share of the width of their panel.
+_ROOM = 0.05
 _MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o"}
-# Height of a bar, as a share of the distance of two names.
-_BAR = 0.6
+# Height of the thinnest bars [mm].
+_THINNEST = 1.8
 # Dashes by their numbers in a look.
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), ":", (0, (5, 1.5, 1, 1.5)), (0, (9, 2)))
 _DESIRED: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 0.8, "zorder": 2.5}
@@ -72,7 +78,9 @@ def plotting_function(name: str) -> Callable[..., Figure]:
     """Return the plotting function of a figure of the catalogue: of results or their folder, a mode, and options."""
     entry = all_figures()[name]
 
-    def plot(data: Any, mode: str | None = None, **options: Any) -> Figure:
+    def plot(data: Any, *args: Any, **options: Any) -> Figure:
+        options = dict(list(shown.bind(data, *args, **options).arguments.items())[1:])
+        mode = options.pop("mode", None) if entry.takes == "mode" else None
         if entry.takes == "mode" and mode is None and "mode" in getattr(data, "dims", ()):
             mode = default_mode(data)
         found = prepared(data, mode)
@@ -85,9 +93,12 @@ def plotting_function(name: str) -> Callable[..., Figure]:
 
     own = list(inspect.signature(entry.charts).parameters.values())
     modes = [inspect.Parameter("mode", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None)]
+    shown = inspect.Signature([own[0], *(modes if entry.takes == "mode" else []), *own[1:]])
     plot.__name__ = plot.__qualname__ = name
+    # Annotations are evaluated where they are written.
+    plot.__module__ = entry.charts.__module__
     plot.__doc__ = f"Plot {entry.shows}.\n\n{inspect.getdoc(entry.charts)}"
-    plot.__signature__ = inspect.Signature([own[0], *(modes if entry.takes == "mode" else []), *own[1:]])  # type: ignore[attr-defined]
+    plot.__signature__ = shown  # type: ignore[attr-defined]
     return drawn(plot)
 
 
@@ -114,7 +125,9 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
     rows = _cells(entry, charts, runs)
     if len(rows[0]) == 1 and rows[0][0].chart.equal and len(rows) == 1:
         return _plane(rows[0][0], time)
-    columns = len(rows[0]) if entry.panels == "choices" else _columns(entry, sum(map(len, rows)), charts)
+    columns = (
+        len(rows[0]) if len(rows[0]) > 1 and entry.panels == "choices" else _columns(entry, sum(map(len, rows)), charts)
+    )
     cells = [cell for row in rows for cell in row]
     figure, axes = panel_grid(
         len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS
@@ -123,14 +136,27 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
         _draw(panel, cell, time)
     if all(cell.chart.over_time for cell in cells):
         label_outer_time(axes)
+    if entry.panels == "choices":
+        _label_rows(axes)
     names = max(len(chart.axis(None).names) for chart in charts)
-    return lay_out(figure, axes, panel_height=LIST_LINE * names + 2.0 if names else entry.height)
+    line = max(
+        LIST_LINE, *(_THINNEST / one.thickness for chart in charts for one in chart.curves if one.mark == "bar"), 0.0
+    )
+    return lay_out(figure, axes, panel_height=line * names + 2.0 if names else entry.height)
+
+
+def _label_rows(axes: Any) -> None:
+    """Remove the label of the vertical axis from panels beside one with the same label."""
+    for row in axes:
+        for panel in row[1:]:
+            if panel.get_ylabel() == row[0].get_ylabel():
+                panel.set_ylabel("")
 
 
 def _columns(entry: CatalogueFigure, count: int, charts: Sequence[Chart]) -> int:
     if is_narrow():
         return 1
-    return entry.columns or (min(count, 3) if not charts[0].over_time else 1)
+    return min(count, entry.columns or (1 if charts[0].over_time else 3))
 
 
 def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Sequence[str]) -> list[list[_Cell]]:
@@ -140,6 +166,8 @@ def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Sequence[str])
         return [[_Cell(chart, r, 0, name) for r, name in enumerate(runs)] for chart in charts]
     if entry.panels == "choices":
         members = max(len(chart.choices) - chart.overview for chart in charts)
+        if entry.takes == "designs" and is_narrow():
+            members = min(members, max(_MOST_STACKED // len(charts), 1))
         return [[_member(chart, run, k) for chart in charts] for k in range(max(members, 1))]
     several = len(charts) > 1
     return [[_Cell(chart, run, 0 if chart.choices else None, chart.title if several else "")] for chart in charts]
@@ -150,7 +178,8 @@ def _member(chart: Chart, run: int | None, k: int) -> _Cell:
     if not chart.choices:
         return _Cell(chart, run, None, chart.title)
     choice = k + chart.overview
-    return _Cell(chart, run, choice, f"{chart.choices[choice]}: {chart.axis(choice).name}")
+    title, name = chart.choices[choice], chart.axis(choice).name
+    return _Cell(chart, run, choice, "" if title == name else f"{title}: {name}" if name else title)
 
 
 def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
@@ -170,6 +199,8 @@ def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
         label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
         low, high = units.x.factor * span.low, units.x.factor * span.high
         panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
+    if any(curve.mark not in ("", "ring") for curve in shown):
+        panel.margins(x=_ROOM)
     values = joined(units.of(cell.choice).factor * np.asarray(curve.y, dtype=float) for curve in shown)
     _set_scale(panel, "y", axis, values, units.of(cell.choice))
     _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x)
@@ -197,12 +228,15 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
     colour = BLACK if curve.look.colour is None else COLOURS[curve.look.colour % len(COLOURS)]
     label = mathematics(curve.name) if curve.name else None
     if curve.mark == "bar":
-        panel.barh(y, x, height=_BAR, color=colour, linewidth=0.0, label=label)
+        panel.barh(y, x, height=curve.thickness, color=colour, linewidth=0.0, label=label)
         return
     if curve.mark:
         style = _DASHES[curve.look.dash] if curve.line else ""
-        panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], markersize=4.0, color=colour, label=label,
-                   markerfacecolor="white" if curve.mark == "ring" else colour)  # fmt: skip
+        size, pale = 4.0 if y.size <= _MANY else 2.8, {}
+        if curve.faint:
+            size, pale = 2.4, {"alpha": max(0.15, min(0.6, 40.0 / max(y.size, 1))), "markeredgewidth": 0.6}
+        panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], markersize=size, color=colour, label=label,
+                   markerfacecolor="white" if curve.mark == "ring" else colour, **pale)  # fmt: skip
         return
     if curve.desired and single:
         panel.plot(x, y, label=label, **_DESIRED)
@@ -227,7 +261,7 @@ def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: Displ
             panel.yaxis.set_minor_locator(NullLocator())
             top = positive.max()
             set_limits(max(0.5 * np.percentile(positive, 0.5), top * 10.0**-_DECADES), 2.0 * top)
-        else:
+        elif not panel.margins()[0]:
             set_limits(positive.min(), positive.max())
     elif axis.extent:
         keep_flat(panel, unit.factor * axis.extent, direction)

@@ -25,6 +25,7 @@ from paraflex.figures.charts import Panel
 from paraflex.folders import added_to
 from paraflex.formatting import typeset
 from paraflex.plots.themes import THEMES
+from paraflex.report.designs import Designs
 from paraflex.report.film import Animation
 from paraflex.report.packing import Series
 from paraflex.writing import write_text
@@ -89,14 +90,6 @@ class Curve:
     texts: Sequence[str] = ()
 
 
-class Picker(NamedTuple):
-    """Choice of a column for a chart of designs: name, columns, and index of the initial one."""
-
-    name: str
-    columns: Sequence[int]
-    chosen: int = 0
-
-
 @dataclass(frozen=True)
 class Chart:
     """Chart of a page.
@@ -123,10 +116,6 @@ class Chart:
         Additional parts of Plotly's `layout`, such as numbers of axes and shapes.
     figure : mapping, optional
         Plotly's own `data` and `layout` in place of curves; colours and fonts of the page are added.
-    drawer : str
-        Chart of the page's designs in place of curves: "responses", "front", "parallel" or "distribution".
-    pickers : sequence of Picker
-        Choices of columns that the reader makes for the drawer.
     """
 
     identity: str
@@ -143,62 +132,6 @@ class Chart:
     note: str = ""
     layout: Mapping[str, Any] = field(default_factory=dict)
     figure: Mapping[str, Any] | None = None
-    drawer: str = ""
-    pickers: Sequence[Picker] = ()
-
-
-@dataclass(frozen=True)
-class DesignColumn:
-    """Column with one number per run.
-
-    Attributes
-    ----------
-    identity : str
-        Name of the column in the table of the study.
-    name, unit : str
-        Name and unit as shown.
-    values : (k,) array
-        Values in that unit; NaN where there is none.
-    parameter : bool
-        Whether the column is a parameter or (default) a metric.
-    log : bool
-        Whether its axis is logarithmic.
-    """
-
-    identity: str
-    name: str
-    unit: str
-    values: ArrayLike
-    parameter: bool = False
-    log: bool = False
-
-
-@dataclass(frozen=True)
-class Designs:
-    """Runs of many designs for the charts of the page.
-
-    Attributes
-    ----------
-    columns : sequence of DesignColumn
-        Columns, parameters first.
-    telling : str
-        Name of the property that distinguishes series of runs, such as "mode".
-    series : sequence of (str, Look)
-        Names and looks of the series.
-    member : (k,) array of int
-        Index of the series of each run.
-    number : (k,) array of int
-        Number of the design of each run.
-    shown : (k,) array of int
-        Index of each run among the runs of the page; -1 for most.
-    """
-
-    columns: Sequence[DesignColumn]
-    telling: str
-    series: Sequence[tuple[str, Look]]
-    member: ArrayLike
-    number: ArrayLike
-    shown: ArrayLike
 
 
 @given_as("a page", "what tracking_page or motion_page returns")
@@ -343,7 +276,7 @@ def _data(page: Page) -> dict[str, Any]:
         "selected": page.selected,
         "panels": panels(page.panels),
         "survey": panels(page.survey),
-        "designs": None if page.designs is None else _designs(page.designs, series),
+        "designs": None if page.designs is None else page.designs.to_dict(series),
         "film": None if page.film is None else page.film.to_dict(),
         "palettes": {name: look.links for name, look in THEMES.items()},
         "series": series.to_dict(),
@@ -353,15 +286,6 @@ def _data(page: Page) -> dict[str, Any]:
 def _fields(thing: Any, *left_out: str) -> dict[str, Any]:
     """Return the fields of a dataclass, except some, as a dict."""
     return {one.name: getattr(thing, one.name) for one in fields(thing) if one.name not in left_out}
-
-
-def _designs(designs: Designs, series: Series) -> dict[str, Any]:
-    numbers = {name: series.add(getattr(designs, name), exact=True) for name in ("member", "number", "shown")}
-    return numbers | {
-        "telling": designs.telling,
-        "columns": [_fields(column, "values") | {"row": series.add(column.values)} for column in designs.columns],
-        "series": [{"name": name} | look._asdict() for name, look in designs.series],
-    }
 
 
 def _described(chart: described.Chart, series: Series, time: int) -> dict[str, Any]:
@@ -382,7 +306,8 @@ def _described(chart: described.Chart, series: Series, time: int) -> dict[str, A
         "curves": [curve(one) for one in chart.curves], "choices": list(chart.choices), "choosing": chart.choosing,
         "log": described.is_logarithmic(chart.axis(None), ys), "log_x": described.is_logarithmic(chart.x, xs),
         "equal": chart.equal, "over_time": chart.over_time, "note": chart.note, "layout": _layout(chart, units),
-        "figure": None, "drawer": "", "pickers": [],
+        "figure": None, "drawer": getattr(chart, "drawer", ""),
+        "pickers": [picker._asdict() for picker in getattr(chart, "pickers", ())],
     }  # fmt: skip
 
 
@@ -409,8 +334,7 @@ def _chart(chart: Chart | described.Chart, series: Series, time: int) -> dict[st
     if isinstance(chart, described.Chart):
         return _described(chart, series, time)
     return _fields(chart) | {
-        "pickers": [picker._asdict() for picker in chart.pickers],
-        "choices": list(chart.choices),
+        "drawer": "", "pickers": [], "choices": list(chart.choices),
         "figure": None if chart.figure is None else dict(chart.figure),
         "curves": [
             _fields(curve, "look") | curve.look._asdict()

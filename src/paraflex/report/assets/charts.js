@@ -3,6 +3,8 @@ const charts = (() => {
   const { page, state, element } = report;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
   const MARKS = { ring: "circle-open", cross: "x-thin-open", square: "square", dot: "circle" };
+  const ROUND = "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0";
+  const SHAPES = { ring: ROUND, dot: ROUND, cross: "M9 1L17 9M9 9L17 1", square: "M9 1h8v8h-8z", bar: "M4 3h18v4h-18z" };
   const SAMPLES = ["", "6 3", "1.5 2.5", "6 2.5 1.5 2.5", "9 3"];
   // On paper: width of charts, height of flat ones, and the size of the titles beside them [px].
   const PAPER = 640, LOW = 200, LOW_TITLE = 10;
@@ -31,12 +33,13 @@ const charts = (() => {
     return shown.map((curve) => {
       const chosen = beside && curve.run === state.run;
       if (curve.mark === "bar") return {
-        type: "bar", orientation: "h", name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y), width: 0.6,
+        type: "bar", orientation: "h", name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y), width: curve.thickness,
         marker: { color: lineColour(curve) }, hovertemplate: "%{x:.4~g}<extra>%{fullData.name}</extra>", visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       if (curve.mark) return {
         type: "scatter", mode: curve.line ? "lines+markers" : "markers", line: { color: lineColour(curve), dash: DASHES[curve.dash], width: 1.4 }, name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y),
-        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: curve.mark === "ring" ? 9 : 8, line: { width: 1.6, color: lineColour(curve) } },
+        opacity: curve.faint ? 0.5 : 1,
+        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: curve.faint ? 6 : curve.mark === "ring" ? 9 : 8, line: { width: 1.6, color: lineColour(curve) } },
         text: curve.texts.map(plain), hovertemplate: `${curve.texts.length ? "%{text}" : "%{x:.4~g}, %{y:.4~g}"}<extra>%{fullData.name}</extra>`, visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       return {
@@ -102,7 +105,7 @@ const charts = (() => {
     }
     return {
       ...common,
-      hovermode: overTime ? "x unified" : "closest",
+      hovermode: overTime ? "x unified" : "closest", barmode: "overlay",
       xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : logX ? { type: "log", dtick: 1, tickformat: "~g", hoverformat: ".4~g" } : added.xaxis || {}),
       yaxis: axis(yLabel(chart), { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal ? { scaleanchor: "x" } : {}), hoverformat: ".4~g", ...added.yaxis }),
       shapes: added.shapes || [],
@@ -137,8 +140,8 @@ const charts = (() => {
     for (const [name, value] of Object.entries({ x1: 0, x2: 26, y1: 5, y2: 5, stroke, "stroke-width": 2, "stroke-dasharray": SAMPLES[curve.dash] })) line.setAttribute(name, value);
     if (curve.mark) {
       const mark = document.createElementNS("http://www.w3.org/2000/svg", "path");
-      const d = curve.mark === "ring" ? "M17 5a4 4 0 1 1 -8 0a4 4 0 1 1 8 0" : "M9 1L17 9M9 9L17 1";
-      for (const [name, value] of Object.entries({ d, stroke, "stroke-width": 1.6, fill: "none" })) mark.setAttribute(name, value);
+      const fill = ["square", "dot", "bar"].includes(curve.mark) ? stroke : "none";
+      for (const [name, value] of Object.entries({ d: SHAPES[curve.mark], stroke, "stroke-width": 1.6, fill })) mark.setAttribute(name, value);
       svg.append(mark);
     } else svg.append(line);
     return svg;
