@@ -31,6 +31,6 @@ def _report(console: Console, result: IdentificationResult) -> None:
     else:
         described = ", ".join(f"{share:+.2f} {name}" for name, share in found.weakest.items())
         console.print(
-            f"the targets cannot distinguish the parameters (condition {number(found.condition, 3)}): they hardly change "
-            f"along {described}, as fractions of the ranges"
+            f"the targets cannot distinguish the parameters (condition {number(found.condition, 3)}): they hardly "
+            f"change along {described}, as fractions of the ranges"
         )

@@ -16,6 +16,7 @@ from paraflex.formatting import common_unit, display_unit, labelled
 from paraflex.units import DisplayUnit
 
 Array = NDArray[np.float64]
+Mark = Literal["", "ring", "cross", "square", "dot", "bar"]
 
 # Numbers of colours and of dashes; the latter include the solid line.
 N_COLOURS, N_DASHES = 8, 5
@@ -145,7 +146,7 @@ class Curve:
     desired: bool = False
     stopped: bool = False
     quiet: bool = False
-    mark: Literal["", "ring", "cross", "square", "dot", "bar"] = ""
+    mark: Mark = ""
     faint: bool = False
     thickness: float = 0.6
     line: bool = False

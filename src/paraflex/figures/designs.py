@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.catalogue import figure
-from paraflex.figures.charts import Axis, Chart, Curve, is_wide, look, stairs
+from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
 from paraflex.figures.selection import place_of
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, axis_unit, text_symbol
@@ -34,7 +34,7 @@ _FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "rea
 _NOT_VARIED = 1e-9
 # Ratio of values from which the axis of a metric is logarithmic.
 _WIDE = 50.0
-_MARKS = ("dot", "square", "cross", "ring")
+_MARKS: tuple[Mark, ...] = ("dot", "square", "cross", "ring")
 # Largest numbers of columns and rows of panels.
 _MOST_PARAMETERS, _MOST_METRICS = 3, 3
 # Largest number of parameter values with a median each; more values are divided into this number of groups.
@@ -161,6 +161,16 @@ class DesignTable:
             log = not (values <= 0.0).any() and is_wide(values, _WIDE)
         return Axis(text_symbol(label), unit, log=log, shown=axis_unit(unit, values))
 
+    def column(self, name: str) -> Array:
+        """Return the values of a parameter or metric in SI units."""
+        return self.parameters[name] if name in self.parameters else self.metrics[name]
+
+    def labelled(self, name: str) -> tuple[str, float]:
+        """Return the axis label of a parameter or metric, and the factor of its values to the unit of the label."""
+        axis = self.axis(name)
+        unit = axis.unit_for(self.column(name))
+        return axis.label(unit), unit.factor
+
     def series_name(self, pair: tuple[str, str]) -> str:
         """Return a distinctive name of the runs of a path and mode."""
         path, mode = pair
@@ -209,7 +219,7 @@ def _in_order(table: Any) -> DesignTable:
         units={name: units[name] for name in own},
         run=table["run"].to_numpy().astype(int),
         design=table["design"].to_numpy().astype(int),
-        **texts,
+        **texts,  # pyright: ignore[reportArgumentType]
     )
     order = np.argsort(designs.run, kind="stable")
     return designs if np.array_equal(order, np.arange(order.size)) else designs.only(order)

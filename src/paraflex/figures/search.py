@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.figures.catalogue import figure
-from paraflex.figures.charts import Array, Axis, Chart, Curve, Look, is_wide, look, stairs
+from paraflex.figures.charts import Array, Axis, Chart, Curve, Look, Mark, is_wide, look, stairs
 from paraflex.figures.designs import column_label
 from paraflex.figures.tables import Column, Table, in_row_units
 from paraflex.formatting import number
@@ -50,7 +50,8 @@ def convergence(figures: Mapping[str, Any]) -> Iterator[Chart]:
     shown, held = np.minimum(values, top), np.array([each[2] for each in ran], dtype=bool)
     numbers = np.array([each[0] for each in ran], dtype=float)
     curves = []
-    for name, own, mark in (("designs", held, "dot"), ("passing a limit", ~held, "cross")):
+    kinds: tuple[tuple[str, Array, Mark], ...] = (("designs", held, "dot"), ("passing a limit", ~held, "cross"))
+    for name, own, mark in kinds:
         if own.any():
             texts = [f"design {int(k)}: {number(value)}" for k, value in zip(numbers[own], values[own], strict=True)]
             curves.append(Curve(name, shown[own], numbers[own], mark=mark, faint=True, texts=texts))
@@ -65,7 +66,9 @@ def convergence(figures: Mapping[str, Any]) -> Iterator[Chart]:
         curves.append(Curve("not running", np.full(len(failed), np.exp(below) if log else below), failed, _FAILED,
                             mark="cross", texts=[f"design {number} does not run" for number in failed]))  # fmt: skip
     goal = "root mean square residual" if figures["kind"] == IDENTIFICATION else "objective"
-    yield Chart("convergence", "Convergence", Axis(goal, log=log), curves, Axis("design"))
+    notes = ["Crosses: designs that exceed a limit."] if not held.all() else []
+    notes += ["Designs far above the first are at the upper edge."] if values.max() > top else []
+    yield Chart("convergence", "Convergence", Axis(goal, log=log), curves, Axis("design"), note=" ".join(notes))
 
 
 @figure(
@@ -85,7 +88,10 @@ def targets_reached(figures: Mapping[str, Any]) -> Iterator[Chart]:
         return
     lines = np.arange(len(targets), dtype=float)
     curves = [Curve("target", [-0.6, lines[-1] + 0.6], [1.0, 1.0], Look(1))]
-    for key, name, mark, own in (("start", "start", "ring", Look()), ("reached", "best", "square", _BEST)):
+    kinds: tuple[tuple[str, str, Mark, Look], ...] = (
+        ("start", "start", "ring", Look()), ("reached", "best", "square", _BEST),
+    )  # fmt: skip
+    for key, name, mark, own in kinds:
         curves.append(Curve(name, lines, [each[key] / each["value"] for each in targets], own, mark=mark))
     names = _target_names(targets, ("mode", "metric", "path"))
     yield Chart("targets", "Targets", Axis("", names=names), curves, Axis("reached / target"))
@@ -97,8 +103,6 @@ def targets_reached(figures: Mapping[str, Any]) -> Iterator[Chart]:
 )  # fmt: skip
 def sobol_bars(figures: Mapping[str, Any]) -> Iterator[Chart]:
     """Yield the chart of first-order and total Sobol indices of every parameter, by metric, path and mode.
-
-    Lines are intervals of 95 %.
 
     Parameters
     ----------
@@ -114,14 +118,14 @@ def sobol_bars(figures: Mapping[str, Any]) -> Iterator[Chart]:
     for choice, ((metric, path, mode), rows) in enumerate(found.items()):
         choices.append(", ".join(filter(None, (column_label(metric), path if several else "", mode))))
         for k, (key, name) in enumerate((("first", "first order"), ("total", "total"))):
-            y, x = np.arange(len(rows)) + 0.38 * (k - 0.5), np.array([row[key] for row in rows], dtype=float)
-            wide = np.array([row[f"{key}_confidence"] for row in rows], dtype=float)
+            y = np.arange(len(rows), dtype=float) + 0.38 * (k - 0.5)
+            x, wide = (np.array([row[one] for row in rows], float) for one in (key, f"{key}_confidence"))
             curves.append(Curve(name, y, x, look(k), choice=choice, mark="bar", thickness=0.34))
-            curves.append(Curve("interval of 95 %", *_gapped(y, x, wide), choice=choice, quiet=True))
+            curves.append(Curve("", *_gapped(y, x, wide), choice=choice, quiet=True))
     if curves:
         names = [row["parameter"] for row in next(iter(found.values()))]
-        yield Chart("indices", "Sobol indices", Axis("", names=names), curves, Axis("share of the variance", zero=True),
-                    choices, choosing="metric")  # fmt: skip
+        axis = Axis("share of the variance (lines: intervals of 95 %)", zero=True)
+        yield Chart("indices", "Sobol indices", Axis("", names=names), curves, axis, choices, choosing="metric")
 
 
 def _gapped(y: Array, x: Array, wide: Array) -> tuple[Array, Array]:
@@ -134,7 +138,7 @@ def _gapped(y: Array, x: Array, wide: Array) -> tuple[Array, Array]:
 
 
 def tables(found: Mapping[str, Any], units: Mapping[str, str]) -> Iterator[Table]:
-    """Yield the tables of a search: its parameters, and its targets or metrics, none if it found no design; of indices.
+    """Yield the tables of a search: its parameters, and its targets or metrics; none if it found no design.
 
     Parameters
     ----------
@@ -146,8 +150,6 @@ def tables(found: Mapping[str, Any], units: Mapping[str, str]) -> Iterator[Table
     if found.get("values"):
         yield parameter_table(found, units)
         yield (target_table if found["kind"] == IDENTIFICATION else metric_table)(found, units)
-    if found.get("indices"):
-        yield index_table(found)
 
 
 def parameter_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table:
@@ -162,10 +164,11 @@ def parameter_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table
     if bounds:
         words = {"low": "lowest allowed", "high": "highest allowed"}
         columns.append(Column("bound", [words.get(bounds.get(name, ""), "") for name in values]))
-    reasons = confidence.get("reasons") or {}
-    note = " ".join(f"No interval of confidence of {', '.join(name for name in reasons if reasons[name] == why)}: {why}."
-                    for why in dict.fromkeys(reasons.values()))  # fmt: skip
-    names = Column("parameter", [name.replace("_", " ") for name in values])
+    whose: dict[str, list[str]] = {}
+    for name, why in (confidence.get("reasons") or {}).items():
+        whose.setdefault(why, []).append(name)
+    note = " ".join(f"No interval of confidence of {', '.join(names)}: {why}." for why, names in whose.items())
+    names = Column("parameter", list(values))
     return Table("Parameters found", [names, *columns], note).filled()
 
 
@@ -192,7 +195,10 @@ def target_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table:
         [units.get(one["metric"], "") for one in targets],
     )  # fmt: skip
     off = [_relative(one["reached"], one["value"]) for one in targets]
+    # Residuals are these differences unless a target has a weight or is not relative.
     residuals = [one.get("residual") for one in targets]
+    if np.allclose(np.array(residuals, dtype=float), np.array(off, dtype=float), equal_nan=True):
+        residuals = [None] * len(targets)
     return Table("Targets", [
         Column("metric", _target_names(targets, ("metric", "mode", "path"), ", ")), *columns,
         Column("off by", off, shown=PERCENT, digits=3), Column("residual", residuals, digits=3),
@@ -204,10 +210,11 @@ def index_table(found: Mapping[str, Any]) -> Table:
     rows = found["indices"]
     words = [Column("metric", [column_label(row["metric"]) for row in rows])]
     words += [Column(key, [row[key] for row in rows]) for key in ("path", "mode", "parameter")]
-    numbers = [Column(name, [row[key] for row in rows], digits=3) for name, key in (
-        ("first order", "first"), ("±", "first_confidence"), ("total", "total"), ("±", "total_confidence"),
-    )]  # fmt: skip
-    return Table("Sobol indices and half the widths of their intervals of 95 %", [*words, *numbers])
+    numbers = []
+    for key, name in (("first", "first order"), ("total", "total")):
+        numbers.append(Column(name, [row[key] for row in rows], digits=3))
+        numbers.append(Column("± (95 %)", [row[f"{key}_confidence"] for row in rows], digits=3))
+    return Table("Sobol indices", [*words, *numbers])
 
 
 def _relative(value: float | None, other: float | None) -> float | None:

@@ -20,7 +20,7 @@ _FILLED = 0.8
 
 @figure(
     "elasticities: change of metrics in % per % of parameter", takes="run", written_as="elasticities",
-    variables=("runs",), columns=1,
+    variables=("runs",),
 )  # fmt: skip
 def elasticities(figures: Mapping[str, Any], run: int = 0) -> Iterator[Chart]:
     """Yield the chart of elasticities: the change of each metric in per cent per one per cent of each parameter.
@@ -41,8 +41,8 @@ def elasticities(figures: Mapping[str, Any], run: int = 0) -> Iterator[Chart]:
     for k, parameter in enumerate(parameters):
         values = [shown["metrics"][metric]["relative"][parameter] for metric in metrics]
         y = np.arange(len(metrics)) + pitch * (k - 0.5 * (len(parameters) - 1))
-        curves.append(Curve(_name(parameter), y, np.array(values, dtype=float), look(k), mark="bar",
-                            thickness=0.9 * pitch))  # fmt: skip
+        name, x = text_symbol(parameter.replace("_", " ")), np.array(values, dtype=float)
+        curves.append(Curve(name, y, x, look(k), mark="bar", thickness=0.9 * pitch))
     title = ", ".join(filter(None, (figures["mechanism"], shown["path"], shown["mode"])))
     yield Chart("elasticities", title, Axis("", names=list(map(column_label, metrics))), curves,
                 Axis("elasticity", "% / %", zero=True))  # fmt: skip
@@ -56,7 +56,7 @@ def tables(figures: Mapping[str, Any], run: int, parameters: Sequence[str] = ())
     def columns(key: str) -> Iterator[Column]:
         for name in parameters or figures["parameters"]:
             value = number(figures["parameters"][name]["value"])
-            yield Column(f"{_name(name)}\n{value}", [one[key][name] for one in metrics.values()], digits=3)
+            yield Column(f"{name}\n{value}", [one[key][name] for one in metrics.values()], digits=3)
 
     names = Column("metric", list(map(column_label, metrics)))
     values = in_row_units([Column("value", [one["value"] for one in metrics.values()])],
@@ -65,7 +65,3 @@ def tables(figures: Mapping[str, Any], run: int, parameters: Sequence[str] = ())
     yield Table("Derivatives, in the units of metrics and parameters", [
         names, Column("unit", [units.get(name, "") for name in metrics]), *columns("derivatives"),
     ])  # fmt: skip
-
-
-def _name(parameter: str) -> str:
-    return text_symbol(parameter.replace("_", " "))

@@ -169,7 +169,7 @@ def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Sequence[str])
         if entry.takes == "designs" and is_narrow():
             members = min(members, max(_MOST_STACKED // len(charts), 1))
         return [[_member(chart, run, k) for chart in charts] for k in range(max(members, 1))]
-    several = len(charts) > 1
+    several = len(charts) > 1 or entry.takes == "run"
     return [[_Cell(chart, run, 0 if chart.choices else None, chart.title if several else "")] for chart in charts]
 
 
@@ -232,7 +232,8 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         return
     if curve.mark:
         style = _DASHES[curve.look.dash] if curve.line else ""
-        size, pale = 4.0 if y.size <= _MANY else 2.8, {}
+        size = 4.0 if y.size <= _MANY else 2.8
+        pale: dict[str, Any] = {}
         if curve.faint:
             size, pale = 2.4, {"alpha": max(0.15, min(0.6, 40.0 / max(y.size, 1))), "markeredgewidth": 0.6}
         panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], markersize=size, color=colour, label=label,
@@ -261,7 +262,7 @@ def _set_scale(panel: Axes, direction: Any, axis: Axis, values: Any, unit: Displ
             panel.yaxis.set_minor_locator(NullLocator())
             top = positive.max()
             set_limits(max(0.5 * np.percentile(positive, 0.5), top * 10.0**-_DECADES), 2.0 * top)
-        elif not panel.margins()[0]:
+        elif panel.get_xmargin() == 0.0:
             set_limits(positive.min(), positive.max())
     elif axis.extent:
         keep_flat(panel, unit.factor * axis.extent, direction)

@@ -55,11 +55,10 @@ def response_map(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
     shape = (len(chosen), 1) if is_narrow() else (1, len(chosen))
     figure, axes = panels(*shape, width=ONE_COLUMN if len(chosen) == 1 else TWO_COLUMNS)
     for panel, metric in zip(axes.flat, chosen, strict=True):
-        across, up, level = map(table.axis, (*names[:2], metric))
-        x, y = (axis.shown.factor * series[0].parameters[name] for axis, name in zip((across, up), names, strict=False))
-        _draw_map(panel, x, y, level.shown.factor * series[0].metrics[metric])
-        labels = [mathematics(axis.label(axis.shown)) for axis in (across, up, level)]
-        panel.set(xlabel=labels[0], ylabel=labels[1], title=labels[2])
+        shown = [(series[0].column(name), *table.labelled(name)) for name in (*names[:2], metric)]
+        _draw_map(panel, *(factor * values for values, _, factor in shown))
+        across, up, title = (mathematics(label) for _, label, _ in shown)
+        panel.set(xlabel=across, ylabel=up, title=title)
     return lay_out(figure, axes, panel_height=58.0)
 
 

@@ -12,7 +12,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paraflex.figures.designs import DesignTable
+from paraflex.figures.designs import DesignTable, column_label
 from paraflex.formatting import number, typeset
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import mathematics, plain
@@ -41,14 +41,14 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
     chosen = table.judged_by(metrics, _METRICS)
     pair, runs = next(iter(table.series.items()))
     parameters = runs.varied[: max(1, _AXES - len(chosen))]
-    columns = [(table.axis(name), (runs.parameters | runs.metrics)[name]) for name in (*parameters, *chosen)]
-    values = np.column_stack([axis.shown.factor * one for axis, one in columns])
+    labelled = {name: table.labelled(name) for name in (*parameters, *chosen)}
+    values = np.column_stack([factor * runs.column(name) for name, (_, factor) in labelled.items()])
     values = values[np.isfinite(values).all(axis=1)]
     low, high = values.min(axis=0), values.max(axis=0)
     places = (values - low) / np.where(high > low, high - low, 1.0)
-    labels = [mathematics(axis.label(axis.shown)) for axis, _ in columns]
+    labels = [mathematics(label) for label, _ in labelled.values()]
     figure, axes = panels(1, 1)
-    _draw_designs(axes[0, 0], places, places[:, len(parameters)], mathematics(columns[len(parameters)][0].name))
+    _draw_designs(axes[0, 0], places, places[:, len(parameters)], mathematics(column_label(chosen[0])))
     _draw_axes(axes[0, 0], labels, low, high)
     # The title is centred: above the names there is no room for it in one column.
     axes[0, 0].set_title(

@@ -90,7 +90,8 @@ class Designs:
 
     def _column(self, name: str, series: Series) -> dict[str, Any]:
         table, axis = self.table, self.table.axis(name)
-        values, unit = (table.parameters | table.metrics)[name], axis.unit_for(())  # type: ignore[operator]
+        values = table.column(name)
+        unit = axis.unit_for(values)
         return {
             "identity": name, "name": axis.name, "unit": superscripts("" if unit.name == "1" else unit.name),
             "parameter": name in table.parameters, "log": is_logarithmic(axis, values[table.complete]),

@@ -7,7 +7,7 @@ from typing import Any
 
 from paraflex.figures.designs import column_label
 from paraflex.figures.search import IDENTIFICATION
-from paraflex.formatting import number, quantity
+from paraflex.formatting import common_unit, number, quantity
 
 # Largest number of tiles for metrics or parameters.
 _MOST_TILES = 2
@@ -29,6 +29,9 @@ def search_tiles(found: Mapping[str, Any], units: Mapping[str, str]) -> list[tup
     now, before = ("values", "start") if identified else ("metrics", "start_metrics")
     old = found.get(before) or {}
     for name, value in list((found.get(now) or {}).items())[:_MOST_TILES]:
-        shown, start = (quantity(each, units.get(name, ""), digits=4, padded=False) for each in (value, old.get(name)))
-        tiles.append((name.replace("_", " ") if identified else column_label(name), shown, f"{start} at the start"))
+        unit = units.get(name, "")
+        shown = common_unit(unit, (value, old.get(name)))
+        label = name.replace("_", " ") if identified else column_label(name)
+        start = number(old.get(name), factor=shown.factor)
+        tiles.append((label, quantity(value, unit, shown, digits=4, padded=False), f"{start} at the start"))
     return tiles

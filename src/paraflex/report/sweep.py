@@ -123,6 +123,7 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
     data = side_by_side(list(shown.values()), labels) if shown else None
     rows = drawn_rows(designs, [one.row for one in picked])
     drawn = Designs(designs, rows, {row: k for k, row in enumerate(shown)})
+    indices = [search.index_table(account.found)] if "indices" in account.found else []
     first = [chart for panel in page_panels(account.kind, account.found) for chart in panel.charts]
     few = None if data is None else thinned(data)
     missing = dict(account.failed) | dict.fromkeys(
@@ -139,7 +140,7 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
         survey=survey(drawn, first, seeks_least=account.seeks_least) if rows.size else [],
         designs=drawn if rows.size else None,
         tables=sections([_best_table(designs, picked, list(shown), account)]),
-        more=[*sections([_parameter_table(designs, account)]), *_trouble(designs)],
+        more=[*sections([*indices, _parameter_table(designs, account)]), *_trouble(designs)],
         panels=[] if few is None else _panels(few, labels, account),
         time=[] if few is None else few["time"].values,
         runs=labels,
@@ -248,7 +249,7 @@ def _best_table(designs: DesignTable, picked: Sequence[Picked], shown: Sequence[
     labels = list(map(designs.label, rows))
     columns = [Column("design", labels), Column(why, ["; ".join(reasons) for _, reasons in picked])]
     for name in [*designs.varied, *designs.judged][:_MOST_COLUMNS]:
-        axis, values = designs.axis(name), designs.parameters.get(name, designs.metrics.get(name))
+        axis, values = designs.axis(name), designs.column(name)
         columns.append(Column(axis.name, [float(values[row]) for row in rows], axis.unit, shown=axis.shown))
     if shown:
         note = f"{note} A selected row is shown in motion below and ringed in the charts.".lstrip()

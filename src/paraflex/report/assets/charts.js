@@ -150,7 +150,7 @@ const charts = (() => {
   function drawLegend(chart) {
     const byName = new Map();
     for (const curve of chart.description.curves) {
-      if (isShown(chart, curve)) byName.set(curve.name, [...(byName.get(curve.name) || []), curve]);
+      if (curve.name && isShown(chart, curve)) byName.set(curve.name, [...(byName.get(curve.name) || []), curve]);
     }
     chart.legend.replaceChildren();
     if (byName.size < 2) return;

@@ -56,7 +56,7 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
         raise InputError("no run is done yet", field=str(folder), remedy="run the study first")
     logarithmic = frozenset(name for name, (_, _, spread) in study.ranges.items() if spread == "log")
     # Tables of earlier releases do not have the units of parameters.
-    designs = replace(designs, logarithmic=logarithmic, units=designs.units | study.setting.parameter_units)
+    designs = replace(designs, logarithmic=logarithmic, units={**designs.units, **study.setting.parameter_units})
     found = _found(study.folder)
     picked = best_runs(designs)
     if "history" in found:
