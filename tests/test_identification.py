@@ -248,7 +248,7 @@ def test_the_figure_shows_every_target(tmp_path):
     best = next(each for each in panel.get_lines() if each.get_label() == "best")
     ratios = [each.reached / each.target.value for each in result.targets]
     assert list(best.get_xdata()) == pytest.approx(ratios)
-    with pytest.raises(InputError, match="no targets to compare with"):
+    with pytest.raises(InputError, match="nothing to show"):
         targets_reached({"targets": []})
 
 
@@ -288,6 +288,6 @@ def test_command_line(tmp_path):
     file, out = write_study(tmp_path, STUDY + "".join(targets) + "[search]\nevaluations = 4\n"), tmp_path / "out"
     done = paraflex("identify", file, "--output", out)
     assert done.returncode == 0, done.stderr
-    assert "peak_torque_max" in done.stdout
+    assert "peak torque" in done.stdout
     assert "root mean square residual" in done.stdout
     assert {file.name for file in (out / "figures").iterdir()} >= {"convergence.png", "targets.png"}

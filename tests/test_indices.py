@@ -146,7 +146,7 @@ def test_without_salib(tmp_path, monkeypatch):
 
 
 def test_a_figure_of_nothing_is_refused():
-    with pytest.raises(InputError, match="no metric varies"):
+    with pytest.raises(InputError, match="nothing to show"):
         sobol_bars({"indices": [{"first": None}]})
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import paraflex as pf
 from paraflex.designs.measure import measure
-from paraflex.plots.designs import read_designs
+from paraflex.figures.designs import read_designs
 from paraflex.plots.labels import metric_name
 from paraflex.results import summary
 from paraflex.results.following import FOLLOWING, KEPT_METRICS

@@ -510,7 +510,7 @@ def test_what_a_method_cannot_do(tmp_path, monkeypatch):
 
 
 def test_a_figure_of_nothing_is_refused():
-    with pytest.raises(InputError, match="no design ran"):
+    with pytest.raises(InputError, match="nothing to show"):
         convergence({"kind": "optimisation", "history": [[0, None, False]]})
 
 
@@ -519,7 +519,7 @@ def test_command_line(tmp_path):
     file, out = write_study(tmp_path, text), tmp_path / "out"
     first = paraflex("optimise", file, "--output", out)
     assert first.returncode == 0, first.stderr
-    assert "tracking_rms" in first.stdout
+    assert "RMS tracking error" in first.stdout
     assert "4 designs; evaluations = 4 are done" in first.stdout
     again = paraflex("optimize", file, "--output", out, "--json")
     assert again.returncode == 0, again.stderr

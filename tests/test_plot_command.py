@@ -26,10 +26,10 @@ from paraflex.control import (
     simulate_controlled_motion,
 )
 from paraflex.errors import InputError
+from paraflex.figures.designs import undominated
 from paraflex.formatting import logarithmic_number
 from paraflex.mechanism import Motor
 from paraflex.plots.catalogue import CATALOGUE, figure_names
-from paraflex.plots.designs import undominated
 from paraflex.plots.labels import axis_label, metric_name
 from paraflex.plots.layout import MM, column_width
 from paraflex.plots.planned import drawings, figures_of, find_figure

@@ -18,12 +18,12 @@ from paraflex.designs.derivatives import changes, gradient
 from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import State, build_system
 from paraflex.errors import InputError, IntegrationError, NumericalError
+from paraflex.figures.designs import DesignTable
 from paraflex.files.library import library_text
 from paraflex.integrators import sensitivity
 from paraflex.mechanism import Material, ModalBody, ModalPoint, PointRef, RigidBody, SlidingJoint, parse_mode
 from paraflex.motion import simulate_motion
-from paraflex.plots.designs import DesignTable
-from paraflex.plots.responses import pareto_front
+from paraflex.plots import pareto_front
 from paraflex.report.page import plotly_script
 from paraflex.studies import load_sensitivities, load_sweep, motion_case, sensitivities, sweep
 from paraflex.tracking import simulate

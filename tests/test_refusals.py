@@ -12,13 +12,13 @@ import pytest
 import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.fem import mesh_beam
+from paraflex.figures.designs import read_designs
 from paraflex.figures.selection import one_run, select_model
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
 from paraflex.motion import simulate_motion
 from paraflex.plots import link_deflections, mode_conditions
-from paraflex.plots.designs import read_designs
 from paraflex.plots.film import FilmOptions, plan_film
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.scene import check_shapes, scene, select

@@ -10,10 +10,9 @@ import pytest
 from paraflex.designs.reopen import open_study, run_again
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
+from paraflex.figures.designs import DesignTable, failure_table, in_conflict, read_designs, undominated
 from paraflex.files import library_file
-from paraflex.plots.designs import DesignTable, in_conflict, read_designs, undominated
 from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows, fronts
-from paraflex.report.designs import reasons
 from paraflex.report.film import frames_of
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
@@ -183,9 +182,8 @@ def test_failures_are_counted_and_grouped(finished, report, html):
     assert f"{invalid} invalid" in of
     assert "Runs that are not complete" in html
     assert "lump.end.mass" in html
-    told_reasons = reasons(made_up(500))
-    assert len(told_reasons) == 1
-    assert told_reasons[0][2] == int((~made_up(500).complete).sum())
+    (told_reason,) = failure_table(made_up(500)).texts()
+    assert told_reason[1] == str(int((~made_up(500).complete).sum()))
 
 
 def test_names_are_escaped_and_parameters_told(html):
@@ -279,8 +277,9 @@ def test_a_search_has_one_with_its_convergence(tmp_path):
     result = optimise(load_optimisation(tmp_path / "study.toml"), tmp_path / "out", workers=1)
     page = told(html_of(study_page(tmp_path / "out")))
     history = page["survey"][0]["charts"][0]
-    assert history["identity"] == "history"
-    least = rows_of(page["series"])[history["curves"][1]["y"]]
+    assert history["identity"] == "convergence"
+    (curve,) = (one for one in history["curves"] if one["name"] == "least until then")
+    least = rows_of(page["series"])[curve["y"]]
     assert least[-1] == pytest.approx(result.objective, rel=1e-5)
     assert len(page["runs"]) >= 2
     assert page["film"] is not None

@@ -7,13 +7,15 @@ therefore registered by class with `late.view` in higher layers.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from html import escape
 from typing import Any
 
-from paraflex.formatting import number
+from paraflex.formatting import number, typeset
 from paraflex.late import view
 
+# Largest number of rows shown of a table that could be long.
+_MOST_LISTED = 60
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
 
 
@@ -46,9 +48,9 @@ def facts(pairs: Iterable[tuple[str, Any]]) -> str:
     return f"<table>{cells}</table>" if cells else ""
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> str:
-    """Return a table with numbers aligned right and text aligned left, an empty text if there are no rows."""
-    body = "".join("<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows)
+def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "", right: Container[int] = ()) -> str:
+    """Return a table with numbers and the columns `right` aligned right, text left; an empty text without rows."""
+    body = "".join("<tr>" + "".join(_cell(value, k in right) for k, value in enumerate(row)) + "</tr>" for row in rows)
     if not body:
         return ""
     style = f'style="text-align: left; border-bottom: {_RULE}"'
@@ -57,18 +59,16 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str =
     return f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-class _Number(str):
-    """Text of a number, which is aligned right."""
-
-
 def described(shown: Any) -> str:
     """Return a described table, see `figures.tables.Table`; an empty text if it has no rows."""
     numeric = [column.is_numeric for column in shown.columns]
     heads = [
         f"{name} [{unit}]" if unit and one else name for (name, unit), one in zip(shown.heads(), numeric, strict=True)
     ]
-    rows = ([_Number(cell) if one else cell for cell, one in zip(row, numeric, strict=True)] for row in shown.texts())
-    return table(heads, rows, shown.title)
+    rows, right = shown.texts(), [k for k, one in enumerate(numeric) if one]
+    cells = [list(map(typeset, row)) for row in rows[:_MOST_LISTED]]
+    more = sentence(f"and {len(rows) - _MOST_LISTED} more rows") if len(rows) > _MOST_LISTED else ""
+    return table(heads, cells, shown.title, right) + sentence(shown.note) + more
 
 
 def written(value: Any) -> str:
@@ -84,6 +84,6 @@ def written(value: Any) -> str:
     return number(value) if isinstance(value, float) else str(value)
 
 
-def _cell(value: Any) -> str:
-    number = isinstance(value, (int, float, _Number)) and not isinstance(value, bool)
+def _cell(value: Any, right: bool) -> str:
+    number = right or (isinstance(value, (int, float)) and not isinstance(value, bool))
     return f'<td style="text-align: {"right" if number else "left"}">{escape(written(value))}</td>'

@@ -33,6 +33,7 @@ GREEK = {
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 # Longest name or unit that is shown whole.
 LONGEST = 200
+_POWER = re.compile(r"\^(-?\d+)")
 # Numbers within a text, with the parts that are typeset.
 _WRITTEN = re.compile(r"(?<![\w.])(-)?(\d+(?:\.\d*)?)(?:e([+-]\d+))?(?![\w])")
 
@@ -100,8 +101,13 @@ def number(
 
 
 def typeset(text: str) -> str:
-    """Return a text with its numbers as pages print them: "1.2e-05" as "1.2 × 10⁻⁵", a minus sign, a dash for none."""
-    return "–" if text == NO_VALUE else _WRITTEN.sub(_typeset, text)
+    """Return a text as pages print it: "1.2e-05" as "1.2 × 10⁻⁵", "m/s^2" as "m/s²", a minus sign, a dash for none."""
+    return "–" if text == NO_VALUE else _WRITTEN.sub(_typeset, superscripts(text))
+
+
+def superscripts(text: str) -> str:
+    """Return a text with its powers as superscripts: "m/s^2" as "m/s²"."""
+    return _POWER.sub(lambda found: raised(int(found[1])), text)
 
 
 def _typeset(found: re.Match[str]) -> str:
@@ -171,6 +177,18 @@ def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
     return next(fits, choices[-1])
 
 
+def axis_unit(unit: str, values: ArrayLike) -> DisplayUnit:
+    """Return the unit of `display_unit` for an axis; very large or small numbers are in powers of a thousand of others.
+
+    Numbers without a unit up to 2e9 are "in 10⁹".
+    """
+    shown, size = display_unit(unit, values), peak(values)
+    if unit in _PREFIXES or size == 0.0 or 1e-3 <= size < 1e5:
+        return shown
+    exponent = 3 * math.floor(math.log10(size) / 3.0)
+    return DisplayUnit(f"10{raised(exponent)} {'' if unit == '1' else shown.name}".rstrip(), 10.0**-exponent)
+
+
 def display_units(unit: str) -> tuple[DisplayUnit, ...]:
     """Return all units in which a quantity of an SI unit may be shown, the largest first."""
     return _PREFIXES.get(unit, (DisplayUnit(unit[:LONGEST], 1.0),))
@@ -205,7 +223,7 @@ def peak(values: ArrayLike) -> float:
 
 def labelled(name: str, unit: str) -> str:
     """Return the label of an axis or a column, with its unit if it has one: "torque [N m]"."""
-    return name if unit in ("1", "") else f"{name} [{unit[:LONGEST]}]".lstrip()
+    return name if unit in ("1", "") else f"{name} [{superscripts(unit[:LONGEST])}]".lstrip()
 
 
 # Names

@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.console import Console
 
 from paraflex.cli.commands.studies import SearchRequest
-from paraflex.cli.search import parameter_table, search_command
-from paraflex.cli.tables import plain_table
+from paraflex.cli.search import search_command
+from paraflex.formatting import number
 from paraflex.studies import IdentificationResult, load_identification
 
 
@@ -17,19 +17,8 @@ def identify_command(request: SearchRequest) -> int:
 
 def _report(console: Console, result: IdentificationResult) -> None:
     found = result.confidence
-    # Half-widths of 68 % confidence intervals.
-    known = {} if found is None else found.deviations
-    widths = {name: known.get(name) for name in result.values}
-    deviations = {name: "not given" if value is None else f"{value:.2g}" for name, value in widths.items()}
-    console.print(parameter_table(result, deviation=deviations))
-    rows = (
-        [one.target.mode, one.target.path, one.target.column,
-         *(f"{value:.5g}" for value in (one.target.value, one.start, one.reached)), f"{one.residual:+.3g}"]
-        for one in result.targets
-    )  # fmt: skip
-    heads = ("target", "start", "reached", "residual")
-    console.print(plain_table("mode", "path", "metric", numbers=heads, rows=rows))
-    console.print(f"root mean square residual {result.residual:.4g}, {result.start_residual:.4g} at the start")
+    now, start = number(result.residual), number(result.start_residual)
+    console.print(f"root mean square residual {now}, {start} at the start")
     console.print(f"derivatives: {result.derivatives or 'none were needed'}", soft_wrap=True)
     if found is None:
         console.print(f"deviations not given: {result.stopped} before derivatives there were known", soft_wrap=True)
@@ -38,10 +27,10 @@ def _report(console: Console, result: IdentificationResult) -> None:
         names = ", ".join(name for name, why in found.reasons.items() if why == reason)
         console.print(f"deviations not given of {names}: {reason}", soft_wrap=True)
     if found.telling:
-        console.print(f"condition of the Jacobian {found.condition:.3g}, degrees of freedom {found.freedom}")
+        console.print(f"condition of the Jacobian {number(found.condition, 3)}, degrees of freedom {found.freedom}")
     else:
         described = ", ".join(f"{share:+.2f} {name}" for name, share in found.weakest.items())
         console.print(
-            f"the targets cannot distinguish the parameters (condition {found.condition:.3g}): they hardly change "
-            f"along {described}, as fractions of the ranges"
+            f"the targets cannot distinguish the parameters (condition {number(found.condition, 3)}): they hardly "
+            f"change along {described}, as fractions of the ranges"
         )

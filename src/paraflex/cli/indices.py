@@ -10,8 +10,9 @@ from paraflex.cli import COMPLETE, signals
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import IndicesRequest
 from paraflex.cli.ending import tell
-from paraflex.cli.tables import number, plain_console, plain_table
+from paraflex.cli.tables import plain_console, print_table
 from paraflex.compilation import compile_kernels_for
+from paraflex.figures.search import index_table
 from paraflex.plots import save_figures
 from paraflex.studies import IndicesResult, load_indices
 
@@ -36,7 +37,7 @@ def indices_command(request: IndicesRequest) -> int:
     verdict = study.sweep.setting.verdict()
 
     def show(out: Console) -> None:
-        _report(out, result, numbers["indices"])
+        _report(out, result, numbers)
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)
 
     tell(numbers | {"verdict": verdict.to_dict()}, show, as_json=request.json, doubts=verdict)
@@ -44,15 +45,8 @@ def indices_command(request: IndicesRequest) -> int:
     return COMPLETE
 
 
-def _report(console: Console, result: IndicesResult, found: list[dict[str, Any]]) -> None:
-    title = "Sobol indices and half the width of their intervals of 95 %"
-    keys = ("first", "first_confidence", "total", "total_confidence")
-    rows = (
-        [row["metric"], row["path"], row["mode"], row["parameter"], *(number(row[key], ".3f") for key in keys)]
-        for row in found
-    )
-    heads = ("first", "±", "total", "±")
-    console.print(plain_table("metric", "path", "mode", "parameter", numbers=heads, rows=rows, title=title))
+def _report(console: Console, result: IndicesResult, found: dict[str, Any]) -> None:
+    print_table(console, index_table(found))
     indices = result.indices
     for k, dropped in enumerate(indices["dropped"].values):
         if dropped:

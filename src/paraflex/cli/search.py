@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import TypeVar
 
 from rich.console import Console
-from rich.table import Table
 
 from paraflex.campaign import Progress
 from paraflex.cli import signals
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.ending import exit_code, tell
-from paraflex.cli.tables import plain_console, plain_table
+from paraflex.cli.tables import plain_console, print_table
 from paraflex.compilation import compile_kernels_for
+from paraflex.figures.search import tables
+from paraflex.formatting import number, quantity
 from paraflex.plots import save_figures
 from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
 
@@ -35,6 +36,8 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
     verdict = study.base.setting.verdict()
 
     def show(out: Console) -> None:
+        for table in tables(numbers, result.units):
+            print_table(out, table)
         report(out, result)
         _say_end(console, result, request.folder)
 
@@ -45,23 +48,12 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
     return exit_code(bool(result.values), interrupted=result.interrupted)
 
 
-def parameter_table(result: R, **columns: dict[str, str]) -> Table:
-    """Return a table of the start and the best value of every parameter, with further columns of text."""
-    table = plain_table("parameter", numbers=("start", "best", *columns))
-    table.add_column("", no_wrap=True)
-    for name, value in result.values.items():
-        more = [column.get(name, "") for column in columns.values()]
-        bound = f"at its {result.bounds[name]}" if name in result.bounds else ""
-        table.add_row(name, f"{result.start[name]:.6g}", f"{value:.6g}", *more, bound)
-    return table
-
-
 def _with_bar(console: Console, study: DesignStudy[R], request: SearchRequest, what: str) -> R:
     with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[best]}") as progress:
         bar = progress.add_task(study.name, total=study.search.evaluations, best="")
 
         def tell(at: Progress) -> None:
-            best = "" if at.best is None else f"{what} {at.best:.4g}"
+            best = "" if at.best is None else f"{what} {number(at.best)}"
             progress.update(bar, completed=at.done, best=best)
 
         return study.run(request.folder, workers=request.workers.chosen, on_progress=tell)
@@ -73,7 +65,7 @@ def _say_end(console: Console, result: OptimisationResult | IdentificationResult
     out.print(f"{result.evaluations} designs{failed}; {result.stopped}")
     for reason in result.reasons[:1]:
         console.print(f"a design that failed: {reason}", soft_wrap=True)
-    console.print(f"{result.fresh} designs in {result.seconds:.1f} s now")
+    console.print(f"{result.fresh} designs in {quantity(result.seconds, 's', padded=False)} now")
     if result.interrupted:
         console.print(f"interrupted; so far: {result.table}; the same command continues from there", soft_wrap=True)
     else:

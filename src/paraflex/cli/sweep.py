@@ -15,6 +15,7 @@ from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.sweep import SweepStudy
+from paraflex.formatting import number, quantity
 from paraflex.studies import SweepResult, load_sweep
 
 
@@ -45,7 +46,7 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
         def report(at: Progress) -> None:
             left = "" if at.left is None else f", {_clock(at.left)} left"
             progress.start_task(bar)
-            progress.update(bar, completed=at.done, pace=f"{at.rate:.1f} runs/s{left}")
+            progress.update(bar, completed=at.done, pace=f"{number(at.rate, 3)} runs/s{left}")
 
         return study.run(folder, workers=request.workers.chosen, on_progress=report, limit=request.limit)
 
@@ -70,7 +71,8 @@ def _report(console: Console, result: SweepResult) -> None:
         plain_console().print(f"warning: {coarse_runs(result.coarse)}", soft_wrap=True)
     if result.fresh:
         console.print(
-            f"{result.fresh} of them in {result.seconds:.1f} s now, {result.fresh / result.seconds:.1f} runs/s"
+            f"{result.fresh} of them in {quantity(result.seconds, 's', padded=False)} now, "
+            f"{number(result.fresh / result.seconds, 3)} runs/s"
         )
     if result.complete:
         console.print(f"one table: {result.table}", soft_wrap=True)

@@ -176,13 +176,15 @@ def table_schema(setting: Setting, members: Members) -> pa.Schema:
 
     whole, real, text = pa.int64(), pa.float64(), pa.string()
     columns = [("run", whole), ("id", text), ("design", whole), ("path", text), ("mode", text)]
-    columns += [(name, whole if each else real) for name, each in zip(setting.names, setting.whole, strict=True)]
-    columns += [("status", text), ("reason", text)]
-    fields = [pa.field(*column) for column in columns]
+    fields, units = [pa.field(*column) for column in columns], setting.units(members)
+    for name, each in zip(setting.names, setting.whole, strict=True):
+        about = {"unit": units[name]} if units[name] else None
+        fields.append(pa.field(name, whole if each else real, metadata=about))
+    fields += [pa.field("status", text), pa.field("reason", text)]
     fields.append(pa.field("time_reached", real, metadata={"unit": "s"}))
     for metric in map(METRICS.__getitem__, setting.metrics):
         for column in metric.columns(members):
-            about = {"unit": metric.unit_of(column, members), "meaning": metric.meaning}
+            about = {"unit": units[column], "meaning": metric.meaning}
             fields.append(pa.field(column, whole if metric.whole else real, metadata=about))
     return pa.schema(fields)
 

@@ -16,7 +16,7 @@ from paraflex.designs.own_motion import own_duration
 from paraflex.designs.own_statics import check_of_statics
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, VaryTable
-from paraflex.designs.units import check_unit_of
+from paraflex.designs.units import check_unit_of, unit_of
 from paraflex.equilibria.given import chosen_over
 from paraflex.errors import InputError, suggestion
 from paraflex.files import Model, library_names, model_from
@@ -32,7 +32,7 @@ from paraflex.limits import WHOLE, at_most, of_size
 from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
 from paraflex.results.following import Part
-from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS
+from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS, Members, metric_unit
 from paraflex.validity import doubtful_numbers
 
 # Default limit of attempted steps, so that a single design with violent motion does not delay a study.
@@ -117,6 +117,18 @@ class Setting:
         asked = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
         more = [name for name in ("balanced", "statics") if getattr(self, name)]
         return digest([dict(self.data), *asked, *more])
+
+    @property
+    def parameter_units(self) -> dict[str, str]:
+        """SI units of the parameters by name; empty where there is none, or the fields have different ones."""
+        units = {name: {unit_of(self.data, place) for place in places}
+                 for name, places in zip(self.names, self.places, strict=True)}  # fmt: skip
+        return {name: one.pop() if len(one) == 1 else "" for name, one in units.items()}
+
+    def units(self, members: Members) -> dict[str, str]:
+        """Return the SI units of the parameters and of the columns of all metrics."""
+        columns = (column for name in self.metrics for column in METRICS[name].columns(members))
+        return self.parameter_units | {column: metric_unit(column, members) for column in columns}
 
     def numbers(self, values: tuple[float, ...]) -> list[tuple[Place, float | int]]:
         """Return all places in the data that a design sets, with their values."""

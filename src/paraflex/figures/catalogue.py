@@ -134,9 +134,11 @@ def figure(shows: str, **more: Any) -> Callable[[Charts], Charts]:
 def figures_of_kind(kind: str) -> Mapping[str, Figure]:
     """Return the figures with charts of a kind of results, by name."""
     found: dict[str, Figure] = {}
-    for name in RESULT_KINDS[kind].figures:
-        import_module(f"paraflex.figures.{name}")
-        found |= _MODULES[f"paraflex.figures.{name}"]
+    for each in RESULT_KINDS[kind].figures:
+        module, _, name = each.partition(".")
+        import_module(f"paraflex.figures.{module}")
+        entries = _MODULES[f"paraflex.figures.{module}"]
+        found |= {name: entries[name]} if name else entries
     return found
 
 

@@ -16,6 +16,7 @@ from paraflex.formatting import common_unit, display_unit, labelled
 from paraflex.units import DisplayUnit
 
 Array = NDArray[np.float64]
+Mark = Literal["", "ring", "cross", "square", "dot", "triangle", "diamond", "bar"]
 
 # Numbers of colours and of dashes; the latter include the solid line.
 N_COLOURS, N_DASHES = 8, 5
@@ -131,6 +132,12 @@ class Curve:
     mark : str
         Marks at its points, "ring", "cross", "square", "dot", "triangle" or "diamond", or horizontal bars, "bar"; empty
         (default) for none.
+    size : float
+        Size of the marks relative to the usual one.
+    faint : bool
+        Whether the marks are small and pale, as those of many points.
+    thickness : float
+        Height of horizontal bars, as a share of the distance of two names.
     line : bool
         Whether a line joins the points; by default only if they have no marks.
     texts : sequence of str
@@ -147,8 +154,10 @@ class Curve:
     desired: bool = False
     stopped: bool = False
     quiet: bool = False
-    mark: Literal["", "ring", "cross", "square", "dot", "bar"] = ""
+    mark: Mark = ""
     size: float = 1.0
+    faint: bool = False
+    thickness: float = 0.6
     line: bool = False
     texts: Sequence[str] = ()
 

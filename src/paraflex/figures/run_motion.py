@@ -171,13 +171,18 @@ def energies(data: xr.Dataset) -> Iterator[Chart]:
     kinetic, strain, work = (data[name].values for name in ("kinetic_energy", "strain_energy", "work"))
     yield energy_chart(data)
     if peak(strain):
-        yield compared(Chart("strain", "Strain energy", replace(ENERGY, zero=False)), data, data["strain_energy"])
+        yield strain_chart(data)
     imbalance = np.abs(kinetic + strain - kinetic[:, :1] - strain[:, :1] - work)
     # Rounding errors would extend the logarithmic axis.
     imbalance = np.where(imbalance > _ROUNDING * peak([kinetic, strain, work]), imbalance, np.nan)
     if peak(imbalance):
         chart = Chart("imbalance", "Imbalance", Axis("energy", "J", log=True), on_page=False)
         yield compared(chart, data, data["work"].copy(data=imbalance))
+
+
+def strain_chart(data: xr.Dataset) -> Chart:
+    """Return the chart of the strain energy of all runs."""
+    return compared(Chart("strain", "Strain energy", replace(ENERGY, zero=False)), data, data["strain_energy"])
 
 
 def energy_chart(data: xr.Dataset) -> Chart:

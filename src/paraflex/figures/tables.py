@@ -110,19 +110,23 @@ class Table:
         Sentence below the table.
     runs : mapping of str to int
         Runs of a page that rows select, by the name of the row.
+    sortable : bool
+        Whether readers of a page may sort the rows by a column.
     """
 
     title: str
     columns: Sequence[Column]
     note: str = ""
     runs: Mapping[str, int] | None = None
+    sortable: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.columns and self.columns[0].cells)
 
     def heads(self) -> list[tuple[str, str]]:
         """Return heading and unit of every column; the unit is empty if there is none."""
-        return [(column.name, column.shown_unit.name if column.is_numeric else column.unit) for column in self.columns]
+        units = [column.shown_unit.name if column.is_numeric else column.unit for column in self.columns]
+        return [(column.name, "" if unit == "1" else unit) for column, unit in zip(self.columns, units, strict=True)]
 
     def texts(self) -> list[list[str]]:
         """Return the rows as text."""
@@ -164,12 +168,12 @@ class Table:
 
 def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column]:
     """Return columns whose rows have different SI units in units for display, followed by the column of these units."""
-    shown = [common_unit(unit, [column.cells[k] for column in columns]) for k, unit in enumerate(units)]  # type: ignore[misc]
-    converted = [
-        replace(column, cells=[None if cell is None else unit.factor * cell
-                               for cell, unit in zip(column.cells, shown, strict=True)])  # type: ignore[operator]
-        for column in columns
-    ]  # fmt: skip
+    rows = zip(*(column.cells for column in columns), strict=True)
+    numbers = [[cell if isinstance(cell, float | int) else None for cell in row] for row in rows]
+    shown = [common_unit(unit, row) for unit, row in zip(units, numbers, strict=True)]
+    cells = [[None if cell is None else unit.factor * cell for cell in row]
+             for unit, row in zip(shown, numbers, strict=True)]  # fmt: skip
+    converted = [replace(column, cells=[row[k] for row in cells]) for k, column in enumerate(columns)]
     return [*converted, Column("unit", [NO_VALUE if unit.name in ("", "1") else unit.name for unit in shown])]
 
 

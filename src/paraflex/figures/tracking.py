@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -61,7 +62,8 @@ def end_effector_path(
         raise InputError(
             "not a magnification", field="magnification", value=magnification, remedy="give a positive number"
         )
-    curves, desired = [], data["end_effector_desired"].values[0] if "end_effector_desired" in data else None
+    curves: list[Curve] = []
+    desired = data["end_effector_desired"].values if "end_effector_desired" in data else None
     if desired is None and magnification is not None:
         raise InputError(
             "a point without a desired path has no deviation", field="magnification", value=magnification,
@@ -72,16 +74,20 @@ def end_effector_path(
         curves.append(Curve(actual_name(data, r, point), actual[:, 1], actual[:, 0], look(0), run=r, shown=(r,),
                             stopped=stopped))  # fmt: skip
         if desired is not None:
-            extent = float(np.ptp(desired, axis=0).max())
-            times = round_magnification(actual - desired, extent) if magnification is None else magnification
+            away, extent = actual - desired[r], float(np.ptp(desired[r], axis=0).max())
+            times = round_magnification(away, extent) if magnification is None else magnification
             if times != 1.0:
-                x, y = (desired + times * (actual - desired)).T
+                x, y = (desired[r] + times * away).T
                 curves.append(Curve(f"deviation × {number(times)}", y, x, Look(1), run=r, shown=(r,)))
         else:
             curves.append(start_mark(*actual.T, r))
     if desired is not None:
-        x, y = desired.T
-        curves += [Curve("desired", y, x, Look(dash=DASHED), desired=True), Curve("start", y[:1], x[:1], mark="square")]
+        # Designs may have paths of their own.
+        common = bool(np.all(desired == desired[:1]))
+        for r, (x, y) in enumerate(np.swapaxes(desired[: 1 if common else None], 1, 2)):
+            own: dict[str, Any] = {} if common else {"run": r, "shown": (r,)}
+            curves += [Curve("desired", y, x, Look(dash=DASHED), desired=True, **own),
+                       Curve("start", y[:1], x[:1], mark="square", **own)]  # fmt: skip
     yield Chart("path", "End-effector path", Axis("", "m", "y"), curves, Axis("", "m", "x"), equal=True)
 
 

@@ -44,7 +44,7 @@ class ResultKind:
     with_folder : bool
         Whether that function also takes the folder, for the summary in it.
     figures : tuple of str
-        Modules of `paraflex.figures` with the charts and tables of the results.
+        Modules of `paraflex.figures` with the charts and tables of the results, or "module.figure" for one chart.
     drawings : tuple of str
         Names of the figures of the results that Matplotlib draws without charts.
     refusals : mapping of str to (str, str)
@@ -94,18 +94,17 @@ _NOTHING_MOVES = (
     "these results are not a run and show no motion",
     "paraflex plot draws them: deformed_shapes of equilibria, reduced_responses of models",
 )
-_DESIGN_DRAWINGS = ("response_curves", "response_map", "parallel_coordinates", "pareto_front")
+_DESIGN_DRAWINGS = ("response_map", "parallel_coordinates")
 _RUN_FIGURES = ("controllers", "loads", "sensors")
 _STUDY = ("study.json", "journal.sqlite", "results.parquet")
 RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
-    ResultKind("sweep", STUDY_OF_RUNS, _STUDY,
-               drawings=_DESIGN_DRAWINGS),
+    ResultKind("sweep", STUDY_OF_RUNS, _STUDY, figures=("designs",), drawings=_DESIGN_DRAWINGS),
     ResultKind("optimisation", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "optimisation"},
-               drawings=("convergence", *_DESIGN_DRAWINGS)),
+               figures=("search.convergence", "designs"), drawings=_DESIGN_DRAWINGS),
     ResultKind("identification", STUDY_OF_RUNS, _STUDY, "result.json", marks={"kind": "identification"},
-               drawings=("convergence", "targets_reached", *_DESIGN_DRAWINGS)),
+               figures=("search.convergence", "search.targets_reached", "designs"), drawings=_DESIGN_DRAWINGS),
     ResultKind("indices", STUDY_OF_RUNS, _STUDY, "indices.json", marks={"kind": "indices"},
-               drawings=("sobol_bars", *_DESIGN_DRAWINGS)),
+               figures=("search.sobol_bars", "designs"), drawings=_DESIGN_DRAWINGS),
     ResultKind("verification", VERIFICATION, ("verify.json", "verify.nc"), "verify.nc", "Verification.dataset",
                page="verification.report_of_folder", with_folder=True,
                figures=("verification",)),
@@ -121,7 +120,7 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
     ResultKind("runs", RUN_COMPARISON, ("compare.json",)),
     ResultKind("sensitivity", SENSITIVITY, ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
                "sensitivity.json", marks={"parameters": ..., "units": ..., "runs": ...},
-               drawings=("elasticities",)),
+               figures=("sensitivity",)),
     ResultKind("linear", LINEAR_MODELS, ("linear.json", "linear.nc"), "linear.nc", "linear_dataset", None,
                "linear.linear_page", figures=("linear",), refusals={
         "motion": ("these are linear models, not a run",

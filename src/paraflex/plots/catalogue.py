@@ -14,61 +14,7 @@ from paraflex.folders.kinds import RESULT_KINDS
 _DRAWINGS: Mapping[str, Figure] = {
     one.name: one
     for one in (
-        Figure(
-            "desired_path",
-            "desired path and the mechanism at its start (Fig. 11)",
-            written_as="desired_path",
-        ),
-        Figure(
-            "motor_torques",
-            "torque of every motor over time, one panel per mode (Fig. 12)",
-            written_as="motor_torques",
-        ),
-        Figure(
-            "tip_deflections",
-            "axial and transverse displacement and slope of links' ends (Fig. 13)",
-            takes="mode",
-            written_as="tip_deflections",
-        ),
-        Figure(
-            "link_motions",
-            "angle, speed and acceleration of links, desired and actual (Fig. 14)",
-            takes="mode",
-            written_as="link_motions",
-        ),
-        Figure(
-            "end_effector_path",
-            "desired and actual path, deviation magnified (Fig. 15)",
-            takes="mode",
-            written_as="end_effector_path",
-            points="point",
-        ),
-        Figure(
-            "end_effector_motion",
-            "motion of the end-effector, desired and actual (Fig. 16)",
-            takes="mode",
-            written_as="end_effector_motion",
-            points="point",
-        ),
-        Figure(
-            "phase_diagrams",
-            "phase diagrams of the end-effector (Fig. 17)",
-            takes="mode",
-            written_as="phase_diagrams",
-            points="point",
-        ),
-        Figure(
-            "tracking_errors",
-            "tracking error in x and y over time, one panel per mode (Fig. 18)",
-            written_as="tracking_errors",
-        ),
-        Figure("tracking_distance", "distance from the desired position over time, all modes"),
-        Figure("mode_comparison", "tracking error, vibration and largest torque of every mode"),
-        Figure(
-            "actuation_condition",
-            "condition number of the actuation matrix along the path, all modes",
-            variables=("actuation_condition",),
-        ),
+        Figure("desired_path", "desired path and the mechanism at its start (Fig. 11)", written_as="desired_path"),
         Figure(
             "mechanism_drawing",
             "the mechanism with its deflected links half way through the run",
@@ -76,146 +22,7 @@ _DRAWINGS: Mapping[str, Figure] = {
             variables=("shape",),
             points="point",
         ),
-        Figure(
-            "energies",
-            "kinetic and strain energy, work, and error of the energy balance",
-            takes="mode",
-        ),
-        Figure(
-            "joint_forces",
-            "magnitude of the force in every joint over time",
-            takes="mode",
-            variables=("joint_force",),
-        ),
-        Figure(
-            "beam_stresses",
-            "largest stress of every beam over time",
-            takes="mode",
-            variables=("stress",),
-        ),
-        Figure(
-            "stress_envelope",
-            "largest stress of the run along every beam",
-            takes="mode",
-            variables=("section_moment",),
-        ),
-        Figure(
-            "joint_motions",
-            "angle or travel of every joint, and its rate, over time",
-            takes="mode",
-            variables=("joint_coordinate",),
-        ),
-        Figure(
-            "drive_efforts",
-            "torque, speed and power of motors and prescribed motions",
-            takes="mode",
-            variables=("input_power",),
-        ),
-        Figure(
-            "frame_loads",
-            "shaking force and moment of the mechanism on the ground",
-            takes="mode",
-            variables=("frame_force",),
-        ),
-        Figure(
-            "sensors",
-            "reading of every sensor, a panel for each unit",
-            takes="mode",
-            variables=("sensor_reading",),
-        ),
-        Figure(
-            "controllers",
-            "torques of controllers before and after limits, and their readings",
-            takes="mode",
-            written_as="controllers",
-        ),
-        Figure("link_deflections", "transverse displacement of the ends of all links", takes="mode"),
-        Figure(
-            "point_motions",
-            "distance from the start, speed and acceleration of named points",
-            takes="mode",
-            variables=("point_velocity", "point_acceleration"),
-            points="points",
-        ),
-        Figure("link_phases", "angular velocity over angle of every body", takes="mode"),
-        Figure("motion_overview", "angles, speeds and energies", written_as="motion_overview"),
-        Figure("coordinates", "generalised coordinates, including modal coordinates of bodies"),
-        Figure("point_paths", "paths of named points in the plane", points="points"),
-        Figure(
-            "compared_links",
-            "angle and speed of links in two models (Fig. 22)",
-            takes="models",
-            written_as="compared_links",
-        ),
-        Figure(
-            "compared_paths",
-            "path of the end-effector in two models (Fig. 23)",
-            takes="models",
-            written_as="compared_paths",
-        ),
-        Figure(
-            "model_distances",
-            "distances of all models from the desired position and from the reference",
-            written_as="model_distances",
-        ),
-        Figure(
-            "compared_deflections",
-            "transverse displacement of links' ends in all models",
-            takes="mode",
-        ),
-        Figure(
-            "singular_values",
-            "gains from motors to their encoders and to the end-effector over frequency, all modes",
-            written_as="singular_values",
-        ),
-        Figure(
-            "bode",
-            "magnitude and phase from motors to their encoders and to the end-effector",
-            takes="mode",
-            written_as="bode",
-        ),
-        Figure(
-            "pole_zero_map",
-            "poles and zeros in the complex plane, all modes",
-            written_as="pole_zero_map",
-        ),
-        Figure(
-            "mode_shapes",
-            "lowest mode shapes, with motors free and held",
-            takes="mode",
-            written_as="mode_shapes",
-        ),
-        Figure(
-            "poles_along_path",
-            "frequencies and real parts of poles along the motion",
-            takes="mode",
-            written_as="poles_along_path",
-            variables=("branch_real",),
-        ),
-        Figure(
-            "reduced_responses",
-            "gains of reduced models and the full model over frequency",
-            takes="mode",
-            written_as="reduced_responses",
-        ),
-        Figure(
-            "reduction_errors",
-            "errors of reduced models over frequency, all modes",
-            written_as="reduction_errors",
-        ),
-        Figure(
-            "held_frequency_by_states",
-            "lowest frequency with motors held against number of states",
-            takes="mode",
-            written_as="held_frequency_by_states",
-        ),
-        Figure(
-            "bases_along_path",
-            "errors along the path with bases of one and of several poses",
-            takes="mode",
-            written_as="bases_along_path",
-            variables=("along_error",),
-        ),
+        Figure("mode_shapes", "lowest mode shapes, with motors free and held", takes="mode", written_as="mode_shapes"),
         Figure(
             "deformed_shapes",
             "deformed mechanism in all steps",
@@ -228,51 +35,10 @@ _DRAWINGS: Mapping[str, Figure] = {
             written_as="buckling_shapes",
             variables=("buckling_shape",),
         ),
-        Figure(
-            "law_comparison",
-            "error, vibration and largest torque of control laws in all modes",
-            written_as="law_comparison",
-        ),
-        Figure(
-            "work_precision",
-            "wall time and number of steps against error",
-            written_as="work_precision",
-        ),
-        Figure(
-            "numerical_damping",
-            "damping ratio, period error and spectral radius of methods",
-            takes="nothing",
-        ),
-        Figure("response_curves", "metrics against parameters", takes="designs"),
         Figure("response_map", "contours of metrics over two parameters", takes="designs"),
-        Figure(
-            "parallel_coordinates",
-            "parameters and metrics of every design on parallel axes",
-            takes="designs",
-        ),
-        Figure("pareto_front", "two metrics of every design, and the Pareto front", takes="designs"),
-        Figure(
-            "convergence",
-            "objective of every design, and the least up to it",
-            written_as="convergence",
-        ),
-        Figure(
-            "targets_reached",
-            "every target at the start and at the best design",
-            written_as="targets",
-        ),
-        Figure("sobol_bars", "first-order and total Sobol indices", written_as="indices"),
-        Figure(
-            "elasticities",
-            "elasticities: change of metrics in % per % of parameter",
-            takes="run",
-            written_as="elasticities",
-        ),
-        Figure("mode_conditions", "worst condition number of every mode along the path"),
+        Figure("parallel_coordinates", "parameters and metrics of every design on parallel axes", takes="designs"),
     )
 }
-
-
 # Figures of each kind of results that has any: those with charts, then drawings.
 CATALOGUE: Mapping[str, tuple[Figure, ...]] = {
     kind: found for kind, each in RESULT_KINDS.items()

@@ -14,11 +14,11 @@ from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
 from paraflex.errors import InputError
+from paraflex.figures.designs import DesignTable
 from paraflex.formatting import logarithmic_number, peak
-from paraflex.plots.designs import DesignTable
 from paraflex.plots.given import drawn
+from paraflex.plots.labels import mathematics
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
-from paraflex.plots.scales import round_scale, scaled_label
 
 Array = NDArray[np.float64]
 
@@ -55,18 +55,16 @@ def response_map(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
     shape = (len(chosen), 1) if is_narrow() else (1, len(chosen))
     figure, axes = panels(*shape, width=ONE_COLUMN if len(chosen) == 1 else TWO_COLUMNS)
     for panel, metric in zip(axes.flat, chosen, strict=True):
-        label, factor = table.labelled(metric)
-        across, up = (series[0].parameters[name] for name in names[:2])
-        _draw_map(panel, across, up, factor * series[0].metrics[metric])
-        panel.set_title(label)
-        panel.set_xlabel(scaled_label(names[0], round_scale(across)))
-        panel.set_ylabel(scaled_label(names[1], round_scale(up)))
+        shown = [(series[0].column(name), *table.labelled(name)) for name in (*names[:2], metric)]
+        _draw_map(panel, *(factor * values for values, _, factor in shown))
+        across, up, title = (mathematics(label) for _, label, _ in shown)
+        panel.set(xlabel=across, ylabel=up, title=title)
     return lay_out(figure, axes, panel_height=58.0)
 
 
 def _draw_map(panel: Axes, x: Array, y: Array, values: Array) -> None:
     known = np.isfinite(values)
-    x, y, values = x[known] / round_scale(x), y[known] / round_scale(y), values[known]
+    x, y, values = x[known], y[known], values[known]
     # Triangulate in normalised coordinates, so that the triangles do not depend on units.
     unit = [(each - each.min()) / (float(np.ptp(each)) or 1.0) for each in (x, y)]
     areas = Triangulation(x, y, Triangulation(*unit).triangles)

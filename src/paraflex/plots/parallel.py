@@ -12,9 +12,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paraflex.plots.designs import DesignTable
+from paraflex.figures.designs import DesignTable, column_label
+from paraflex.formatting import number, typeset
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import plain, three_digits
+from paraflex.plots.labels import mathematics, plain
 from paraflex.plots.layout import is_narrow, lay_out, panels
 from paraflex.plots.style import VERMILLION
 
@@ -40,16 +41,14 @@ def parallel_coordinates(table: DesignTable, metrics: Sequence[str] | None = Non
     chosen = table.judged_by(metrics, _METRICS)
     pair, runs = next(iter(table.series.items()))
     parameters = runs.varied[: max(1, _AXES - len(chosen))]
-    labelled = [table.labelled(metric) for metric in chosen]
-    columns = [runs.parameters[name] for name in parameters]
-    columns += [factor * runs.metrics[name] for name, (_, factor) in zip(chosen, labelled, strict=True)]
-    values = np.column_stack(columns)
+    labelled = {name: table.labelled(name) for name in (*parameters, *chosen)}
+    values = np.column_stack([factor * runs.column(name) for name, (_, factor) in labelled.items()])
     values = values[np.isfinite(values).all(axis=1)]
     low, high = values.min(axis=0), values.max(axis=0)
     places = (values - low) / np.where(high > low, high - low, 1.0)
-    labels = [*map(plain, parameters), *(label for label, _ in labelled)]
+    labels = [mathematics(label) for label, _ in labelled.values()]
     figure, axes = panels(1, 1)
-    _draw_designs(axes[0, 0], places, places[:, len(parameters)], labels[len(parameters)].partition(" [")[0])
+    _draw_designs(axes[0, 0], places, places[:, len(parameters)], mathematics(column_label(chosen[0])))
     _draw_axes(axes[0, 0], labels, low, high)
     # The title is centred: above the names there is no room for it in one column.
     axes[0, 0].set_title(
@@ -78,7 +77,7 @@ def _draw_axes(panel: Axes, labels: list[str], low: Array, high: Array) -> None:
         panel.axhline(row, color="0.3", linewidth=0.6, zorder=0.5)
         for place, value, side in ((0.0, least, "left"), (1.0, most, "right")):
             panel.text(
-                place, row - 0.08, three_digits(value), ha=side, va="bottom", fontsize=7.0,
+                place, row - 0.08, typeset(number(value, 3, padded=True)), ha=side, va="bottom", fontsize=7.0,
                 bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5},
             )  # fmt: skip
     panel.set_yticks(range(len(labels)), labels)

@@ -51,9 +51,6 @@ def _vibrates(found: Any) -> bool:
 
 # Conditions on the results for a figure, in addition to its variables.
 _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
-    "convergence": lambda found: any(value is not None for _, value, _ in found.get("history", ())),
-    "targets_reached": lambda found: any(target["value"] != 0.0 for target in found.get("targets", ())),
-    "sobol_bars": lambda found: any(row["first"] is not None for row in found.get("indices", ())),
     "mode_shapes": _vibrates,
 }
 

@@ -5,31 +5,18 @@ Numbers are plain text because the layout computes their width from that of the 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Literal
 
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import ArrayLike
 
-from paraflex.formatting import logarithmic_number, peak, power_of_ten
+from paraflex.formatting import logarithmic_number, power_of_ten
 from paraflex.plots.labels import plain
 
 # Height of a line in a list of names [mm].
 LIST_LINE = 5.5
-
-
-def round_scale(values: ArrayLike) -> float:
-    """Return a power of a thousand that leaves few zeros in very large or small numbers; 1 for all others."""
-    size = peak(values)
-    return 1.0 if size == 0.0 or 1e-3 <= size < 1e5 else 1e3 ** math.floor(math.log10(size) / 3.0)
-
-
-def scaled_label(name: str, scale: float) -> str:
-    """Return the name of an axis, with its scale unless that is 1."""
-    return plain(name) + (f" [{power_of_ten(scale)}]" if scale != 1.0 else "")
 
 
 def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y", *, wide: float = 200.0) -> None:

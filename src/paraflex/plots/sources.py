@@ -8,8 +8,8 @@ from typing import Any
 
 from paraflex.campaign import tables_of
 from paraflex.errors import InputError
+from paraflex.figures.designs import DesignTable, read_designs
 from paraflex.folders import DATA_FILES, RESULT_KINDS, STUDY_OF_RUNS, check_listed
-from paraflex.plots.designs import DesignTable, read_designs
 from paraflex.seals import NETCDF, PARQUET, check_regular, unreadable
 from paraflex.writing import read_values
 

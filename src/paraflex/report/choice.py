@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.plots.designs import DesignTable, in_conflict, undominated
-from paraflex.report.designs import metric_name
+from paraflex.figures.designs import DesignTable, column_label, in_conflict, undominated
 
 # Largest number of rows drawn and of runs in motion; numbers of the latter that are best in the first metric, and that
 # are on the front.
@@ -38,22 +37,22 @@ def best_runs(designs: DesignTable) -> list[Picked]:
     first, *others = judged
     why: dict[int, list[str]] = {}
     for place, row in enumerate(_least(designs, first)[:_BEST]):
-        why.setdefault(row, []).append(f"{metric_name(first)}{'' if place == 0 else f', {_nth(place + 1)}'}")
+        why.setdefault(row, []).append(f"{column_label(first)}{'' if place == 0 else f', {_nth(place + 1)}'}")
     best = next(iter(why))
     for name, row in _least_of_series(designs, first).items():
         if row == best:
             continue
         if row in why or len(why) < MOST_RUNS - _FRONT:
-            why.setdefault(row, []).append(f"{metric_name(first)} in {name}")
+            why.setdefault(row, []).append(f"{column_label(first)} in {name}")
     pair = in_conflict(designs, designs.judged)
     if len(pair) == 2:
         for row in _knees(designs, *pair):
             if len(why) < MOST_RUNS:
-                why.setdefault(row, []).append(f"front of {metric_name(pair[0])} and {metric_name(pair[1])}")
+                why.setdefault(row, []).append(f"front of {column_label(pair[0])} and {column_label(pair[1])}")
     for name in others:
         row = _least(designs, name)[0]
         if row in why or len(why) < MOST_RUNS:
-            why.setdefault(row, []).append(metric_name(name))
+            why.setdefault(row, []).append(column_label(name))
     return [Picked(row, tuple(reasons)) for row, reasons in why.items()]
 
 

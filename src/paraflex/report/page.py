@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cache
 from html import escape
 from importlib.metadata import version
@@ -13,18 +13,28 @@ from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from string import Template
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments, given_as
 from paraflex.errors import InputError
-from paraflex.figures import charts as described
-from paraflex.figures.charts import Panel
+from paraflex.figures.charts import (
+    Array,
+    Axis,
+    Chart,
+    Curve,
+    Panel,
+    ShownUnits,
+    is_logarithmic,
+    joined,
+    symmetrical_numbers,
+)
 from paraflex.folders import added_to
 from paraflex.formatting import logarithmic_number, typeset
 from paraflex.plots.themes import THEMES
+from paraflex.report.designs import Designs
 from paraflex.report.film import Animation
 from paraflex.report.packing import Series
 from paraflex.units import DisplayUnit
@@ -35,171 +45,6 @@ _FOLDED = 3
 _ORIGIN = "How these results were made"
 _STYLES = ("page.css",)
 _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
-
-
-class Look(NamedTuple):
-    """Look of a curve: index of one of the page's eight colours, or None for the colour of text, and dashes.
-
-    Dashes are 0 solid, 1 dashed, 2 dotted, 3 dash-dotted, 4 long dashes.
-    """
-
-    colour: int | None = None
-    dash: int = 0
-
-
-PLAIN_LOOK = Look()
-
-
-@dataclass(frozen=True)
-class Curve:
-    """Curve of a chart.
-
-    Attributes
-    ----------
-    name : str
-        Name of the curve.
-    y : (k,) array
-        Ordinates in the chart's unit; NaN where there is no value.
-    x : (k,) array, optional
-        Abscissae; the page's time by default.
-    look : Look
-        Colour and dashes.
-    run : int, optional
-        Run of the curve, which is drawn thicker than others when this run is selected.
-    shown : tuple of int, optional
-        Selected runs with which the curve is shown; any by default.
-    choice : int, optional
-        Choice of the chart that shows the curve; every choice by default.
-    quiet : bool
-        Whether the curve is omitted from the label at the pointer.
-    mark : str
-        Marks at its points instead of a line, "ring" or "cross"; empty (default) for a line.
-    texts : sequence of str
-        Text of each mark in the label at the pointer.
-    """
-
-    name: str
-    y: ArrayLike
-    x: ArrayLike | None = None
-    look: Look = PLAIN_LOOK
-    run: int | None = None
-    shown: tuple[int, ...] | None = None
-    choice: int | None = None
-    quiet: bool = False
-    mark: str = ""
-    texts: Sequence[str] = ()
-
-
-class Picker(NamedTuple):
-    """Choice of a column for a chart of designs: name, columns, and index of the initial one."""
-
-    name: str
-    columns: Sequence[int]
-    chosen: int = 0
-
-
-@dataclass(frozen=True)
-class Chart:
-    """Chart of a page.
-
-    Attributes
-    ----------
-    identity : str
-        Identifier, unique within the page.
-    title, y, x : str
-        Title, and labels of the axes with units.
-    curves : sequence of Curve
-        Curves of the chart.
-    choices : sequence of str
-        Names of the members that the chart shows one at a time, such as links or motors.
-    choosing : str
-        Noun for a choice, for screen readers.
-    log, log_x, equal : bool
-        Whether the vertical axis is logarithmic, whether the horizontal one is, and whether their scales are equal.
-    over_time : bool
-        Whether x is time: a line then moves with the animation, otherwise a dot on every curve of a run.
-    note : str
-        Sentence below the chart.
-    layout : mapping
-        Additional parts of Plotly's `layout`, such as numbers of axes and shapes.
-    figure : mapping, optional
-        Plotly's own `data` and `layout` in place of curves; colours and fonts of the page are added.
-    drawer : str
-        Chart of the page's designs in place of curves: "responses", "front", "parallel" or "distribution".
-    pickers : sequence of Picker
-        Choices of columns that the reader makes for the drawer.
-    """
-
-    identity: str
-    title: str
-    y: str
-    curves: Sequence[Curve] = ()
-    x: str = "time [s]"
-    choices: Sequence[str] = ()
-    choosing: str = "shown"
-    log: bool = False
-    log_x: bool = False
-    equal: bool = False
-    over_time: bool = True
-    note: str = ""
-    layout: Mapping[str, Any] = field(default_factory=dict)
-    figure: Mapping[str, Any] | None = None
-    drawer: str = ""
-    pickers: Sequence[Picker] = ()
-
-
-@dataclass(frozen=True)
-class DesignColumn:
-    """Column with one number per run.
-
-    Attributes
-    ----------
-    identity : str
-        Name of the column in the table of the study.
-    name, unit : str
-        Name and unit as shown.
-    values : (k,) array
-        Values in that unit; NaN where there is none.
-    parameter : bool
-        Whether the column is a parameter or (default) a metric.
-    log : bool
-        Whether its axis is logarithmic.
-    """
-
-    identity: str
-    name: str
-    unit: str
-    values: ArrayLike
-    parameter: bool = False
-    log: bool = False
-
-
-@dataclass(frozen=True)
-class Designs:
-    """Runs of many designs for the charts of the page.
-
-    Attributes
-    ----------
-    columns : sequence of DesignColumn
-        Columns, parameters first.
-    telling : str
-        Name of the property that distinguishes series of runs, such as "mode".
-    series : sequence of (str, Look)
-        Names and looks of the series.
-    member : (k,) array of int
-        Index of the series of each run.
-    number : (k,) array of int
-        Number of the design of each run.
-    shown : (k,) array of int
-        Index of each run among the runs of the page; -1 for most.
-    """
-
-    columns: Sequence[DesignColumn]
-    telling: str
-    series: Sequence[tuple[str, Look]]
-    member: ArrayLike
-    number: ArrayLike
-    shown: ArrayLike
 
 
 @given_as("a page", "what tracking_page or motion_page returns")
@@ -344,7 +189,7 @@ def _data(page: Page) -> dict[str, Any]:
         "selected": page.selected,
         "panels": panels(page.panels),
         "survey": panels(page.survey),
-        "designs": None if page.designs is None else _designs(page.designs, series),
+        "designs": None if page.designs is None else page.designs.to_dict(series),
         "film": None if page.film is None else page.film.to_dict(),
         "palettes": {name: look.links for name, look in THEMES.items()},
         "series": series.to_dict(),
@@ -356,39 +201,31 @@ def _fields(thing: Any, *left_out: str) -> dict[str, Any]:
     return {one.name: getattr(thing, one.name) for one in fields(thing) if one.name not in left_out}
 
 
-def _designs(designs: Designs, series: Series) -> dict[str, Any]:
-    numbers = {name: series.add(getattr(designs, name), exact=True) for name in ("member", "number", "shown")}
-    return numbers | {
-        "telling": designs.telling,
-        "columns": [_fields(column, "values") | {"row": series.add(column.values)} for column in designs.columns],
-        "series": [{"name": name} | look._asdict() for name, look in designs.series],
-    }
-
-
-def _described(chart: described.Chart, series: Series, time: int) -> dict[str, Any]:
+def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
     """Return a described chart for the scripts, in the units in which it is shown."""
     units = chart.shown_units()
     labels = [axis.label(unit) for axis, unit in zip(chart.axes, units.y, strict=False)]
 
-    def curve(one: described.Curve) -> dict[str, Any]:
+    def curve(one: Curve) -> dict[str, Any]:
         x = time if one.x is None else series.add(_placed(chart.x, units.x, one.x))
         y = series.add(_placed(chart.axis(one.choice), units.of(one.choice), one.y))
         texts = list(map(typeset, one.texts))
         return _fields(one, "look", "desired", "stopped") | one.look._asdict() | {"x": x, "y": y, "texts": texts}
 
-    ys, xs = (described.joined(each) for each in (
+    ys, xs = (joined(each) for each in (
         (one.y for one in chart.curves), (one.x for one in chart.curves if one.x is not None)
     ))  # fmt: skip
     return {
         "identity": chart.identity, "title": chart.title, "y": labels, "x": chart.x.label(units.x),
         "curves": [curve(one) for one in chart.curves], "choices": list(chart.choices), "choosing": chart.choosing,
-        "log": described.is_logarithmic(chart.axis(None), ys), "log_x": described.is_logarithmic(chart.x, xs),
-        "equal": chart.equal or bool(chart.x.linear_below), "over_time": chart.over_time, "note": chart.note,
-        "layout": _layout(chart, units), "figure": None, "drawer": "", "pickers": [],
+        "log": is_logarithmic(chart.axis(None), ys), "log_x": is_logarithmic(chart.x, xs),
+        "equal": chart.equal, "over_time": chart.over_time, "note": chart.note, "layout": _layout(chart, units),
+        "figure": None, "drawer": getattr(chart, "drawer", ""),
+        "pickers": [picker._asdict() for picker in getattr(chart, "pickers", ())],
     }  # fmt: skip
 
 
-def _layout(chart: described.Chart, units: described.ShownUnits) -> dict[str, Any]:
+def _layout(chart: Chart, units: ShownUnits) -> dict[str, Any]:
     """Return additional parts of Plotly's layout: shaded ranges, levels, and numbers of symmetrical axes and names."""
     shade = {"type": "rect", "xref": "x", "yref": "paper", "y0": 0.0, "y1": 1.0, "fillcolor": "rgba(128,128,128,0.14)",
              "line": {"width": 0}, "layer": "below"}  # fmt: skip
@@ -399,7 +236,7 @@ def _layout(chart: described.Chart, units: described.ShownUnits) -> dict[str, An
         "x1": 1.0,
         "line": {"width": 1, "dash": "dash", "color": "grey"},
     }
-    end = chart.x.high or described.joined(one.x for one in chart.curves if one.x is not None).max(initial=0.0)
+    end = chart.x.high or joined(one.x for one in chart.curves if one.x is not None).max(initial=0.0)
     ends = ([x if np.isfinite(x) else end for x in span[:2]] for span in chart.spans)
     shapes = [shade | dict(zip(("x0", "x1"), _placed(chart.x, units.x, each).tolist(), strict=True)) for each in ends]
     shapes += [level | {"y0": units.of(None).factor * y, "y1": units.of(None).factor * y} for y in chart.levels]
@@ -411,7 +248,7 @@ def _layout(chart: described.Chart, units: described.ShownUnits) -> dict[str, An
     return out
 
 
-def _placed(axis: described.Axis, unit: DisplayUnit, values: ArrayLike) -> described.Array:
+def _placed(axis: Axis, unit: DisplayUnit, values: ArrayLike) -> Array:
     """Return values in the unit of an axis, or the places of values on a symmetrical logarithmic axis."""
     values = np.asarray(values, dtype=float)
     if not axis.linear_below:
@@ -419,27 +256,12 @@ def _placed(axis: described.Axis, unit: DisplayUnit, values: ArrayLike) -> descr
     return np.sign(values) * np.log10(1.0 + np.abs(values) / axis.linear_below)
 
 
-def _symmetrical(axis: described.Axis, unit: DisplayUnit) -> dict[str, Any]:
+def _symmetrical(axis: Axis, unit: DisplayUnit) -> dict[str, Any]:
     """Return Plotly's layout of a symmetrical logarithmic axis."""
-    ticks, limits = described.symmetrical_numbers(axis), [axis.low or 0.0, axis.high or 0.0]
+    ticks, limits = symmetrical_numbers(axis), [axis.low or 0.0, axis.high or 0.0]
     return {
         "tickvals": _placed(axis, unit, ticks).tolist(), "range": _placed(axis, unit, limits).tolist(),
         "ticktext": list(map(logarithmic_number, unit.factor * ticks)), "zeroline": axis.zero, "tickangle": 0,
-    }  # fmt: skip
-
-
-def _chart(chart: Chart | described.Chart, series: Series, time: int) -> dict[str, Any]:
-    if isinstance(chart, described.Chart):
-        return _described(chart, series, time)
-    return _fields(chart) | {
-        "pickers": [picker._asdict() for picker in chart.pickers],
-        "choices": list(chart.choices),
-        "figure": None if chart.figure is None else dict(chart.figure),
-        "curves": [
-            _fields(curve, "look") | curve.look._asdict()
-            | {"x": time if curve.x is None else series.add(curve.x), "y": series.add(curve.y)}
-            for curve in chart.curves
-        ],
     }  # fmt: skip
 
 

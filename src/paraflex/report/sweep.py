@@ -11,27 +11,21 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from paraflex.figures.catalogue import page_panels
+from paraflex.figures import search
+from paraflex.figures.catalogue import page_panels, prepared
+from paraflex.figures.charts import Panel
+from paraflex.figures.designs import DesignTable, column_label, failure_table
+from paraflex.figures.run_motion import strain_chart
 from paraflex.figures.runs import thinned
-from paraflex.plots.designs import DesignTable
+from paraflex.figures.search import IDENTIFICATION
+from paraflex.figures.tables import Column, Table, in_row_units
+from paraflex.formatting import NO_VALUE, count, quantity
 from paraflex.report.choice import Picked, drawn_rows
-from paraflex.report.curves import (
-    ERRORS,
-    STRAIN,
-    TIPS,
-    bending,
-    compared,
-    errors,
-    followed,
-    plane_path,
-    torque_chart,
-)
-from paraflex.report.designs import columns, metric_name, reasons, shown_unit
+from paraflex.report.designs import LOWER, Designs, survey
 from paraflex.report.film import animation
-from paraflex.report.page import Page, Panel
-from paraflex.report.search import IDENTIFICATION, search_tables, search_tiles
-from paraflex.report.survey import LOWER, Step, drawn_designs, survey
-from paraflex.report.text import NO_VALUE, count, number, table
+from paraflex.report.page import Page
+from paraflex.report.search import search_tiles
+from paraflex.report.text import sections, table_html
 
 _NO_RUN = "None of the best designs was simulated again, so there is no animation."
 # Largest number of columns in the table of best designs; the study's table has all.
@@ -42,6 +36,8 @@ _SHOWN_VARIABLES = (
     "spring_station", "joint_rail", "gear_radius", "load_station", "load_force", "load_torque", "stress",
     "joint_coordinate", "joint_speed", "drive_torque", "drive_power",
 )  # fmt: skip
+# Charts of the runs in motion, along a path and without one.
+_ALONG_PATH = ("tracking_distance", "end_effector_path", "motor_torques", "link_deflections")
 _SHOWN_FIGURES = ("beam_stresses", "joint_motions", "drive_efforts")
 _STATIONS = ("point_station", "spring_station", "joint_rail", "load_station")
 _DIFFERING = (*_STATIONS, "gear_radius")
@@ -52,10 +48,9 @@ _COORDINATES = (
 
 
 class VariedParameter(NamedTuple):
-    """Varied parameter: fields of the mechanism's file, unit, smallest and largest value, distribution."""
+    """Varied parameter: fields of the mechanism's file, smallest and largest value, distribution."""
 
     fields: tuple[str, ...]
-    unit: str
     low: float
     high: float
     spread: str
@@ -68,7 +63,7 @@ class StudyAccount:
     Attributes
     ----------
     kind : str
-        Kind of study: "sweep", "optimisation" or "identification".
+        Kind of study: "sweep", "optimisation", "identification" or "indices".
     name, mechanism : str
         Names of the study and of the mechanism.
     total : int or None
@@ -82,9 +77,7 @@ class StudyAccount:
     failed : mapping of int to str
         Reasons why other rows could not be repeated.
     found : mapping of str to object
-        Content of a search's `result.json`; empty for a sweep.
-    history : sequence of Step
-        Evaluated designs of a search, in order.
+        Result of a search or of Sobol indices as plain numbers; empty for a sweep.
     notes : sequence of str
         Notices at the top of the page.
     """
@@ -98,13 +91,7 @@ class StudyAccount:
     runs: Mapping[int, xr.Dataset] = field(default_factory=dict)
     failed: Mapping[int, str] = field(default_factory=dict)
     found: Mapping[str, Any] = field(default_factory=dict)
-    history: Sequence[Step] = ()
     notes: Sequence[str] = ()
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Units of the parameters."""
-        return {name: one.unit for name, one in self.parameters.items()}
 
     @property
     def seeks_least(self) -> bool:
@@ -128,8 +115,9 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
     labels = [designs.label(row) for row in shown]
     data = side_by_side(list(shown.values()), labels) if shown else None
     rows = drawn_rows(designs, [one.row for one in picked])
-    logarithmic = [name for name, one in account.parameters.items() if one.spread == "log"]
-    drawn = columns(designs, rows, account.units, logarithmic)
+    drawn = Designs(designs, rows, {row: k for k, row in enumerate(shown)})
+    indices = [search.index_table(account.found)] if "indices" in account.found else []
+    first = [chart for panel in page_panels(account.kind, account.found) for chart in panel.charts]
     few = None if data is None else thinned(data)
     missing = dict(account.failed) | dict.fromkeys(
         others, "it has other bodies, joints, motors or springs than the first"
@@ -141,12 +129,12 @@ def sweep_page(designs: DesignTable, picked: Sequence[Picked], account: StudyAcc
         subtitle=_subtitle(designs, account),
         facts=account.facts,
         figures=_tiles(designs, account),
-        summary=search_tables(account.found, account.units, designs.units),
-        survey=survey(designs, rows, drawn, account.history, seeks_least=account.seeks_least) if rows.size else [],
-        designs=drawn_designs(designs, rows, drawn, {row: k for k, row in enumerate(shown)}) if rows.size else None,
-        tables=[_best_table(designs, picked, list(shown), account)] if picked else [],
-        more=[("What was varied", _parameter_table(account)), *_trouble(designs)],
-        panels=[] if few is None else _panels(few, labels, account),
+        summary=sections(search.tables(account.found, designs.units)),
+        survey=survey(drawn, first, seeks_least=account.seeks_least) if rows.size else [],
+        designs=drawn if rows.size else None,
+        tables=sections([_best_table(designs, picked, list(shown), account)]),
+        more=[*sections([*indices, _parameter_table(designs, account)]), *_trouble(designs)],
+        panels=[] if few is None else _panels(few, account),
         time=[] if few is None else few["time"].values,
         runs=labels,
         selecting="design",
@@ -237,66 +225,46 @@ def _tiles(designs: DesignTable, account: StudyAccount) -> list[tuple[str, str, 
     of = f"of {count(account.total)} runs" if account.total is not None else f"of {count(done)} runs"
     tiles = [("complete", f"{count(counts.get('complete', 0))}", ", ".join([of, *rest]))]
     if account.found.get("values"):
-        return [*search_tiles(account.found, account.units, designs.units), *tiles]
+        return [*search_tiles(account.found, designs.units), *tiles]
     for name in designs.judged[:3]:
         values = designs.metrics[name]
         known = np.flatnonzero(designs.complete & np.isfinite(values))
         if known.size:
             row = int(known[np.argmin(values[known])])
-            unit, factor = shown_unit(designs.units.get(name, ""), values[known])
-            value = f"{number(values[row], factor)} {unit}".rstrip()
-            tiles.append((metric_name(name), value, f"least, of {designs.label(row)}"))
+            value = quantity(values[row], designs.units.get(name, ""), designs.axis(name).shown, digits=4, padded=False)
+            tiles.append((column_label(name), value, f"least, of {designs.label(row)}"))
     return tiles
 
 
-def _best_table(
-    designs: DesignTable, picked: Sequence[Picked], shown: Sequence[int], account: StudyAccount
-) -> tuple[str, str]:
-    """Return title and table of the best designs: parameters, metrics, and the metrics in which they are best."""
-    title, why_head, note = (
-        ("Best designs", "best in", LOWER) if account.seeks_least else ("Designs shown", "which", "")
-    )
-    named = [*((name, True) for name in designs.varied), *((name, False) for name in designs.judged)]
-    heads, cells, keys = [("design", "")], {}, {}
-    names = {row: designs.label(row) for row, _ in picked}
-    for row, why in picked:
-        cells[row], keys[row] = ["; ".join(why)], [int(designs.design[row]), None]
-    heads.append((why_head, ""))
-    for name, parameter in named[:_MOST_COLUMNS]:
-        values = (designs.parameters if parameter else designs.metrics)[name]
-        unit, factor = shown_unit((account.units if parameter else designs.units).get(name, ""), values)
-        heads.append((name.replace("_", " ") if parameter else metric_name(name), f"[{unit}]" if unit else ""))
-        for row, _ in picked:
-            cells[row].append(number(values[row], factor))
-            keys[row].append(float(values[row]))
-    selects = {names[row]: k for k, row in enumerate(shown)}
+def _best_table(designs: DesignTable, picked: Sequence[Picked], shown: Sequence[int], account: StudyAccount) -> Table:
+    """Return the table of the best designs: parameters, metrics, and the metrics in which they are best."""
+    title, why, note = ("Best designs", "best in", LOWER) if account.seeks_least else ("Designs shown", "which", "")
+    rows = [row for row, _ in picked]
+    labels = list(map(designs.label, rows))
+    columns = [Column("design", labels), Column(why, ["; ".join(reasons) for _, reasons in picked])]
+    for name in [*designs.varied, *designs.judged][:_MOST_COLUMNS]:
+        axis, values = designs.axis(name), designs.column(name)
+        columns.append(Column(axis.name, [float(values[row]) for row in rows], axis.unit, shown=axis.shown))
     if shown:
         note = f"{note} A selected row is shown in motion below and ringed in the charts.".lstrip()
-    return title, table(
-        heads, [(names[row], cells[row]) for row, _ in picked], caption=title, note=note, runs=selects,
-        keys={names[row]: keys[row] for row, _ in picked},
-    )  # fmt: skip
+    return Table(title, columns, note, {designs.label(row): k for k, row in enumerate(shown)}, sortable=True)
 
 
-def _parameter_table(account: StudyAccount) -> str:
-    rows = []
-    for name, one in account.parameters.items():
-        unit, factor = shown_unit(one.unit, np.array([one.low, one.high]))
-        spread = {"log": "in their logarithm", "values": "as listed", "linear": "evenly"}.get(one.spread, one.spread)
-        rows.append((name, ["\n".join([one.fields[0], ", ".join(one.fields[1:])]) if one.fields else NO_VALUE,
-                            number(one.low, factor), number(one.high, factor), unit or NO_VALUE, spread]))  # fmt: skip
-    heads = [("parameter", ""), ("field", ""), ("from", ""), ("to", ""), ("unit", ""), ("spread", "")]
-    return table(heads, rows, caption="What was varied")
+def _parameter_table(designs: DesignTable, account: StudyAccount) -> Table:
+    given = account.parameters.values()
+    words = {"log": "in their logarithm", "values": "as listed", "linear": "evenly"}
+    fields = ["\n".join([one.fields[0], ", ".join(one.fields[1:])]) if one.fields else NO_VALUE for one in given]
+    ends = [Column("from", [one.low for one in given]), Column("to", [one.high for one in given])]
+    return Table("What was varied", [
+        Column("parameter", list(account.parameters)), Column("field", fields),
+        *in_row_units(ends, [designs.units.get(name, "") for name in account.parameters]),
+        Column("spread", [words.get(one.spread, one.spread) for one in given]),
+    ])  # fmt: skip
 
 
 def _trouble(designs: DesignTable) -> list[tuple[str, str]]:
-    """Return the table of reasons why runs are not complete, with similar ones grouped."""
-    found = reasons(designs)
-    if not found:
-        return []
-    rows = [(status or NO_VALUE, [count(number), reason]) for status, reason, number in found]
-    heads = [("status", ""), ("runs", ""), ("reason", "one of those alike")]
-    return [("Runs that are not complete", f'<div class="long">{table(heads, rows, caption="Reasons")}</div>')]
+    table = failure_table(designs)
+    return [(table.title, f'<div class="long">{table_html(table)}</div>')] if table else []
 
 
 def _unfinished(designs: DesignTable, account: StudyAccount) -> list[str]:
@@ -306,19 +274,9 @@ def _unfinished(designs: DesignTable, account: StudyAccount) -> list[str]:
     return [f"The study is not finished: these are {count(done)} of {count(account.total)} runs."]
 
 
-def _panels(data: xr.Dataset, runs: list[str], account: StudyAccount) -> list[Panel]:
+def _panels(data: xr.Dataset, account: StudyAccount) -> list[Panel]:
     """Return the charts over time of the runs shown in motion."""
-    data = data.transpose("mode", "time", ...)
     title = f"The {'best ' if account.seeks_least else ''}designs in motion"
-    if "end_effector_desired" not in data:
-        loads = [chart for panel in page_panels("motion", data, _SHOWN_FIGURES) for chart in panel.charts]
-        return [Panel(title, [*loads, compared(STRAIN, data["strain_energy"], runs)])]
-    charts = [
-        compared(ERRORS, errors(data), runs),
-        plane_path(data, runs, common=False),
-        followed(torque_chart(data), data["torque"], runs, selecting="design"),
-    ]
-    if bending(data).size:
-        charts.append(followed(TIPS, bending(data), runs, selecting="design"))
-    charts.append(compared(STRAIN, data["strain_energy"], runs))
-    return [Panel(title, charts)]
+    kind, names = ("tracking", _ALONG_PATH) if "end_effector_desired" in data else ("motion", _SHOWN_FIGURES)
+    charts = [chart for panel in page_panels(kind, data, names) for chart in panel.charts]
+    return [Panel(title, [*charts, strain_chart(prepared(data))])]

@@ -120,13 +120,15 @@ def table(
 
 def table_html(shown: Table) -> str:
     """Return the HTML of a table, with its numbers typeset and the units below the headings."""
-    heads = [(text_symbol(name), f"[{unit}]" if unit and column.is_numeric else unit)
+    heads = [(text_symbol(name), typeset(f"[{unit}]") if unit and column.is_numeric else unit)
              for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
     rows = [
         (text_symbol(name), ["\n".join(typeset(text_symbol(line)) for line in cell.split("\n")) for cell in cells])
         for name, *cells in shown.texts()
     ]
-    return table(heads, rows, caption=shown.title, note=shown.note, runs=shown.runs)
+    cells = zip(*(column.cells for column in shown.columns), strict=True)
+    keys = {name: row for (name, _), row in zip(rows, cells, strict=True)} if shown.sortable else None
+    return table(heads, rows, caption=shown.title, note=shown.note, runs=shown.runs, keys=keys)  # type: ignore[arg-type]
 
 
 def table_pairs(shown: Table) -> list[tuple[str, str]]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from paraflex.designs.sweep import SweepResult
 from paraflex.display import described, facts, page, sentence, table
+from paraflex.figures import search, sensitivity
 from paraflex.figures.laws import law_table
 from paraflex.figures.methods import tables
+from paraflex.figures.search import IDENTIFICATION
 from paraflex.figures.verification import model_table, path_extent
 from paraflex.formatting import number, quantity
 from paraflex.late import view
@@ -19,9 +20,7 @@ from paraflex.results.validity import validity_line
 from paraflex.studies.agreement import Verification
 from paraflex.studies.comparison import MethodComparison
 from paraflex.studies.law_comparison import LawComparison
-from paraflex.studies.optimisation.identify import IdentificationResult
 from paraflex.studies.optimisation.indices import IndicesResult
-from paraflex.studies.optimisation.optimise import OptimisationResult
 from paraflex.studies.optimisation.result import SearchResult
 from paraflex.studies.sensitivities.study import Sensitivities
 from paraflex.studies.tracking import StudyResult
@@ -66,7 +65,7 @@ def study_html(result: StudyResult) -> str:
 @view.register(SweepResult)
 def sweep_html(result: SweepResult) -> str:
     """Return the number of runs by status and the path of the table as HTML."""
-    rate = f"{result.fresh} runs in {result.seconds:.3g} s" if result.fresh else None
+    rate = f"{result.fresh} runs in {quantity(result.seconds, 's', padded=False)}" if result.fresh else None
     known = [
         ("runs", f"{result.done} of {result.total}"),
         *sorted(result.counts.items()),
@@ -76,74 +75,34 @@ def sweep_html(result: SweepResult) -> str:
     return page(f"sweep: {_state(result.complete, result.interrupted)}", facts(known))
 
 
-@view.register(OptimisationResult)
-def optimisation_html(result: OptimisationResult) -> str:
-    """Return the best design and the start, with parameters, objective and metrics, as HTML."""
-    numbers = [(name, result.start[name], value, result.bounds.get(name, "")) for name, value in result.values.items()]
-    metrics = [("objective", result.start_objective, result.objective, "")]
-    metrics += [(name, result.start_metrics.get(name), value, "") for name, value in result.metrics.items()]
-    limits = "" if result.holds_limits or not result.values else "no design holds all limits"
+@view.register(SearchResult)
+def search_html(result: SearchResult) -> str:
+    """Return the best design and the start, with parameters, and metrics or targets, as HTML."""
+    found = result.to_dict()
+    ended = [] if found["kind"] == IDENTIFICATION else [("objective", found["objective"])]
+    if found["kind"] == IDENTIFICATION:
+        ended = [("RMS residual", found["residual"]), ("at the start", found["start_residual"]),
+                 ("derivatives", found["derivatives"])]  # fmt: skip
     return page(
-        f"optimisation: {result.stopped}",
-        sentence(limits),
-        table(("parameter", "start", "best", "at its bound"), numbers),
-        table(("", "start", "best", ""), metrics if result.values else ()),
-        facts(_search_facts(result)),
-    )
-
-
-@view.register(IdentificationResult)
-def identification_html(result: IdentificationResult) -> str:
-    """Return the identified parameters, their deviations, and the value of every target as HTML."""
-    found = result.confidence
-    deviations: Mapping[str, float | None] = {} if found is None else found.deviations
-    reasons: Mapping[str, str] = {} if found is None else found.reasons
-    numbers = [
-        (
-            name,
-            result.start[name],
-            value,
-            _given(deviations.get(name), reasons.get(name, result.stopped)),
-            result.bounds.get(name, ""),
-        )
-        for name, value in result.values.items()
-    ]
-    targets = [
-        (each.target.column, each.target.path, each.target.mode, each.target.value, each.start, each.reached)
-        for each in result.targets
-    ]
-    residuals = [("RMS residual", result.residual), ("at the start", result.start_residual)]
-    return page(
-        f"identification: {result.stopped}",
-        table(("parameter", "start", "found", "deviation", "at its bound"), numbers),
-        table(("target", "path", "mode", "value", "start", "reached"), targets),
-        facts([*residuals, ("derivatives", result.derivatives), *_search_facts(result)]),
+        f"{result.kind}: {result.stopped}",
+        *(described(table) for table in search.tables(found, result.units)),
+        facts([*ended, *_search_facts(result)]),
     )
 
 
 @view.register(IndicesResult)
 def indices_html(result: IndicesResult) -> str:
     """Return first-order and total indices, one row per metric, path, mode and parameter, as HTML."""
-    names = ("metric", "path", "mode", "parameter", "first", "first_confidence", "total", "total_confidence")
-    rows = [tuple(row[name] for name in names) for row in result.to_dict()["indices"]]
-    heads = ("metric", "path", "mode", "parameter", "first order", "±", "total", "±")
-    shown = table(heads, rows[:_MOST_LISTED], "with half the widths of the intervals of 95 %")
-    return page(f"Sobol indices: {_state(result.sweep.complete, result.sweep.interrupted)}", shown, _more(len(rows)))
+    state = _state(result.sweep.complete, result.sweep.interrupted)
+    return page(f"Sobol indices: {state}", described(search.index_table(result.to_dict())))
 
 
 @view.register(Sensitivities)
 def sensitivities_html(found: Sensitivities) -> str:
-    """Return the elasticities of every metric by every parameter, one row per metric, path and mode, as HTML."""
-    relative = found.relative
-    rows = [
-        (metric, path, mode, float(found.values[i, j]), unit, *(float(x) for x in relative[i, j]))
-        for i, (path, mode) in enumerate(found.rows)
-        for j, (metric, unit) in enumerate(zip(found.metrics, found.units, strict=True))
-    ]
-    heads = ("metric", "path", "mode", "value", "unit", *(f"by {name}" for name in found.parameters))
-    caption = "change of metrics by that of parameters [% / %]"
-    return page(f"{found.name}: sensitivities of {found.mechanism}", table(heads, rows[:_MOST_LISTED], caption),
-                _more(len(rows)))  # fmt: skip
+    """Return the elasticities of every metric by every parameter, a table for each path and mode, as HTML."""
+    numbers = found.to_dict()
+    shown = [next(sensitivity.tables(numbers, run)) for run in range(len(found.rows))]
+    return page(f"{found.name}: sensitivities of {found.mechanism}", *map(described, shown))
 
 
 @view.register(Verification)
@@ -187,7 +146,10 @@ def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:
     return [
         ("designs", f"{result.evaluations}, {result.failed} of them not running"),
         ("one that does not run", result.reasons[0] if result.reasons else None),
-        ("in this session", f"{result.fresh} designs in {result.seconds:.3g} s" if result.fresh else None),
+        (
+            "in this session",
+            f"{result.fresh} designs in {quantity(result.seconds, 's', padded=False)}" if result.fresh else None,
+        ),
         ("table", str(result.table)),
         ("folder", str(result.folder)),
     ]
@@ -195,10 +157,6 @@ def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:
 
 def _state(finished: bool, interrupted: bool) -> str:
     return "interrupted" if interrupted else "finished" if finished else "not finished"
-
-
-def _given(deviation: float | None, reason: str) -> float | str:
-    return f"not given: {reason}" if deviation is None else deviation
 
 
 def _millimetres(metres: float | None) -> float | None:

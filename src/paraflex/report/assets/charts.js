@@ -35,12 +35,13 @@ const charts = (() => {
     return shown.map((curve) => {
       const chosen = beside && curve.run === state.run;
       if (curve.mark === "bar") return {
-        type: "bar", orientation: "h", name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y), width: 0.6,
+        type: "bar", orientation: "h", name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y), width: curve.thickness,
         marker: { color: lineColour(curve) }, hovertemplate: "%{x:.4~g}<extra>%{fullData.name}</extra>", visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       if (curve.mark) return {
         type: "scatter", mode: curve.line ? "lines+markers" : "markers", line: { color: lineColour(curve), dash: DASHES[curve.dash], width: 1.4 }, name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y),
-        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: (curve.size ?? 1) * (curve.mark === "ring" ? 9 : 8), line: { width: 1.6, color: lineColour(curve) } },
+        opacity: curve.faint ? 0.5 : 1,
+        marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: curve.faint ? 6 : (curve.size ?? 1) * (curve.mark === "ring" ? 9 : 8), line: { width: 1.6, color: lineColour(curve) } },
         text: curve.texts.map(plain), hovertemplate: `${curve.texts.length ? "%{text}" : "%{x:.4~g}, %{y:.4~g}"}<extra>%{fullData.name}</extra>`, visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       return {
@@ -106,7 +107,7 @@ const charts = (() => {
     }
     return {
       ...common,
-      hovermode: overTime ? "x unified" : "closest",
+      hovermode: overTime ? "x unified" : "closest", barmode: "overlay",
       xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : logX ? { type: "log", dtick: 1, tickformat: "~g", hoverformat: ".4~g" } : added.xaxis || {}),
       yaxis: axis(yLabel(chart), { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal && !added.xaxis ? { scaleanchor: "x" } : {}), hoverformat: ".4~g", ...added.yaxis }),
       shapes: added.shapes || [],
@@ -142,8 +143,8 @@ const charts = (() => {
     if (!curve.mark || curve.line) svg.append(line);
     if (curve.mark) {
       const mark = document.createElementNS("http://www.w3.org/2000/svg", "path");
-      const d = SHAPES[curve.mark], fill = curve.mark === "ring" ? "none" : stroke;
-      for (const [name, value] of Object.entries({ d, stroke, "stroke-width": 1.6, fill })) mark.setAttribute(name, value);
+      const fill = ["square", "dot", "bar"].includes(curve.mark) ? stroke : "none";
+      for (const [name, value] of Object.entries({ d: SHAPES[curve.mark], stroke, "stroke-width": 1.6, fill })) mark.setAttribute(name, value);
       svg.append(mark);
     }
     return svg;

@@ -262,7 +262,7 @@ const designs = (() => {
         const down = head.getAttribute("aria-sort") === "ascending";
         for (const each of table.tHead.rows[0].cells) each.removeAttribute("aria-sort");
         head.setAttribute("aria-sort", down ? "descending" : "ascending");
-        const order = (a, b) => (a === null) - (b === null) || (down ? -1 : 1) * (a < b ? -1 : a > b ? 1 : 0);
+        const order = (a, b) => (a === null) - (b === null) || (down ? -1 : 1) * (typeof a === "string" ? a.localeCompare(b, "en", { numeric: true }) : a < b ? -1 : a > b ? 1 : 0);
         body.append(...[...body.rows].sort((a, b) => order(keyed(a), keyed(b))));
       });
     });

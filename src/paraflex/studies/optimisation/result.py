@@ -51,6 +51,8 @@ class SearchResult(KeptResult):
         Wall time of the session [s].
     history : tuple of (int, float or None, bool)
         Number, objective or residual (None if it failed), and satisfaction of the limits, for every design.
+    units : mapping of str to str
+        SI units of parameters and metrics.
     """
 
     values_file = "result.json"
@@ -68,6 +70,7 @@ class SearchResult(KeptResult):
     interrupted: bool
     seconds: float
     history: tuple[tuple[int, float | None, bool], ...] = field(repr=False, default=())
+    units: Mapping[str, str] = field(repr=False, default_factory=dict)
 
     @property
     def complete(self) -> bool:
@@ -96,6 +99,7 @@ def of_session(study: DesignStudy[Result], folder: Path, session: Session, best:
         "folder": folder,
         "values": {} if best is None else dict(zip(names, best.design, strict=True)),
         "start": dict(zip(names, study.start, strict=True)),
+        "units": study.setting.units(study.base.members),
         "bounds": {} if best is None else at_bounds(study, best.design),
         "evaluations": len(history),
         "fresh": session.evaluate.fresh,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +15,19 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.reopen import StudyFolder, open_study, run_again
 from paraflex.designs.schema import DEFAULT_NAME
-from paraflex.designs.units import unit_of
 from paraflex.errors import InputError, ParaflexError
+from paraflex.figures.designs import DesignTable, read_designs
+from paraflex.figures.search import IDENTIFICATION
 from paraflex.files import model_from
 from paraflex.folders import check_listed
-from paraflex.plots.designs import DesignTable, read_designs
+from paraflex.formatting import quantity
 from paraflex.report import Page
 from paraflex.report.choice import MOST_RUNS, Picked, best_runs
-from paraflex.report.search import IDENTIFICATION
-from paraflex.report.survey import Step
 from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
 from paraflex.results.doubts import doubt_lines
 from paraflex.results.metrics import VALIDITY
 from paraflex.writing import read_json
 
-_SEARCH_RESULT = "result.json"
 # Relative difference between a repeated metric and its row above which the report warns; machines round differently.
 _ROW_DIFFERENCE = 1e-6
 
@@ -55,9 +54,12 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
     designs = read_designs(files) if files else None
     if designs is None or not designs.run.size:
         raise InputError("no run is done yet", field=str(folder), remedy="run the study first")
-    found = _found(study.folder / _SEARCH_RESULT)
+    logarithmic = frozenset(name for name, (_, _, spread) in study.ranges.items() if spread == "log")
+    # Tables of earlier releases do not have the units of parameters.
+    designs = replace(designs, logarithmic=logarithmic, units={**designs.units, **study.setting.parameter_units})
+    found = _found(study.folder)
     picked = best_runs(designs)
-    if found:
+    if "history" in found:
         picked = _searched(designs, found, picked)
     again = [] if study.setting.statics else picked
     if on_progress is not None and again:
@@ -74,11 +76,6 @@ def study_page(folder: str | Path, on_progress: Callable[[str], None] | None = N
         runs=runs,
         failed=failed,
         found=found,
-        history=[
-            Step(step[0], np.nan if step[1] is None else step[1], bool(step[2]))
-            for step in found.get("history") or []
-            if len(step) == 3
-        ],
         notes=_notes(study, designs, differ),
     )
     return sweep_page(designs, picked, account)
@@ -120,9 +117,7 @@ def _parameters(study: StudyFolder, designs: DesignTable) -> dict[str, VariedPar
     for name, places in zip(study.setting.names, study.setting.places, strict=True):
         values = designs.parameters[name]
         low, high, spread = study.ranges.get(name, (float(values.min()), float(values.max()), study.sampling))
-        units = {unit_of(study.setting.data, place) for place in places}
-        fields = tuple(".".join(map(str, place)) for place in places)
-        out[name] = VariedParameter(fields, units.pop() if len(units) == 1 else "", low, high, spread)
+        out[name] = VariedParameter(tuple(".".join(map(str, place)) for place in places), low, high, spread)
     return out
 
 
@@ -130,15 +125,15 @@ def _facts(study: StudyFolder, found: Mapping[str, Any]) -> list[tuple[str, str]
     setting = study.setting
     integration = setting.integration
     facts = [("sampling", study.sampling)]
-    if found:
+    if "history" in found:
         facts = [("search", str(found.get("method", "least squares")))]
         facts += [("ended", str(found["stopped"]))] if found.get("stopped") else []
     if setting.duration is not None:
-        facts.append(("duration", f"{setting.duration:g} s"))
-    for name, unit in (("method", ""), ("tolerance", " m"), ("step", " s"), ("constraints", "")):
-        if integration.get(name) is not None:
-            value = integration[name]
-            facts.append((name, f"{value:g}{unit}" if isinstance(value, float) else f"{value}"))
+        facts.append(("duration", quantity(setting.duration, "s", digits=4, padded=False)))
+    for name, unit in (("method", ""), ("tolerance", "m"), ("step", "s"), ("constraints", "")):
+        if (value := integration.get(name)) is not None:
+            text = quantity(value, unit, digits=4, padded=False) if isinstance(value, float) else str(value)
+            facts.append((name, text))
     return facts + [(name, study.versions[name]) for name in ("paraflex", "numba", "numpy") if name in study.versions]
 
 
@@ -160,13 +155,14 @@ def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> l
     return notes
 
 
-def _found(file: Path) -> Mapping[str, Any]:
-    """Return the result of a search from its file; an empty mapping for a sweep."""
-    if not file.is_file():
-        return {}
-    found = read_json(file)
-    check_listed(file, "run the same command again")
-    return found
+def _found(folder: Path) -> Mapping[str, Any]:
+    """Return the result of a search or of Sobol indices from its file; an empty mapping for a sweep."""
+    for file in (folder / "result.json", folder / "indices.json"):
+        if file.is_file():
+            found = read_json(file)
+            check_listed(file, "run the same command again")
+            return found
+    return {}
 
 
 def _searched(designs: DesignTable, found: Mapping[str, Any], picked: Sequence[Picked]) -> list[Picked]:

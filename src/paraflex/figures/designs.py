@@ -1,8 +1,9 @@
-"""Table of many designs, with parameters, metrics and status, read from the files of a study."""
+"""Table of many designs, with parameters, metrics and status, read from the files of a study, and charts of it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,10 +14,12 @@ from numpy.typing import NDArray
 
 from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
+from paraflex.figures.catalogue import figure
+from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
 from paraflex.figures.selection import place_of
-from paraflex.formatting import display_unit
-from paraflex.plots.labels import metric_name
-from paraflex.results.metrics import JOINT, METRICS, MOTOR
+from paraflex.figures.tables import Column, Table
+from paraflex.formatting import NO_VALUE, axis_unit, text_symbol
+from paraflex.results.metrics import JOINT, METRICS, MOTOR, metric_label
 from paraflex.seals import damaged
 
 Array = NDArray[np.float64]
@@ -29,6 +32,15 @@ _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
 _FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
 # A metric whose relative change is smaller counts as constant.
 _NOT_VARIED = 1e-9
+# Ratio of values from which the axis of a metric is logarithmic.
+_WIDE = 50.0
+_MARKS: tuple[Mark, ...] = ("dot", "square", "cross", "ring")
+# Largest numbers of columns and rows of panels.
+_MOST_PARAMETERS, _MOST_METRICS = 3, 3
+# Largest number of parameter values with a median each; more values are divided into this number of groups.
+_MEDIAN_GROUPS = 12
+# Largest number of listed reasons for failures, and the numbers in which they may differ.
+_MOST_REASONS, _NUMBER = 12, re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -40,11 +52,13 @@ class DesignTable:
     parameters, metrics : mapping of str to (runs,) array
         Columns by name; NaN where a run has no value.
     units : mapping of str to str
-        Units of the metrics.
+        SI units of parameters and metrics.
     run, design : (runs,) array of int
         Numbers of each run and of its design.
     path, mode, status, reason : (runs,) array of str
         Path and actuation mode of each run, its status, and the reason for a failure.
+    logarithmic : frozenset of str
+        Parameters whose range is logarithmic.
     """
 
     parameters: Mapping[str, Array]
@@ -56,6 +70,7 @@ class DesignTable:
     mode: NDArray[np.str_]
     status: NDArray[np.str_]
     reason: NDArray[np.str_]
+    logarithmic: frozenset[str] = frozenset()
 
     @cached_property
     def complete(self) -> NDArray[np.bool_]:
@@ -136,11 +151,31 @@ class DesignTable:
         spread = [name for name, values in self.parameters.items() if np.unique(values).size > 1]
         return spread or list(self.parameters)
 
-    def labelled(self, metric: str) -> tuple[str, float]:
-        """Return the axis label of a metric and the factor that converts its values to the unit of the label."""
-        unit, factor = display_unit(self.units.get(metric, ""), self.metrics[metric])
-        printed = metric_name(metric)
-        return (f"{printed} [{unit}]" if unit not in ("", "1") else printed), factor
+    def axis(self, name: str) -> Axis:
+        """Return the axis of a parameter or metric."""
+        unit = self.units.get(name, "") or "1"
+        if name in self.parameters:
+            values, label, log = self.parameters[name], name.replace("_", " "), name in self.logarithmic
+        else:
+            values, label = np.where(self.complete, self.metrics[name], np.nan), column_label(name)
+            log = not (values <= 0.0).any() and is_wide(values, _WIDE)
+        return Axis(text_symbol(label), unit, log=log, shown=axis_unit(unit, values))
+
+    def column(self, name: str) -> Array:
+        """Return the values of a parameter or metric in SI units."""
+        return self.parameters[name] if name in self.parameters else self.metrics[name]
+
+    def labelled(self, name: str) -> tuple[str, float]:
+        """Return the axis label of a parameter or metric, and the factor of its values to the unit of the label."""
+        axis = self.axis(name)
+        unit = axis.unit_for(self.column(name))
+        return axis.label(unit), unit.factor
+
+    def series_name(self, pair: tuple[str, str]) -> str:
+        """Return a distinctive name of the runs of a path and mode."""
+        path, mode = pair
+        several = len(set(self.path.tolist())) > 1
+        return ", ".join([path] * several + [f"mode {mode}"] * bool(mode)) or "runs"
 
     def _varies(self, name: str) -> bool:
         values = self.metrics[name][self.complete]
@@ -150,6 +185,11 @@ class DesignTable:
 
 def _is_judged(column: str) -> bool:
     return column.partition(".")[0] not in _NOT_JUDGED
+
+
+def column_label(metric: str) -> str:
+    """Return the label of a metric: "RMS tracking error"; "peak torque of τ₁" for a metric of one motor."""
+    return metric_label(metric, text_symbol)
 
 
 def read_designs(files: Sequence[Path]) -> DesignTable:
@@ -169,16 +209,17 @@ def _in_order(table: Any) -> DesignTable:
     names = table.column_names
     first, last = names.index("mode") + 1, names.index("status")
     judged = [name for name in names[last:] if name not in _LAST and not name.startswith("slope.")]
-    columns = {name: table[name].to_numpy().astype(float) for name in (*names[first:last], *judged)}
+    own = (*names[first:last], *judged)
+    columns = {name: table[name].to_numpy().astype(float) for name in own}
     units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
     texts = {key: np.array([*map(str, table[key].to_pylist())], str) for key in ("path", "mode", "status", "reason")}
     designs = DesignTable(
         parameters={name: columns[name] for name in names[first:last]},
         metrics={name: columns[name] for name in judged},
-        units={name: units[name] for name in judged},
+        units={name: units[name] for name in own},
         run=table["run"].to_numpy().astype(int),
         design=table["design"].to_numpy().astype(int),
-        **texts,
+        **texts,  # pyright: ignore[reportArgumentType]
     )
     order = np.argsort(designs.run, kind="stable")
     return designs if np.array_equal(order, np.arange(order.size)) else designs.only(order)
@@ -203,3 +244,100 @@ def undominated(x: Array, y: Array) -> NDArray[np.intp]:
     least = np.minimum.accumulate(y[order])
     better = np.concatenate([[True], y[order][1:] < least[:-1]]) if order.size else np.zeros(0, dtype=bool)
     return order[better]
+
+
+# Charts
+
+
+@figure("metrics against parameters", takes="designs", panels="choices", height=42.0)
+def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) -> Iterator[Chart]:
+    """Yield charts of metrics against parameters: a chart for each parameter, a mark for each run.
+
+    Colours distinguish paths and modes. If one parameter varies, its runs are joined by a line; otherwise the line is
+    the median over the other parameters, at each value or in twelve groups of equally many runs.
+
+    Parameters
+    ----------
+    table : DesignTable
+        Runs.
+    metrics : sequence of str, optional
+        Metrics to show; by default the first three that vary.
+    """
+    rows = table.judged_by(metrics, _MOST_METRICS)
+    axes = [table.axis(metric) for metric in rows]
+    for parameter in table.varied[:_MOST_PARAMETERS]:
+        curves = []
+        for k, (pair, runs) in enumerate(table.series.items()):
+            order = np.argsort(runs.parameters[parameter], kind="stable")
+            x = runs.parameters[parameter][order]
+            for choice, metric in enumerate(rows):
+                y, name = runs.metrics[metric][order], table.series_name(pair)
+                alone = len(table.varied) == 1
+                curves.append(_marked(k, name if alone else "", x, y, choice=choice, line=alone, faint=not alone))
+                if not alone:
+                    middles = _medians(x, y)
+                    curves.append(Curve(f"{name}, median", middles[1], middles[0], look(k), choice=choice))
+        yield Chart(f"responses-{parameter}", "", axes, curves, table.axis(parameter), [one.name for one in axes])
+
+
+@figure("two metrics of every design, and the Pareto front", takes="designs", columns=1, height=58.0)
+def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> Iterator[Chart]:
+    """Yield the chart of two metrics of every design, and the Pareto front of designs that no other one dominates.
+
+    Parameters
+    ----------
+    table : DesignTable
+        Runs.
+    metrics : sequence of str, optional
+        Two metrics; by default the first that varies, and the one for which most designs are on the front.
+    """
+    chosen = table.judged_by(metrics, 2) if metrics else in_conflict(table, table.judged_by(None, len(table.metrics)))
+    if len(chosen) != 2:
+        raise InputError(
+            "a Pareto front is of two metrics", field="metric", value=", ".join(chosen), remedy="name two that vary"
+        )
+    curves = []
+    for k, (pair, runs) in enumerate(table.series.items()):
+        x, y = (runs.metrics[name] for name in chosen)
+        known, name = np.isfinite(x) & np.isfinite(y), table.series_name(pair)
+        x, y = x[known], y[known]
+        front = undominated(x, y)
+        corners = stairs(x[front], y[front])
+        curves += [_marked(k, f"{name}, designs", x, y, faint=True), Curve("", corners[1], corners[0], look(k)),
+                   _marked(k, f"{name}, front", x[front], y[front])]  # fmt: skip
+    across, up = map(table.axis, chosen)
+    yield Chart("pareto", "Pareto front", up, curves, across)
+
+
+def _marked(k: int, name: str, x: Array, y: Array, **more: Any) -> Curve:
+    """Return the marks of the k-th series of runs."""
+    return Curve(name, y, x, look(k), mark=_MARKS[k % len(_MARKS)], **more)
+
+
+def _medians(x: Array, y: Array) -> tuple[Array, Array]:
+    """Return medians of values sorted by x, at each x or in groups of equal size."""
+    values = np.unique(x)
+    if values.size <= _MEDIAN_GROUPS:
+        return values, np.array([np.nanmedian(y[x == value]) for value in values])
+    split = np.array_split(np.arange(x.size), _MEDIAN_GROUPS)
+    across, up = (np.array([np.nanmedian(each[part]) for part in split]) for each in (x, y))
+    return across, up
+
+
+# Tables
+
+
+def failure_table(table: DesignTable) -> Table:
+    """Return the table of the reasons why runs are not complete; reasons that differ only in numbers are one row."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for status, reason in zip(table.status.tolist(), table.reason.tolist(), strict=True):
+        if status != "complete":
+            groups.setdefault((status, _NUMBER.sub("#", reason)), []).append(reason)
+    most = sorted(groups.items(), key=lambda group: -len(group[1]))
+    rows = [(status or NO_VALUE, len(texts), texts[0]) for (status, _), texts in most[:_MOST_REASONS]]
+    if left := sum(len(texts) for _, texts in most[_MOST_REASONS:]):
+        rows.append((NO_VALUE, left, "other reasons; the table has them"))
+    columns = [[row[k] for row in rows] for k in range(3)]
+    return Table("Runs that are not complete", [
+        Column("status", columns[0]), Column("runs", columns[1]), Column("reason", columns[2], "one of those alike"),
+    ])  # fmt: skip
