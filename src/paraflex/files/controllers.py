@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from paraflex.control.laws.described import TABLE, ControllerDescription, check_controllers
-from paraflex.control.laws.described_laws import LAWS
+from paraflex.control.laws.kinds import LAWS
 from paraflex.errors import InputError, renamed, within
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components
@@ -58,15 +60,22 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
     Raises
     ------
     InputError
-        Reference that cannot be expressed in a file.
+        Law or reference that cannot be expressed in a file.
     """
-    said = {"type": one.law.kind} | fields_said(one.law) | fields_said(one, "name", "law")
+    law, place = one.law, f"{TABLE}.{one.name}"
+    if LAWS.get(law.kind) is not type(law):
+        raise unsayable(f"{place}.law", type(law).__name__, f"give a law of type {', '.join(LAWS)}")
+    for each in fields(law):
+        given = getattr(law, each.name)
+        if each.metadata.get("by") and isinstance(given, Sequence | np.ndarray):
+            raise unsayable(f"{place}.{each.name}", given, "give one number, or numbers by name")
+    said = {"type": law.kind} | fields_said(law) | fields_said(one, "name", "law")
     if isinstance(one.reference, Mapping):
         try:
             said["reference"] = {
-                sensor: components_table((law,), "torque")["torque"] for sensor, law in one.reference.items()
+                sensor: components_table((each,), "torque")["torque"] for sensor, each in one.reference.items()
             }
         except (InputError, KeyError):
             remedy = "give numbers or expressions of the time"
-            raise unsayable(f"{TABLE}.{one.name}.reference", dict(one.reference), remedy) from None
+            raise unsayable(f"{place}.reference", dict(one.reference), remedy) from None
     return said

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import numpy as np
 from numba import cfunc, njit, types
 from numba.core.errors import NumbaError
 from numba.extending import is_jitted
 from numba.np.numpy_support import carray
 
+from paraflex.arrays import Array
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.law import Law, StartedLaw
 from paraflex.errors import InputError
 
 MOST_STATES = 100_000
@@ -23,6 +28,76 @@ _SIGNATURE = types.int64(types.int64, types.float64, _POINTER, _POINTER, _POINTE
 _STYLES = re.compile(r"\x1b\[[0-9;]*m")
 # Numba options that affect the machine code, as opposed to caching and calling.
 _KEPT = ("error_model", "fastmath", "locals")
+
+
+@dataclass(frozen=True)
+class CompiledLaw(Law):
+    """User-defined law that runs in the compiled time loop: a law for `SampledController`.
+
+    Attributes
+    ----------
+    function : callable
+        Function of (k, t, y, x, torques), compiled by Numba or such that Numba can compile it. From the errors y
+        (inputs,) of sample k at time t [s] and the states x (states,), which start at zero, it writes the torques
+        (outputs,) [N m, N], which are zero before, and updates x. It is compiled with array bounds checked, and so are
+        the functions that it calls; an exception ends the run.
+    states : int
+        Number of states.
+
+    Raises
+    ------
+    InputError
+        An object that is not a function, or a number of states below zero or above `MOST_STATES`; when started, a
+        function that Numba cannot compile.
+    """
+
+    _own = ("function",)
+
+    function: Callable[..., None]
+    states: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (is_jitted(self.function) or isinstance(self.function, FunctionType)):
+            raise InputError("is not a function", field="function", value=self.function,
+                             remedy="give one of (k, t, y, x, torques)")  # fmt: skip
+        if not 0 <= self.states <= MOST_STATES:
+            raise InputError("is out of range", field="states", value=self.states,
+                             remedy=f"give the number of states, at most {MOST_STATES}")  # fmt: skip
+
+    def start(self, plant: Plant) -> CompiledInRun:
+        """Return the law in a run: see `Law.start`."""
+        return CompiledInRun(compiled_function(self.function), len(plant.inputs), self.states, len(plant.outputs))
+
+
+class CompiledInRun(StartedLaw):
+    """Compiled function in a run, whose state is the array x (states,).
+
+    Parameters
+    ----------
+    compiled : CompiledFunction
+        Function.
+    inputs, states, outputs : int
+        Numbers of readings, of states and of torques.
+    """
+
+    def __init__(self, compiled: CompiledFunction, inputs: int, states: int, outputs: int) -> None:
+        self.states, self._outputs = states, outputs
+        self._function = compiled.function
+        name = getattr(self._function, "__name__", "")
+        self.title: str = f"compiled {name if name.isidentifier() else 'function'}"
+        self._entry = compiled.entry(inputs, states, outputs)
+
+    @property
+    def address(self) -> int:
+        """Address of the machine code."""
+        return int(self._entry.address)
+
+    def step(self, state: Array | None, k: int, t: float, y: Array) -> tuple[Array, Array]:
+        """Return the torques of a sample, and the states after it: see `StartedLaw.step`."""
+        x, torques = np.zeros(self.states) if state is None else state.copy(), np.zeros(self._outputs)
+        self._function(k, t, y.copy(), x, torques)
+        return torques, x
 
 
 class CompiledFunction:

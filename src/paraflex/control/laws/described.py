@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.control.laws.described_laws import LawNames, of_names
+from paraflex.control.laws.law import Law, LawNames, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
 from paraflex.mechanism import AngleLaw, Mechanism
@@ -35,8 +35,8 @@ class ControllerDescription(CheckedFields):
     ----------
     name : str
         Name of the controller.
-    law : DescribedLaw
-        Control law, one of the descriptions in `LAWS`.
+    law : Law
+        Control law, of a kind in `kinds.LAWS` if a file is to hold it.
     period, delay : float
         Sampling period, and delay from a sample until its torques act [s].
     inputs, outputs : tuple of str
@@ -53,9 +53,9 @@ class ControllerDescription(CheckedFields):
         Filters of the readings by sensor: cut-off frequency [Hz], or a transfer function.
     """
 
-    _own = ("law", "reference", "limits", "filters")
+    _own = ("reference", "limits", "filters")
     name: str
-    law: Any
+    law: Law
     period: float
     delay: float = 0.0
     inputs: tuple[str, ...] = ()
@@ -69,7 +69,7 @@ class ControllerDescription(CheckedFields):
     @property
     def whole_torque(self) -> bool:
         """Whether the law gives the whole torque, so that no planned torque acts as well."""
-        return bool(self.law.whole_torque)
+        return self.law.whole_torque
 
     def check(self, mechanism: Mechanism) -> None:
         """Check the names and numbers of the description.
@@ -95,7 +95,7 @@ class ControllerDescription(CheckedFields):
         for field_name, all_names, what in (("inputs", names.sensors, "sensor"), ("outputs", names.motors, "motor")):
             check_distinct(getattr(self, field_name), all_names, field_name, what)
         self.law.check(names)
-        law = self.law.made(self.outputs or names.motors, self.period)
+        law = self.law.of_motors(self.outputs or names.motors)
         sampled = self._sampled(law, {"reference": self.reference})
         among = sampled.inputs or names.sensors
         if isinstance(self.reference, Mapping):
@@ -117,9 +117,9 @@ class ControllerDescription(CheckedFields):
         InputError
             See `check`.
         """
-        law = self.law.made(self.outputs or tuple(motors), self.period)
-        outputs = self.outputs or tuple(getattr(law, "outputs", ())) or tuple(motors)
-        inputs = self.inputs or tuple(getattr(law, "inputs", ())) or encoders_of(mechanism, outputs)
+        law = self.law.of_motors(self.outputs or tuple(motors))
+        outputs = self.outputs or law.outputs or tuple(motors)
+        inputs = self.inputs or law.inputs or encoders_of(mechanism, outputs)
         chosen = {
             "reference": _functions(of_names(self.reference, inputs)),
             "limits": of_names(self.limits, outputs),
@@ -129,7 +129,7 @@ class ControllerDescription(CheckedFields):
         }
         return self._sampled(law, chosen)
 
-    def _sampled(self, law: Any, chosen: Mapping[str, Any]) -> SampledController:
+    def _sampled(self, law: Law, chosen: Mapping[str, Any]) -> SampledController:
         from paraflex.control.loop.chain import SampledController
 
         more = {name: getattr(self, name) for name in ("limits", "rates", "quantise", "filters")} | dict(chosen)

@@ -1,16 +1,37 @@
-"""Linear control laws with limits, in the form that the compiled time loop takes."""
+"""Linear control laws with limits, stepped here and, from the same matrices, by the compiled time loop."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.arrays import Array
+from paraflex.control.laws.law import StartedLaw
+
+
+class LinearState(NamedTuple):
+    """State of a linear law after a sample.
+
+    Attributes
+    ----------
+    x : (n,) array
+        States before the sample.
+    errors : (inputs,) array
+        Errors of the readings at the sample.
+    wanted, given : (outputs,) arrays
+        Torques of the sample before and after limits.
+    """
+
+    x: Array
+    errors: Array
+    wanted: Array
+    given: Array
 
 
 @dataclass(frozen=True)
-class LinearLaw:
+class LinearLaw(StartedLaw):
     """Linear law x' = A x + B e + E (w - g), w = P (h + C x + D e), with g the torques w after limits.
 
     Attributes
@@ -38,3 +59,32 @@ class LinearLaw:
     holding: Array = field(default_factory=lambda: np.zeros(0))
     waiting: Array = field(default_factory=lambda: np.zeros(0))
     projector: Array | None = None
+
+    @property
+    def holding_torques(self) -> Array | float:
+        """Constant torques h, which act before the first sample as well."""
+        return self.holding if self.holding.size else 0.0
+
+    def step(self, state: LinearState | None, k: int, t: float, y: Array) -> tuple[Array, LinearState]:
+        """Return the torques of a sample, and the state after it: see `StartedLaw.step`."""
+        if state is None:
+            x = self.first @ y if self.first.size else np.zeros(len(self.A))
+        else:
+            x = self.following(state)
+        torques = self.holding_torques + self.C @ x + self.D @ y
+        if self.projector is not None:
+            torques = self.projector[min(k, len(self.projector) - 1)] @ torques
+        return torques, LinearState(x, y, torques, torques)
+
+    def limited(self, state: LinearState, torques: Array) -> LinearState:
+        """Return the state after a sample whose torques are limited: see `StartedLaw.limited`."""
+        return state._replace(given=torques)
+
+    def following(self, state: LinearState) -> Array:
+        """Return the states (n,) before the next sample, as `go_on_to_next` of `kernel.sampled` computes them."""
+        x = self.A @ state.x + self.B @ state.errors
+        excess = state.wanted - state.given
+        if not np.any(excess):
+            return x
+        x = x + self.E @ excess if self.E.size else x
+        return np.where(self.waiting == 1.0, state.x, x) if self.waiting.size else x
