@@ -2,7 +2,7 @@ from .laws.controllers import Controller as Controller, Plant as Plant
 from .laws.described import ControllerDescription as ControllerDescription
 from .laws.kinds.lqg import DesignedLQG as DesignedLQG
 from .laws.kinds.state_space import StateSpaceLaw as StateSpaceLaw
-from .laws.law import Law as Law, StartedLaw as StartedLaw, by as by
+from .laws.law import Law as Law, StartedLaw as StartedLaw, given as given
 from .laws.linear_law import LinearLaw as LinearLaw
 from .loop.chain import SampledController as SampledController
 from .loop.run_loop import ControllerRecord as ControllerRecord

@@ -14,7 +14,7 @@ from paraflex.errors import InputError, renamed, within
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components
 from paraflex.files.said import fields_said, unsayable
-from paraflex.files.schema import ControllerTable, ModelTable, TorqueTable
+from paraflex.files.schema import ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.loads import InTime
 
@@ -35,9 +35,7 @@ def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, Contr
     return found
 
 
-def _read(
-    name: str, table: ControllerTable, parameters: Mapping[str, float], duration: float | None
-) -> ControllerDescription:
+def _read(name: str, table: Any, parameters: Mapping[str, float], duration: float | None) -> ControllerDescription:
     said = {key: value for key, value in table if value is not None}
     kind = LAWS[said.pop("type")]
     law = kind(**{each.name: said.pop(each.name) for each in fields(kind) if each.name in said})

@@ -28,6 +28,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from paraflex.control.laws.described import ControllerDescription, References
 from paraflex.control.laws.kinds import LAWS
 from paraflex.equilibria.given import FACTORS, STEPS
 from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
@@ -208,13 +209,13 @@ def _written(hint: Any) -> Any:
     return list[_written(inner[0])]
 
 
-def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
+def _fields_of(member: type, *, needed: bool = True, without: Sequence[str] = ("name",)) -> dict[str, Any]:
     """Return the fields of a member's table from those of its class, with two points or joints in one field.
 
     If `needed` is False, all fields become optional.
     """
     hints, found = get_type_hints(member), {}
-    together = ["name"]
+    together = [*without]
     if hints.get("a") is PointRef:
         found["points"] = (TwoPoints, Field(description='["body.point", "body.point"]'))
         together += ["a", "b"]
@@ -617,50 +618,16 @@ TorqueEntry = Annotated[
 ]
 
 
-# One number for all motors or sensors, or numbers by motor or sensor.
-NumbersOf = Number | dict[str, Number]
-
-
-ReferenceEntry = Annotated[
+_REFERENCE = Annotated[
     Annotated[Literal["plan", "open-loop"], Tag("word[reference]")]
     | Annotated[dict[str, FunctionOfTime], Tag("ReferenceTable")],
     Discriminator(lambda value: "ReferenceTable" if isinstance(value, dict) else "word[reference]"),
 ]
-
-
-_REFERENCES = ", ".join(f'"{law.reference}" with "{kind}"' for kind, law in LAWS.items() if law.reference)
-
-
-class ControllerTable(_Table):
-    """A sampled controller: settings common to all control laws."""
-
-    period: Number = Field(description="the time between samples in s")
-    delay: Number = _optional("the time from a sample until its torques act in s", 0.0)
-    inputs: list[Text] = _optional(
-        'sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the '
-        "encoders of its motors",
-        [],
-    )
-    outputs: list[Text] = _optional("motors; by default all of a mode", [])
-    reference: ReferenceEntry | None = _optional(
-        'the reference subtracted from readings: "plan", the planned motion; "open-loop", the readings where '
-        "the planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the "
-        f"unit of the sensor; by default {_REFERENCES}, nothing with others"
-    )
-    limits: Number | Pair | dict[str, Number | Pair] | None = _optional(
-        "the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all "
-        "motors or by motor"
-    )
-    rates: NumbersOf | None = _optional("the largest change of torques in N m/s or N/s, of all motors or by motor")
-    quantise: NumbersOf | None = _optional("the resolution of readings, in the unit of the sensor, of all or by sensor")
-    filters: dict[str, Number | list[list[Number]]] = _optional(
-        "by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients "
-        "of numerator and denominator in descending powers of s",
-        {},
-    )
-
-
-AnyControllerTable = _member_table(list(LAWS.values()), ControllerTable)
+_WRITTEN[References | None] = _REFERENCE | None
+_CONTROLLER = create_model(
+    "ControllerTable", __base__=_Table, **_fields_of(ControllerDescription, without=("name", "law"))
+)
+AnyControllerTable = _member_table(list(LAWS.values()), _CONTROLLER)
 
 
 class StudyDefaultsTable(_Table):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.control.laws.law import Law, LawNames, of_names
+from paraflex.control.laws.kinds import LAWS
+from paraflex.control.laws.law import Law, LawNames, given, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
 from paraflex.mechanism import AngleLaw, Mechanism
@@ -22,6 +23,11 @@ if TYPE_CHECKING:
 
 # Table of a model file that holds the controllers; and the word that selects none of them.
 TABLE, NONE = "controller", "none"
+
+
+References = str | Mapping[str, InTime]
+Limits = float | tuple[float, float] | Mapping[str, float | tuple[float, float]]
+_DEFAULTS = ", ".join(f'"{law.reference}" with "{kind}"' for kind, law in LAWS.items() if law.reference)
 
 
 @given_as("a description of a controller", "a ControllerDescription, as [controller.NAME] of a model file is read")
@@ -56,15 +62,32 @@ class ControllerDescription(CheckedFields):
     _own = ("reference", "limits", "filters")
     name: str
     law: Law
-    period: float
-    delay: float = 0.0
-    inputs: tuple[str, ...] = ()
-    outputs: tuple[str, ...] = ()
-    reference: str | Mapping[str, InTime] | None = None
-    limits: Any = None
-    rates: Numbers | None = None
-    quantise: Numbers | None = None
-    filters: Mapping[str, Any] = field(default_factory=dict)
+    period: float = given("the time between samples in s")
+    delay: float = given("the time from a sample until its torques act in s", default=0.0)
+    inputs: tuple[str, ...] = given(
+        'sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the encoders of '
+        "its motors", default=(),
+    )  # fmt: skip
+    outputs: tuple[str, ...] = given("motors; by default all of a mode", default=())
+    reference: References | None = given(
+        'the reference subtracted from readings: "plan", the planned motion; "open-loop", the readings where the '
+        "planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the unit "
+        f"of the sensor; by default {_DEFAULTS}, nothing with others", by="inputs", default=None,
+    )  # fmt: skip
+    limits: Limits | None = given(
+        "the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all motors or by "
+        "motor", by="motors", default=None,
+    )  # fmt: skip
+    rates: Numbers | None = given(
+        "the largest change of torques in N m/s or N/s, of all motors or by motor", by="motors", default=None
+    )
+    quantise: Numbers | None = given(
+        "the resolution of readings, in the unit of the sensor, of all or by sensor", by="inputs", default=None
+    )
+    filters: Mapping[str, float | Sequence[Sequence[float]]] = given(
+        "by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients of numerator "
+        "and denominator in descending powers of s", by="inputs", default={},
+    )  # fmt: skip
 
     @property
     def whole_torque(self) -> bool:
@@ -95,8 +118,7 @@ class ControllerDescription(CheckedFields):
         for field_name, all_names, what in (("inputs", names.sensors, "sensor"), ("outputs", names.motors, "motor")):
             check_distinct(getattr(self, field_name), all_names, field_name, what)
         self.law.check(names)
-        law = self.law.of_motors(self.outputs or names.motors)
-        sampled = self._sampled(law, {"reference": self.reference})
+        sampled = self._sampled(self.law.of_motors(self.outputs or names.motors))
         among = sampled.inputs or names.sensors
         if isinstance(self.reference, Mapping):
             all_known(self.reference, among, "reference", "sensor")
@@ -120,23 +142,17 @@ class ControllerDescription(CheckedFields):
         law = self.law.of_motors(self.outputs or tuple(motors))
         outputs = self.outputs or law.outputs or tuple(motors)
         inputs = self.inputs or law.inputs or encoders_of(mechanism, outputs)
-        chosen = {
-            "reference": _functions(of_names(self.reference, inputs)),
-            "limits": of_names(self.limits, outputs),
-            "rates": of_names(self.rates, outputs),
-            "quantise": of_names(self.quantise, inputs),
-            "filters": of_names(self.filters, inputs),
-        }
-        return self._sampled(law, chosen)
+        among = {"inputs": inputs, "motors": outputs}
+        chosen = {each.name: of_names(getattr(self, each.name), among[each.metadata["by"]])
+                  for each in fields(self) if each.metadata.get("by")}  # fmt: skip
+        return self._sampled(law, **chosen | {"reference": _functions(chosen["reference"])})
 
-    def _sampled(self, law: Law, chosen: Mapping[str, Any]) -> SampledController:
+    def _sampled(self, law: Law, **chosen: Any) -> SampledController:
         from paraflex.control.loop.chain import SampledController
 
-        more = {name: getattr(self, name) for name in ("limits", "rates", "quantise", "filters")} | dict(chosen)
-        return SampledController(
-            law, period=self.period, delay=self.delay, inputs=self.inputs or None, outputs=self.outputs or None,
-            name=self.name, **more,
-        )  # fmt: skip
+        names = ("name", "period", "delay", "reference", "limits", "rates", "quantise", "filters")
+        own = {name: getattr(self, name) for name in names} | chosen
+        return SampledController(law, inputs=self.inputs or None, outputs=self.outputs or None, **own)
 
 
 def check_controllers(controllers: Mapping[str, ControllerDescription], mechanism: Mechanism) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -14,7 +14,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import positive, said
+from paraflex.mechanism.quantities import positive
 
 
 @checked_arguments()
@@ -213,8 +213,8 @@ class Differentiator:
         return found[0].copy(), found[1].copy()
 
 
-# Metadata of the field `cutoff` of control laws.
-CUTOFF = said("the cut-off frequency of the low-pass of rates in Hz", positive, "Hz")
+# Description, check and unit of the field `cutoff` of control laws.
+CUTOFF: Any = "the cut-off frequency of the low-pass of rates in Hz", positive, "Hz"
 
 
 class Rates(NamedTuple):

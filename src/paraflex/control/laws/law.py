@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -23,9 +23,22 @@ _NO_NAMES: tuple[str, ...] = ()
 By = Literal["motors", "outputs", "sensors", "inputs"]
 
 
-def by(names: By, description: str, check: Any = None, unit: str = "") -> dict[str, Any]:
-    """Return the metadata of a field with numbers by motor or by sensor; the other arguments are those of `said`."""
-    return said(description, check, unit) | {"by": names}
+def given(description: str, check: Any = None, unit: str = "", *, by: By | None = None, default: Any = MISSING) -> Any:
+    """Return a field of a law.
+
+    Parameters
+    ----------
+    description, check, unit
+        Description in files, check of each number, and unit in errors: see `said`.
+    by : "motors", "outputs", "sensors" or "inputs", optional
+        Names that the keys of a field with numbers by name are.
+    default : any, optional
+        Default value; by default the field is required.
+    """
+    metadata = said(description, check, unit) | {"by": by}
+    return (
+        field(default_factory=dict, metadata=metadata) if default == {} else field(default=default, metadata=metadata)
+    )
 
 
 class LawNames(NamedTuple):
@@ -96,7 +109,7 @@ class Law(CheckedFields, ABC):
 
     A subclass such as `class JointPID(Law, kind="pid", title="PID of joints")` defines a kind of law: its fields and
     its method `start`, and `check`, `inputs` and `outputs` if the defaults do not apply. The metadata of the fields
-    (`said`, `by`) describe them in files and check their numbers. Fields by motor are narrowed to the motors of a mode.
+    (`given`) describe them in files and check their numbers. Fields by motor are narrowed to the motors of a mode.
 
     Attributes
     ----------

@@ -239,13 +239,10 @@ class LQGLaw:
             else self._state.x[len(self.design.start) :]
         )
 
-    def start(self, plant: Plant) -> None:
-        """Reset the states for a new run: see `LQGDesign.in_run`."""
+    def start(self, plant: Plant) -> LQGInRun | None:
+        """Reset the state, and return the law in a run: see `LQGDesign.in_run`; None if a subclass may step itself."""
         self._law, self._state = self.design.in_run(plant), None
-
-    def linear_law(self) -> LinearLaw:
-        """Return the law in the form in which it acts in a run."""
-        return self._law
+        return self._law if type(self) is LQGLaw else None
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """Return torques (motors,) from errors y (measured,) of the readings at sample k."""

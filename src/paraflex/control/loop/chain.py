@@ -289,15 +289,9 @@ class _OwnSteps(StartedLaw):
 
 
 def _started(law: Any, plant: Plant) -> StartedLaw:
-    """Return the law in a run; one with a linear form takes it, unless its steps are another class's."""
-    if isinstance(law, Law):
-        return law.start(plant)
-    if hasattr(law, "start"):
-        law.start(plant)
-    names = ("linear_law", "step", "start", "limited")
-    owners = {next((each for each in type(law).__mro__ if name in vars(each)), None) for name in names} - {None}
-    own_form = hasattr(law, "linear_law") and len(owners) == 1 and "step" not in vars(law)
-    return law.linear_law() if own_form else _OwnSteps(law)
+    """Return the law in a run: what its `start` returns, or the law itself with its own steps."""
+    started = law.start(plant) if hasattr(law, "start") else None
+    return started if isinstance(started, StartedLaw) and "step" not in vars(law) else _OwnSteps(law)
 
 
 def as_law(given: Any) -> Any:

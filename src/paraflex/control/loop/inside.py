@@ -19,6 +19,8 @@ from paraflex.control.loop.together import SAME, periods_in, whole_and_part
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.sampled import NOT_FINITE, RAISED, SAMPLED, WRONG, SampledLaw
 
+_MATRICES = ("A", "B", "C", "D", "E", "first", "holding", "waiting")
+
 
 def sampled_law(
     controller: Any, plant: Plant, readings: Readings, outputs: list[int], base: Array, held: Array, end: float
@@ -44,31 +46,30 @@ def sampled_law(
     """
     if type(controller) is not SampledController or "step" in vars(controller) or not readings.simple:
         return None
-    law = controller.started
-    linear, compiled = _linear(law), law if type(law) is CompiledInRun else None
-    if linear is None and compiled is None:
+    linear, compiled = _linear(controller.started), controller.started
+    if linear is None and type(compiled) is not CompiledInRun:
         return None
     inputs, start, period = len(plant.inputs), plant.state.time, plant.period
     count = periods_in(end - start, period)
     filters = _filters(controller, inputs)
-    given = _law_arrays(linear, compiled.states if compiled else 0, inputs, len(outputs))
-    states, kept = given["A"].shape[0], filters["filter_A"].shape[0]
+    address, states = (0, len(linear.A)) if linear else (compiled.address, compiled.states)
+    law = linear or LinearLaw(np.zeros((states, states)), *np.zeros((2, 0)), np.zeros((len(outputs), inputs)))
+    kept = filters["filter_A"].shape[0]
     whole, part = whole_and_part(plant.delay / period)
     lowest, highest = controller.bounds[0].T
-    projector = None if linear is None else linear.projector
     arrays: dict[str, Any] = {
         "clock": np.array([start, period, part, SAME * period]),
-        "counts": np.array([0, 0, whole, 0, compiled.address if compiled else 0], np.int64),
+        "counts": np.array([0, 0, whole, 0, address], np.int64),
         "resolution": controller.resolution,
         "reference": _reference_table(controller, start + period * np.arange(float(count))),
-        "projector": np.zeros((0, 0, 0)) if projector is None else projector[_rows(count, len(projector))],
+        "projector": np.zeros((0, 0, 0)) if law.projector is None else law.projector[_rows(count, len(law.projector))],
         "lowest": lowest, "highest": highest, "most": controller.bounds[1] * period,
         "outputs": np.array(outputs, np.int64), "base": base,
         "filtered": np.zeros(kept), "x": np.zeros(states), "last": controller.holding_torques, "held": held,
         "scratch": np.zeros((2, max(kept, states, inputs, len(outputs)))),
         "t": np.zeros(count), "acted": np.zeros(count), "readings": np.zeros((count, inputs)),
         "wanted": np.zeros((count, len(outputs))), "given": np.zeros((count, len(outputs))),
-        **_read(readings), **filters, **given,
+        **_read(readings), **filters, **{name: getattr(law, name) for name in _MATRICES},
     }  # fmt: skip
     return SampledLaw(**{name: _apart(array) for name, array in arrays.items()})
 
@@ -109,16 +110,6 @@ def _linear(law: Any) -> LinearLaw | None:
         getattr(type(law), name) is getattr(LinearLaw, name) for name in ("step", "limited", "following")
     )
     return law if own else None
-
-
-def _law_arrays(linear: LinearLaw | None, states: int, inputs: int, outputs: int) -> dict[str, Array]:
-    n = states if linear is None else len(linear.A)
-    linear = linear or LinearLaw(*(np.zeros((0, 0)) for _ in range(4)))
-    shapes = {"A": (n, n), "B": (n, inputs), "C": (outputs, n), "D": (outputs, inputs), "E": (n, outputs),
-              "holding": (outputs,), "first": (n, inputs), "waiting": (n,)}  # fmt: skip
-    found = {name: getattr(linear, name) for name in shapes}
-    return {name: np.reshape(array, shapes[name]).astype(float) if array.size else np.zeros(shapes[name])
-            for name, array in found.items()}  # fmt: skip
 
 
 def _read(readings: Readings) -> dict[str, np.ndarray]:

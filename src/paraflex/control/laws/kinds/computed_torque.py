@@ -8,7 +8,7 @@ torque, feed-forward must not act as well.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -17,13 +17,13 @@ from paraflex.actuation import required_effort
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import CUTOFF, BackwardDifference, Rates
-from paraflex.control.laws.law import Law, StartedLaw
+from paraflex.control.laws.law import Law, StartedLaw, given
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import InputError
 from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.kinematics import RigidMotion
 from paraflex.kinematics.closure import PathClosure
-from paraflex.mechanism.quantities import positive, said
+from paraflex.mechanism.quantities import positive
 
 # The iteration for the position has converged at a change below this fraction of the mechanism's size; largest number
 # of iterations.
@@ -54,12 +54,11 @@ class ComputedTorque(Law, kind="computed-torque", title="computed torque"):
     whole_torque: ClassVar[bool] = True
     absolute: ClassVar[bool] = True
 
-    frequency: float = field(metadata=said("the natural frequency of the end-effector's error in Hz", positive, "Hz"))
-    damping_ratio: float = field(
-        default=0.7,
-        metadata=said("the damping ratio of the end-effector's error", positive, "parts of the critical one"),
+    frequency: float = given("the natural frequency of the end-effector's error in Hz", positive, "Hz")
+    damping_ratio: float = given(
+        "the damping ratio of the end-effector's error", positive, "parts of the critical one", default=0.7
     )
-    cutoff: float | None = field(default=None, metadata=CUTOFF)
+    cutoff: float | None = given(*CUTOFF, default=None)
 
     def start(self, plant: Plant) -> RigidInverse:
         """Return the law in a run: see `Law.start`."""
@@ -124,7 +123,7 @@ class RigidInverse(StartedLaw):
         return torques, RigidState(motion.q[0], rates)
 
     def _read(self, y: Array, place: Array, pose: Array) -> tuple[Array, Array, Array]:
-        """Return the end-effector's position (tasks,) from joint readings y, its Jacobian (tasks, joints), and the pose."""
+        """Return the end-effector's position (tasks,) at readings y, its Jacobian (tasks, joints), and the pose."""
         size = self._closure.system.size
         for _ in range(_ITERATIONS):
             motion = self._motion(0.0, place, np.zeros_like(place), np.zeros_like(place), pose)

@@ -9,7 +9,7 @@ another. B is the rigid actuation matrix on the planned motion.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -20,13 +20,13 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import CUTOFF, BackwardDifference
-from paraflex.control.laws.law import Law, LawNames, by
+from paraflex.control.laws.law import Law, LawNames, given
 from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.control.loop.together import PLAN
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of
-from paraflex.mechanism.quantities import all_known, optional
+from paraflex.mechanism.quantities import all_known
 
 if TYPE_CHECKING:
     from paraflex.control.laws.discrete import DiscreteModel
@@ -71,18 +71,15 @@ class JointPID(Law, kind="pid", title="PID of joints"):
 
     reference: ClassVar[str | None] = PLAN
 
-    stiffness: Gain = field(
-        metadata=by("motors", "the proportional gain in N m/rad or N/m, of all motors or by motor", _gain)
+    stiffness: Gain = given("the proportional gain in N m/rad or N/m, of all motors or by motor", _gain, by="motors")
+    damping: Gain = given(
+        "the derivative gain in N m s/rad or N s/m, of all motors or by motor", _gain, by="motors", default=0.0
     )
-    damping: Gain = field(
-        default=0.0,
-        metadata=by("motors", "the derivative gain in N m s/rad or N s/m, of all motors or by motor", _gain),
+    integral: Gain = given(
+        "the integral gain in N m/rad/s or N/m/s, of all motors or by motor", _gain, by="motors", default=0.0
     )
-    integral: Gain = field(
-        default=0.0, metadata=by("motors", "the integral gain in N m/rad/s or N/m/s, of all motors or by motor", _gain)
-    )
-    project: bool = optional(True, "whether torques that only strain links are removed")
-    cutoff: float | None = field(default=None, metadata=CUTOFF)
+    project: bool = given("whether torques that only strain links are removed", default=True)
+    cutoff: float | None = given(*CUTOFF, default=None)
 
     def check(self, names: LawNames) -> None:
         """Check the names of motors, and the pairs of readings and motors: see `Law.check`."""
@@ -159,7 +156,7 @@ def check_pairs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
         )  # fmt: skip
 
 
-def _gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
+def _gains_of(gains: Any, motors: Sequence[str], field: str) -> Array:
     """Return one gain for each motor (motors,), from one for all, one for each, or values by motor.
 
     Raises
@@ -167,11 +164,11 @@ def _gains_of(given: Any, motors: Sequence[str], field: str) -> Array:
     InputError
         Unknown motors, or a wrong number of gains.
     """
-    if isinstance(given, Mapping):
-        all_known(given, motors, field, "motor")
-        given = [given.get(name, 0.0) for name in motors]
+    if isinstance(gains, Mapping):
+        all_known(gains, motors, field, "motor")
+        gains = [gains.get(name, 0.0) for name in motors]
     try:
-        return np.broadcast_to(np.asarray(given, dtype=float), (len(motors),)).copy()
+        return np.broadcast_to(np.asarray(gains, dtype=float), (len(motors),)).copy()
     except (TypeError, ValueError):
-        raise InputError(f"not gains for {len(motors)} motors", field=field, value=given,
+        raise InputError(f"not gains for {len(motors)} motors", field=field, value=gains,
                          remedy="give one number, one for each motor, or numbers by motor") from None  # fmt: skip

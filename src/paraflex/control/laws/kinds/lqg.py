@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import quantisation_noise
-from paraflex.control.laws.law import Law, LawNames, by
+from paraflex.control.laws.law import Law, LawNames, given
 from paraflex.control.loop.together import OPEN_LOOP, Numbers
 from paraflex.errors import InputError
 from paraflex.mechanism import mode_of_motors
-from paraflex.mechanism.quantities import all_known, finite, not_negative, optional, positive, said
+from paraflex.mechanism.quantities import all_known, finite, not_negative, positive
 
 if TYPE_CHECKING:
     from paraflex.control.laws.lqg_law import LQGInRun
     from paraflex.linear import LinearModel
 
+_OWN_UNIT = "the unit of the sensor"
 # Standard deviation, and cut-off frequency or coefficients of numerator and denominator of a filter.
 Coloured = tuple[float, float | Sequence[Sequence[float]]]
 
 
-def _number_of_states(value: int, field: str) -> None:
+def _some(value: int, field: str) -> None:
     if value < 1:
         raise InputError("no such number of states", field=field, value=value, remedy="give 16, or leave it out")
 
@@ -66,42 +67,35 @@ class DesignedLQG(Law, kind="lqg", title="LQG"):
     _own = ("coloured",)
     reference: ClassVar[str | None] = OPEN_LOOP
 
-    deviations: Mapping[str, float] = field(
-        metadata=by("sensors", "by sensor the largest deviation allowed, in the unit of the sensor", positive,
-                    "the unit of the sensor")
-    )  # fmt: skip
-    effort: Numbers = field(
-        metadata=by("outputs", "the largest torque in N m or N, of all motors or by motor; those not named are not "
-                    "used", positive, "N m or N")
-    )  # fmt: skip
-    noise: Numbers | None = field(
-        default=None,
-        metadata=by("inputs", "the standard deviation of readings, in the unit of the sensor, of all or by sensor; by "
-                    "default of rounding to quantise", positive, "the unit of the sensor"),
-    )  # fmt: skip
-    disturbance: Numbers | None = field(
-        default=None,
-        metadata=by("motors", "the standard deviation of random torques in N m or N, of all motors or by motor; by "
-                    "default a tenth of effort", not_negative, "N m or N"),
-    )  # fmt: skip
-    integrators: Mapping[str, float] = field(
-        default_factory=dict,
-        metadata=by("inputs", "by sensor the time constant in s with which its error under constant loads decays",
-                    positive, "s"),
-    )  # fmt: skip
-    coloured: Mapping[str, Coloured] = field(
-        default_factory=dict,
-        metadata=said(
-            'coloured disturbances, by motor or as "link.tip.x" by point and axis: the standard deviation in N m or N '
-            "and the cut-off frequency in Hz, or lists of the coefficients of numerator and denominator of a filter in "
-            "descending powers of s"
-        ),
+    deviations: Mapping[str, float] = given(
+        "by sensor the largest deviation allowed, in the unit of the sensor", positive, _OWN_UNIT, by="sensors"
     )
-    states: int | None = optional(
-        None, "the number of states of the reduced model, by default 16, or all if fewer", _number_of_states
+    effort: Numbers = given(
+        "the largest torque in N m or N, of all motors or by motor; those not named are not used",
+        positive, "N m or N", by="outputs",
+    )  # fmt: skip
+    noise: Numbers | None = given(
+        "the standard deviation of readings, in the unit of the sensor, of all or by sensor; by default of rounding to "
+        "quantise", positive, _OWN_UNIT, by="inputs", default=None,
+    )  # fmt: skip
+    disturbance: Numbers | None = given(
+        "the standard deviation of random torques in N m or N, of all motors or by motor; by default a tenth of effort",
+        not_negative, "N m or N", by="motors", default=None,
+    )  # fmt: skip
+    integrators: Mapping[str, float] = given(
+        "by sensor the time constant in s with which its error under constant loads decays",
+        positive, "s", by="inputs", default={},
+    )  # fmt: skip
+    coloured: Mapping[str, Coloured] = given(
+        'coloured disturbances, by motor or as "link.tip.x" by point and axis: the standard deviation in N m or N and '
+        "the cut-off frequency in Hz, or lists of the coefficients of numerator and denominator of a filter in "
+        "descending powers of s", default={},
+    )  # fmt: skip
+    states: int | None = given(
+        "the number of states of the reduced model, by default 16, or all if fewer", _some, default=None
     )
-    at: float | None = optional(
-        None, "the time of the planned motion for which it is designed in s, by default its start", finite
+    at: float | None = given(
+        "the time of the planned motion for which it is designed in s, by default its start", finite, default=None
     )
 
     def __post_init__(self) -> None:
@@ -161,13 +155,11 @@ class DesignedLQG(Law, kind="lqg", title="LQG"):
 
     def _noise_of(self, plant: Plant) -> dict[str, float]:
         """Return the standard deviations of readings by sensor: the given ones, else those of rounding."""
-        given = self.noise if isinstance(self.noise, Mapping) else {}
         if self.noise is not None and not isinstance(self.noise, Mapping):
             return dict.fromkeys(plant.inputs, self.noise)
-        resolution = plant.resolution or (0.0,) * len(plant.inputs)
-        rounding = {name: quantisation_noise(one) for name, one in zip(plant.inputs, resolution, strict=True) if one}
-        missing = [name for name in plant.inputs if name not in rounding and name not in given]
-        if missing:
+        pairs = zip(plant.inputs, plant.resolution or (0.0,) * len(plant.inputs), strict=True)
+        noise = {name: quantisation_noise(one) for name, one in pairs if one} | dict(self.noise or {})
+        if missing := [name for name in plant.inputs if name not in noise]:
             raise InputError("has no noise", field="noise", value=missing[0],
                              remedy="give its standard deviation, or quantise, the resolution of readings")  # fmt: skip
-        return {name: given.get(name, rounding.get(name, 0.0)) for name in plant.inputs}
+        return {name: noise[name] for name in plant.inputs}

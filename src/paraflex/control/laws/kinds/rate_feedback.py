@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import CUTOFF, BackwardDifference
-from paraflex.control.laws.law import Law, LawNames, by
+from paraflex.control.laws.law import Law, LawNames, given
 from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import all_known, finite
@@ -43,15 +43,13 @@ class RateFeedback(Law, kind="rate-feedback", title="rate feedback"):
         No gains, or gains that are not finite numbers.
     """
 
-    gains: Mapping[str, Mapping[str, float]] = field(
-        metadata=by(
-            "outputs",
-            "by motor and sensor the torque or force over the rate of the reading, in N m s or N s by the unit of the "
-            "sensor",
-            finite,
-        )
+    gains: Mapping[str, Mapping[str, float]] = given(
+        "by motor and sensor the torque or force over the rate of the reading, in N m s or N s by the unit of the "
+        "sensor",
+        finite,
+        by="outputs",
     )
-    cutoff: float | None = field(default=None, metadata=CUTOFF)
+    cutoff: float | None = given(*CUTOFF, default=None)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -73,9 +71,9 @@ class RateFeedback(Law, kind="rate-feedback", title="rate feedback"):
         super().check(names)
         for motor, row in self.gains.items():
             all_known(row, names.sensors, f"gains.{motor}", "sensor")
-        for field_name, given in (("inputs", names.inputs), ("outputs", names.outputs)):
-            if given and set(given) != set(getattr(self, field_name)):
-                raise InputError("differ from those of the gains", field=field_name, value=", ".join(given),
+        for field_name, own in (("inputs", names.inputs), ("outputs", names.outputs)):
+            if own and set(own) != set(getattr(self, field_name)):
+                raise InputError("differ from those of the gains", field=field_name, value=", ".join(own),
                                  remedy="leave it out")  # fmt: skip
 
     def start(self, plant: Plant) -> LinearLaw:

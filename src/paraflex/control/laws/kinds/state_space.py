@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
-from paraflex.control.laws.law import Law, LawNames
+from paraflex.control.laws.law import Law, LawNames, given
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import optional, said
 
 if TYPE_CHECKING:
     from paraflex.control.laws.discrete import DiscreteModel
@@ -44,10 +43,10 @@ class StateSpaceLaw(Law, kind="state-space", title="state space"):
 
     _own = ("A", "B", "C", "D")
 
-    D: Rows = field(metadata=said("rows of the matrix from readings to torques"))
-    A: Rows = optional((), "rows of the matrix of states; none without states")
-    B: Rows = optional((), "rows of the matrix from readings to states")
-    C: Rows = optional((), "rows of the matrix from states to torques")
+    D: Rows = given("rows of the matrix from readings to torques")
+    A: Rows = given("rows of the matrix of states; none without states", default=())
+    B: Rows = given("rows of the matrix from readings to states", default=())
+    C: Rows = given("rows of the matrix from states to torques", default=())
 
     def __post_init__(self) -> None:
         super().__post_init__()
