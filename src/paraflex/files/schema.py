@@ -618,7 +618,7 @@ TorqueEntry = Annotated[
 ]
 
 
-_REFERENCE = Annotated[
+_REFERENCE: Any = Annotated[
     Annotated[Literal["plan", "open-loop"], Tag("word[reference]")]
     | Annotated[dict[str, FunctionOfTime], Tag("ReferenceTable")],
     Discriminator(lambda value: "ReferenceTable" if isinstance(value, dict) else "word[reference]"),
@@ -749,7 +749,7 @@ class ModelTable(_WithGroups):
     )
     mode: dict[str, list[Text]] = _optional("the motors of each actuation mode", {})
     path: dict[str, PathTable] = Field(default={})
-    controller: dict[str, AnyControllerTable] = Field(default={})
+    controller: dict[str, AnyControllerTable] = Field(default={})  # pyright: ignore[reportInvalidTypeForm]
     start: StartTable | None = None
     study: StudyDefaultsTable = StudyDefaultsTable()
     statics: StaticsTable = StaticsTable()

@@ -77,10 +77,6 @@ class KalmanFilter:
         """Return the estimate (n,) corrected by readings (outputs,)."""
         return x + self.gain @ (y - self.C @ x)
 
-    def carried_on(self, x: Array, u: Array) -> Array:
-        """Return the estimate (n,) propagated to the next sample under torques (inputs,)."""
-        return self.A @ x + self.B @ u
-
 
 def kalman_filter(A: Array, B: Array, C: Array, process: Array, noise: Array) -> KalmanFilter:
     """Return the filter of least error covariance, from the stationary Riccati equation.

@@ -324,7 +324,7 @@ def _filter_model(given: tuple[Array, Array], period: float) -> StateSpace:
 def _filtered(model: StateSpace, x: Array | None, value: float) -> tuple[float, Array]:
     """Return a filtered value and the states of the filter after it, which is in steady state at the first value."""
     A, B, C, D = model
-    x = np.linalg.solve(np.eye(len(A)) - A, B * value) if x is None else x
+    x = np.asarray(np.linalg.solve(np.eye(len(A)) - A, B * value) if x is None else x, dtype=float)
     return float((C @ x + D * value).item()), np.asarray(A @ x + B * value, dtype=float)
 
 

@@ -46,15 +46,17 @@ def sampled_law(
     """
     if type(controller) is not SampledController or "step" in vars(controller) or not readings.simple:
         return None
-    linear, compiled = _linear(controller.started), controller.started
-    if linear is None and type(compiled) is not CompiledInRun:
-        return None
     inputs, start, period = len(plant.inputs), plant.state.time, plant.period
+    started, address = controller.started, 0
+    law = _linear(started)
+    if law is None:
+        if type(started) is not CompiledInRun:
+            return None
+        address, n = started.address, started.states
+        law = LinearLaw(np.zeros((n, n)), np.zeros(0), np.zeros(0), np.zeros((len(outputs), inputs)))
     count = periods_in(end - start, period)
     filters = _filters(controller, inputs)
-    address, states = (0, len(linear.A)) if linear else (compiled.address, compiled.states)
-    law = linear or LinearLaw(np.zeros((states, states)), *np.zeros((2, 0)), np.zeros((len(outputs), inputs)))
-    kept = filters["filter_A"].shape[0]
+    states, kept = len(law.A), filters["filter_A"].shape[0]
     whole, part = whole_and_part(plant.delay / period)
     lowest, highest = controller.bounds[0].T
     arrays: dict[str, Any] = {
