@@ -85,11 +85,12 @@ class SampledController:
     Parameters
     ----------
     law : object
-        Control law: a discrete model of python-control or SciPy from readings to torques, as state space or transfer
-        function; a function of (k, t, y), with y (inputs,) the readings of sample k at time t, that returns torques
-        (outputs,); or an object with such a method `step`. The object may have `start(plant)`, which is called first,
-        `limited(torques)`, which receives the torques after limits, any of the attributes below, `whole_torque` if no
-        planned torque may act as well, and `absolute` if it takes readings without a reference.
+        Control law: a `Law`, such as `JointPID`; a discrete model of python-control or SciPy from readings to torques,
+        as state space or transfer function; a function of (k, t, y), with y (inputs,) the readings of sample k at time
+        t, that returns torques (outputs,); or an object with such a method `step`. The object may have `start(plant)`,
+        which is called first, `limited(torques)`, which receives the torques after limits, any of the attributes
+        below, `whole_torque` if no planned torque may act as well, and `absolute` if it takes readings without a
+        reference. Its attributes are its state.
     period : float, optional
         Sampling period [s]; the law's own by default.
     delay : float
@@ -116,6 +117,13 @@ class SampledController:
         Largest rates of the torques [N m/s, N/s]; unlimited by default.
     name : str
         Name in results and errors.
+
+    Attributes
+    ----------
+    started : StartedLaw
+        Law in the present run, available once started.
+    chain_state : ChainState
+        State of the chain and of the law.
 
     Raises
     ------
