@@ -12,7 +12,7 @@ import paraflex as pf
 from paraflex import JointPID, SampledController, Simulation
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.joints import internal_torques, joint_gains, task_inertia, torque_projectors
-from paraflex.control.laws.kinds.computed_torque import ComputedTorque, RigidState
+from paraflex.control.laws.kinds.computed_torque import ComputedTorque, RigidInverseState
 from paraflex.control.laws.kinds.rate_feedback import RateFeedback
 from paraflex.control.loop.references import planned_readings
 from paraflex.files import model_from
@@ -143,7 +143,7 @@ def test_on_the_plan_it_is_the_feed_forward(task):
     for k in range(0, 100, 7):
         t = k * 1e-3
         before = np.array([one(t) - 1e-3 * rate for one, rate in zip(readings, joint_rates(task, k), strict=True)])
-        state = RigidState(task.motion.q[k], law.rates.after(None, before))
+        state = RigidInverseState(task.motion.q[k], law.rates.after(None, before))
         given, _ = law.step(state, k, t, np.array([one(t) for one in readings]))
         assert given == pytest.approx(needed[k], abs=1e-5)
 

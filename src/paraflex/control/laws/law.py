@@ -29,7 +29,7 @@ def given(description: str, check: Any = None, unit: str = "", *, by: By | None 
     Parameters
     ----------
     description, check, unit
-        Description in files, check of each number, and unit in errors: see `said`.
+        Description in files with the unit after "in", check of each number, and unit that its error asks for.
     by : "motors", "outputs", "sensors" or "inputs", optional
         Names that the keys of a field with numbers by name are.
     default : any, optional

@@ -79,7 +79,7 @@ class ComputedTorque(Law, kind="computed-torque", title="computed torque"):
         )
 
 
-class RigidState(NamedTuple):
+class RigidInverseState(NamedTuple):
     """State of computed torque: the pose (n,) of the rigid mechanism, and the rates of the readings."""
 
     pose: Array
@@ -108,9 +108,9 @@ class RigidInverse(StartedLaw):
         self._closure = PathClosure(plan.mechanism, 0.0, float(plan.t[-1]))
         self._wanted = self._closure.target(plan.path, plan.t)
 
-    def step(self, state: RigidState | None, k: int, t: float, y: Array) -> tuple[Array, RigidState]:
+    def step(self, state: RigidInverseState | None, k: int, t: float, y: Array) -> tuple[Array, RigidInverseState]:
         """Return torques from angles and travels y of joints, and the state: see `StartedLaw.step`."""
-        pose, before = state or RigidState(self._plan.q[0], None)
+        pose, before = state or RigidInverseState(self._plan.q[0], None)
         sample = min(max(round((t - self._start) / self._period), 0), len(self._plan.t) - 1)
         place = self._closure.task(self._plan.q[sample])
         _, rate, acceleration = self._wanted[sample]
@@ -120,7 +120,7 @@ class RigidInverse(StartedLaw):
         motion = self._motion(t, read, rows @ rates.rates, command, pose)
         effort = required_effort(motion)
         torques = np.linalg.pinv(effort.matrix[0][:, self._motors]) @ effort.required[0]
-        return torques, RigidState(motion.q[0], rates)
+        return torques, RigidInverseState(motion.q[0], rates)
 
     def _read(self, y: Array, place: Array, pose: Array) -> tuple[Array, Array, Array]:
         """Return the end-effector's position (tasks,) at readings y, its Jacobian (tasks, joints), and the pose."""
