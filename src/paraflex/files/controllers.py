@@ -16,7 +16,6 @@ from paraflex.files.laws import components_table, read_components
 from paraflex.files.said import fields_said, unsayable
 from paraflex.files.schema import ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism
-from paraflex.mechanism.loads import InTime
 
 
 def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, ControllerDescription]:
@@ -40,16 +39,13 @@ def _read(name: str, table: Any, parameters: Mapping[str, float], duration: floa
     kind = LAWS[said.pop("type")]
     law = kind(**{each.name: said.pop(each.name) for each in fields(kind) if each.name in said})
     if isinstance(table.reference, Mapping):
-        said["reference"] = {
-            sensor: _reference(sensor, given, parameters, duration) for sensor, given in table.reference.items()
-        }
+        said["reference"] = found = {}
+        for sensor, given in table.reference.items():
+            # A reference is written like the torque of a motor.
+            torque = TorqueTable.model_construct(torque=given)
+            with renamed(f"reference.{sensor}"):
+                found[sensor] = read_components(torque, "torque", parameters, duration)[0]
     return ControllerDescription(name, law, **said)
-
-
-def _reference(sensor: str, given: Any, parameters: Mapping[str, float], duration: float | None) -> InTime:
-    """Build the reference of a sensor, which is written like the torque of a motor."""
-    with renamed(f"reference.{sensor}"):
-        return read_components(TorqueTable.model_construct(torque=given), "torque", parameters, duration)[0]
 
 
 def controller_table(one: ControllerDescription) -> dict[str, Any]:
@@ -70,10 +66,9 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
     said = {"type": law.kind} | fields_said(law) | fields_said(one, "name", "law")
     if isinstance(one.reference, Mapping):
         try:
-            said["reference"] = {
-                sensor: components_table((each,), "torque")["torque"] for sensor, each in one.reference.items()
-            }
+            said["reference"] = {sensor: components_table((each,), "torque")["torque"]
+                                 for sensor, each in one.reference.items()}  # fmt: skip
         except (InputError, KeyError):
-            remedy = "give numbers or expressions of the time"
-            raise unsayable(f"{place}.reference", dict(one.reference), remedy) from None
+            raise unsayable(f"{place}.reference", dict(one.reference),
+                            "give numbers or expressions of the time") from None  # fmt: skip
     return said

@@ -67,7 +67,7 @@ class CompiledLaw(Law):
 
     def start(self, plant: Plant) -> CompiledInRun:
         """Return the law in a run: see `Law.start`."""
-        return CompiledInRun(compiled_function(self.function), len(plant.inputs), self.states, len(plant.outputs))
+        return CompiledInRun(self.function, len(plant.inputs), self.states, len(plant.outputs))
 
 
 class CompiledInRun(StartedLaw):
@@ -75,18 +75,27 @@ class CompiledInRun(StartedLaw):
 
     Parameters
     ----------
-    compiled : CompiledFunction
-        Function.
+    function : callable
+        Function of a `CompiledLaw`.
     inputs, states, outputs : int
         Numbers of readings, of states and of torques.
+
+    Raises
+    ------
+    InputError
+        A function that Numba cannot compile.
     """
 
-    def __init__(self, compiled: CompiledFunction, inputs: int, states: int, outputs: int) -> None:
-        self.states, self._outputs = states, outputs
-        self._function = compiled.function
-        name = getattr(self._function, "__name__", "")
+    def __init__(self, function: Callable[..., None], inputs: int, states: int, outputs: int) -> None:
+        if function not in _COMPILED:
+            _COMPILED[function] = checked(function if is_jitted(function) else njit(function), {}), {}
+        self._function, entries = _COMPILED[function]
+        sizes = inputs, states, outputs
+        if sizes not in entries:
+            entries[sizes] = _entry(self._function, *sizes)
+        self._entry, self.states, self._outputs = entries[sizes], states, outputs
+        name = getattr(function, "__name__", "")
         self.title: str = f"compiled {name if name.isidentifier() else 'function'}"
-        self._entry = compiled.entry(inputs, states, outputs)
 
     @property
     def address(self) -> int:
@@ -100,62 +109,26 @@ class CompiledInRun(StartedLaw):
         return torques, x
 
 
-class CompiledFunction:
-    """Compiled function of (k, t, y, x, torques) that evaluates a control law: see `CompiledLaw`.
+def _entry(law: Any, inputs: int, states: int, outputs: int) -> Any:
+    """Return the C function of numbers and pointers, which returns 0, or 1 where an exception was raised."""
 
-    Parameters
-    ----------
-    function : callable
-        Function compiled by Numba, or one that Numba can compile.
-    """
-
-    def __init__(self, function: Callable[..., None]) -> None:
-        self._entries: dict[tuple[int, int, int], Any] = {}
-        self.function: Any = checked(function if is_jitted(function) else njit(function), {})
-
-    def entry(self, inputs: int, states: int, outputs: int) -> Any:
-        """Return the C function for given numbers of inputs, states and outputs.
-
-        It takes numbers and pointers, and returns 0, or 1 where an exception was raised.
-
-        Parameters
-        ----------
-        inputs, states, outputs : int
-            Numbers of readings, of states and of torques.
-
-        Raises
-        ------
-        InputError
-            A function that Numba cannot compile.
-        """
-        sizes, law = (inputs, states, outputs), self.function
-        if sizes in self._entries:
-            return self._entries[sizes]
-
-        def entry(k, t, y, x, torques):
-            try:
-                law(k, t, carray(y, inputs), carray(x, states), carray(torques, outputs))
-            except Exception:
-                return 1
-            return 0
-
+    def entry(k, t, y, x, torques):
         try:
-            self._entries[sizes] = cfunc(_SIGNATURE)(entry)
-        except NumbaError as error:
-            cause = " ".join(_STYLES.sub("", str(error)).split())[:200]
-            raise InputError(f"cannot be compiled: {cause}", field="law", value=law.__name__,
-                             remedy="write it as Numba takes functions, or give a law in Python") from None  # fmt: skip
-        return self._entries[sizes]
+            law(k, t, carray(y, inputs), carray(x, states), carray(torques, outputs))
+        except Exception:
+            return 1
+        return 0
+
+    try:
+        return cfunc(_SIGNATURE)(entry)
+    except NumbaError as error:
+        cause = " ".join(_STYLES.sub("", str(error)).split())[:200]
+        raise InputError(f"cannot be compiled: {cause}", field="law", value=law.__name__,
+                         remedy="write it as Numba takes functions, or give a law in Python") from None  # fmt: skip
 
 
-_FUNCTIONS: WeakKeyDictionary[Any, CompiledFunction] = WeakKeyDictionary()
-
-
-def compiled_function(function: Callable[..., None]) -> CompiledFunction:
-    """Return the compiled function of a control law, compiled once and cached."""
-    if function not in _FUNCTIONS:
-        _FUNCTIONS[function] = CompiledFunction(function)
-    return _FUNCTIONS[function]
+# Checked functions, and their C functions by the numbers of inputs, states and outputs: each is compiled once.
+_COMPILED: WeakKeyDictionary[Any, tuple[Any, dict[tuple[int, int, int], Any]]] = WeakKeyDictionary()
 
 
 def checked(function: Any, done: dict[int, Any]) -> Any:

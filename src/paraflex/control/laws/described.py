@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
 from paraflex.control.laws.kinds import LAWS
-from paraflex.control.laws.law import Law, LawNames, given, of_names
+from paraflex.control.laws.law import Law, given, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
 from paraflex.mechanism import AngleLaw, Mechanism
@@ -37,26 +37,14 @@ class ControllerDescription(CheckedFields):
 
     Entries given by motor or sensor are used for those motors and sensors that a mode has.
 
+    The fields are arguments of `SampledController`.
+
     Attributes
     ----------
-    name : str
-        Name of the controller.
     law : Law
         Control law, of a kind in `kinds.LAWS` if a file is to hold it.
-    period, delay : float
-        Sampling period, and delay from a sample until its torques act [s].
     inputs, outputs : tuple of str
         Sensors and motors. If empty, those of the law, else the encoders of its motors and all motors of a mode.
-    reference : "plan", "open-loop" or mapping of str to float or AngleLaw, optional
-        Reference that is subtracted from the readings; the law's own by default.
-    limits : float, pair or mapping of str to either, optional
-        Limits of the torques [N m, N]; none by default.
-    rates : float or mapping of str to float, optional
-        Limits of the rates of the torques [N m/s, N/s]; none by default.
-    quantise : float or mapping of str to float, optional
-        Resolution of the readings; not quantised by default.
-    filters : mapping of str to float, or to numerator and denominator
-        Filters of the readings by sensor: cut-off frequency [Hz], or a transfer function.
     """
 
     _own = ("reference", "limits", "filters")
@@ -109,20 +97,15 @@ class ControllerDescription(CheckedFields):
         """
         motors = [motor.name for motor in mechanism.motors]
         sensors = [sensor.name for sensor in measured_sensors(mechanism)]
-        encoders = encoders_of(mechanism, self.outputs or motors)
-        points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
         with within(f"{TABLE}.{self.name}"):
-            self._check(LawNames(self.inputs, self.outputs, sensors, motors, encoders, points))
-
-    def _check(self, names: LawNames) -> None:
-        for field_name, all_names, what in (("inputs", names.sensors, "sensor"), ("outputs", names.motors, "motor")):
-            check_distinct(getattr(self, field_name), all_names, field_name, what)
-        self.law.check(names)
-        sampled = self._sampled(self.law.of_motors(self.outputs or names.motors))
-        among = sampled.inputs or names.sensors
-        if isinstance(self.reference, Mapping):
-            all_known(self.reference, among, "reference", "sensor")
-        sampled.check(among, sampled.outputs or names.motors)
+            check_distinct(self.inputs, sensors, "inputs", "sensor")
+            check_distinct(self.outputs, motors, "outputs", "motor")
+            self.law.check(mechanism, self.inputs, self.outputs)
+            sampled = self._sampled(self.law.of_motors(self.outputs or motors))
+            among = sampled.inputs or sensors
+            if isinstance(self.reference, Mapping):
+                all_known(self.reference, among, "reference", "sensor")
+            sampled.check(among, sampled.outputs or motors)
 
     def made(self, mechanism: Mechanism, motors: Sequence[str]) -> SampledController:
         """Return the controller for a mode with some motors of a mechanism.

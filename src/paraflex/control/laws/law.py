@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from paraflex.arguments import CheckedFields, given_as
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
 from paraflex.errors import InputError
+from paraflex.mechanism import Mechanism
+from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known, said
 
 # Kinds of control laws by their names in files; `kinds` imports the modules that define those of paraflex.
@@ -35,33 +37,8 @@ def given(description: str, check: Any = None, unit: str = "", *, by: By | None 
     default : any, optional
         Default value; by default the field is required.
     """
-    metadata = said(description, check, unit) | {"by": by}
-    return (
-        field(default_factory=dict, metadata=metadata) if default == {} else field(default=default, metadata=metadata)
-    )
-
-
-class LawNames(NamedTuple):
-    """Names of sensors and motors against which a law is checked.
-
-    Attributes
-    ----------
-    inputs, outputs : sequence of str
-        Sensors and motors that the controller names itself; may be empty.
-    sensors, motors : sequence of str
-        All sensors and motors of the mechanism.
-    encoders : sequence of str
-        Encoders of the motors that the controller names, or of all motors if it names none.
-    points : sequence of str
-        Points of bodies, such as "link.tip".
-    """
-
-    inputs: Sequence[str]
-    outputs: Sequence[str]
-    sensors: Sequence[str]
-    motors: Sequence[str]
-    encoders: Sequence[str]
-    points: Sequence[str]
+    value: Any = {"default_factory": dict} if default == {} else {"default": default}
+    return field(**value, metadata=said(description, check, unit) | {"by": by})
 
 
 class StartedLaw(ABC):
@@ -166,20 +143,29 @@ class Law(CheckedFields, ABC):
             A law that does not fit the plant.
         """
 
-    def check(self, names: LawNames) -> None:
+    def check(self, mechanism: Mechanism, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         """Check the names of motors and sensors in the fields; numbers are checked when the law is made.
+
+        Parameters
+        ----------
+        mechanism : Mechanism
+            Mechanism to be controlled.
+        inputs, outputs : sequence of str
+            Sensors and motors that the controller names itself; may be empty.
 
         Raises
         ------
         InputError
             An unknown motor or sensor.
         """
+        motors = [motor.name for motor in mechanism.motors]
+        sensors = [sensor.name for sensor in measured_sensors(mechanism)]
+        among = {"motors": motors, "outputs": motors, "sensors": sensors,
+                 "inputs": inputs or encoders_of(mechanism, outputs or motors)}  # fmt: skip
         for each in fields(self):
             wanted, given = each.metadata.get("by"), getattr(self, each.name)
             if wanted and isinstance(given, Mapping):
-                motors = wanted in ("motors", "outputs")
-                sensors = names.sensors if wanted == "sensors" else names.inputs or names.encoders
-                all_known(given, names.motors if motors else sensors, each.name, "motor" if motors else "sensor")
+                all_known(given, among[wanted], each.name, "motor" if among[wanted] is motors else "sensor")
 
     def of_motors(self, motors: Sequence[str]) -> Self:
         """Return the law with the entries of some motors only.

@@ -138,43 +138,33 @@ class LQGDesign:
         """Return the control law in its initial state, for `SampledController`."""
         return LQGLaw(self)
 
-    def in_run(self, plant: Plant) -> LQGInRun:
-        """Return the control law in a run; planned torques hold the equilibrium in its place if they act as well.
+    def in_run(self, plant: Plant | None = None) -> LQGInRun:
+        """Return the control law with the states of `state_space`, for a run or, without a plant, for steps by hand.
+
+        The estimate is propagated with the limited torques, and the integrals stay constant while any torque is
+        limited. Where planned torques act as well, they hold the equilibrium in place of the law.
 
         Raises
         ------
         InputError
             Sensors, motors, a period or a delay other than those of the design.
         """
-        for what in ("inputs", "outputs"):
+        for what in ("inputs", "outputs") if plant else ():
             wanted, have = getattr(self, what), tuple(getattr(plant, what))
             if have != wanted:
                 raise InputError("differ from those of the design in name or order", field=what, value=", ".join(have),
                                  remedy=f"leave them out, or give {', '.join(wanted)}")  # fmt: skip
-        for what in ("period", "delay"):
+        for what in ("period", "delay") if plant else ():
             wanted, have = getattr(self, what), getattr(plant, what)
             if abs(have - wanted) > SAME * self.period:
                 raise InputError(f"the design is for {wanted:g} s", field=what, value=have,
                                  remedy=f"leave it out, or design for that {what}")  # fmt: skip
-        return self.linear_law(holds=not plant.feed_forward)
-
-    def linear_law(self, *, holds: bool = True) -> LQGInRun:
-        """Return the law with the states of `state_space`.
-
-        The estimate is propagated with the limited torques, and the integrals stay constant while any torque is
-        limited.
-
-        Parameters
-        ----------
-        holds : bool
-            Whether the torques that hold the equilibrium are part of those of the law.
-        """
         n, rows = len(self.filter.A), len(self.regulator.integrated)
         return LQGInRun(
             *self.state_space,
             E=np.vstack([-self.filter.B, np.zeros((rows, len(self.outputs)))]),
             first=np.vstack([self.start, np.zeros((rows, len(self.inputs)))]),
-            holding=self.holding_torques if holds else np.zeros_like(self.holding_torques),
+            holding=0.0 * self.holding_torques if plant and plant.feed_forward else self.holding_torques,
             waiting=(np.arange(n + rows) >= n).astype(float),
             design=self,
         )
@@ -199,12 +189,8 @@ class LQGLaw:
     ----------
     design : LQGDesign
         Design of the law.
-    period, delay : float
-        Sampling period, and delay from a sample until its torques act [s].
-    inputs, outputs : tuple of str
-        Sensors and motors.
-    state_space : StateSpace
-        Controller without limits: see `LQGDesign.state_space`.
+    period, delay, inputs, outputs, state_space
+        Those of the design.
     holding_torques : (motors,) array
         Holding torques of the design, part of its torques; zero where planned torques act as well [N m, N].
     """
@@ -216,7 +202,7 @@ class LQGLaw:
         self.inputs: tuple[str, ...] = design.inputs
         self.outputs: tuple[str, ...] = design.outputs
         self.state_space: StateSpace = design.state_space
-        self._law = design.linear_law()
+        self._law = design.in_run()
         self._state: LinearState | None = None
 
     @property

@@ -87,19 +87,7 @@ class RigidInverseState(NamedTuple):
 
 
 class RigidInverse(StartedLaw):
-    """Inverse dynamics of the rigid mechanism at its encoders' readings, with feedback of the end-effector's error.
-
-    Parameters
-    ----------
-    plan : RigidMotion
-        Planned motion at the samples.
-    plant : Plant
-        Plant of the controller.
-    Kp, Kv : float
-        Gains of the end-effector's position [1/s^2] and velocity [1/s].
-    rates : BackwardDifference
-        Filter of the rates.
-    """
+    """Computed torque in a run, with gains Kp [1/s^2] and Kv [1/s] along a plan at the samples of a controller."""
 
     def __init__(self, plan: RigidMotion, plant: Plant, Kp: float, Kv: float, rates: BackwardDifference) -> None:
         self._plan, self._Kp, self._Kv, self.rates = plan, Kp, Kv, rates

@@ -20,7 +20,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import CUTOFF, BackwardDifference
-from paraflex.control.laws.law import Law, LawNames, given
+from paraflex.control.laws.law import Law, given
 from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.control.loop.together import PLAN
 from paraflex.errors import InputError
@@ -81,11 +81,11 @@ class JointPID(Law, kind="pid", title="PID of joints"):
     project: bool = given("whether torques that only strain links are removed", default=True)
     cutoff: float | None = given(*CUTOFF, default=None)
 
-    def check(self, names: LawNames) -> None:
+    def check(self, mechanism: Mechanism, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         """Check the names of motors, and the pairs of readings and motors: see `Law.check`."""
-        super().check(names)
-        if names.inputs and names.outputs:
-            check_pairs(names.inputs, names.outputs)
+        super().check(mechanism, inputs, outputs)
+        if inputs and outputs:
+            check_pairs(inputs, outputs)
 
     def start(self, plant: Plant) -> LinearLaw:
         """Return the law in a run: see `Law.start`. Its states are the previous errors, their rates and integrals."""

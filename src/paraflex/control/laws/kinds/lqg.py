@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import quantisation_noise
-from paraflex.control.laws.law import Law, LawNames, given
+from paraflex.control.laws.law import Law, given
 from paraflex.control.loop.together import OPEN_LOOP, Numbers
 from paraflex.errors import InputError
-from paraflex.mechanism import mode_of_motors
+from paraflex.mechanism import Mechanism, mode_of_motors
 from paraflex.mechanism.quantities import all_known, finite, not_negative, positive
 
 if TYPE_CHECKING:
@@ -37,18 +37,12 @@ class DesignedLQG(Law, kind="lqg", title="LQG"):
 
     Attributes
     ----------
-    deviations : mapping of str to float
-        Largest allowed deviations of sensors, in their units: see `lqr`.
-    effort : float or mapping of str to float
-        Largest torques or forces [N m, N]. Motors that a mapping does not name are not used.
+    deviations, effort, disturbance, integrators
+        See `lqr` and `lqg`. Motors that a mapping of efforts does not name are not used; integrators of sensors that it
+        does not read are ignored.
     noise : float or mapping of str to float, optional
         Standard deviations of readings in their units, of all or by sensor; by default `quantisation_noise` of the
         controller's resolution.
-    disturbance : float or mapping of str to float, optional
-        Standard deviations of random efforts at motors [N m, N]; a tenth of `effort` by default.
-    integrators : mapping of str to float
-        Sensors whose errors are to vanish under constant loads, with the time constants of that decay [s]: see `lqr`.
-        Those that it does not read are ignored.
     coloured : mapping of str to (float, Filter)
         Coloured disturbances at motors, and at points such as "link.point.x": see `lqg`. Motors that it does not drive
         are ignored.
@@ -115,14 +109,16 @@ class DesignedLQG(Law, kind="lqg", title="LQG"):
         """Motors that the efforts name; empty for one effort of all."""
         return tuple(self.effort) if isinstance(self.effort, Mapping) else ()
 
-    def check(self, names: LawNames) -> None:
+    def check(self, mechanism: Mechanism, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         """Check the names: see `Law.check`."""
-        super().check(names)
-        places = [*names.motors, *(f"{point}.{axis}" for point in names.points for axis in "xy")]
+        super().check(mechanism, inputs, outputs)
+        motors = [motor.name for motor in mechanism.motors]
+        points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+        places = [*motors, *(f"{point}.{axis}" for point in points for axis in "xy")]
         all_known(self.coloured, places, "coloured", "motor or point")
-        used = self.of_motors(names.outputs or names.motors).outputs
-        if names.outputs and used and set(used) != set(names.outputs):
-            raise InputError("differ from those of effort", field="outputs", value=", ".join(names.outputs),
+        used = self.of_motors(outputs or motors).outputs
+        if outputs and used and set(used) != set(outputs):
+            raise InputError("differ from those of effort", field="outputs", value=", ".join(outputs),
                              remedy="leave it out, or give the effort of each")  # fmt: skip
 
     def start(self, plant: Plant) -> LQGInRun:

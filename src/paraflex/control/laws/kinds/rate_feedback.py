@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,14 +11,14 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import CUTOFF, BackwardDifference
-from paraflex.control.laws.law import Law, LawNames, given
+from paraflex.control.laws.law import Law, given
 from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.errors import InputError
+from paraflex.mechanism import Mechanism
+from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import all_known, finite
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from paraflex.control.laws.discrete import DiscreteModel
 
 
@@ -66,12 +66,13 @@ class RateFeedback(Law, kind="rate-feedback", title="rate feedback"):
         """Motors that the gains name."""
         return tuple(self.gains)
 
-    def check(self, names: LawNames) -> None:
+    def check(self, mechanism: Mechanism, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         """Check the names of motors and sensors: see `Law.check`."""
-        super().check(names)
+        super().check(mechanism, inputs, outputs)
+        sensors = [sensor.name for sensor in measured_sensors(mechanism)]
         for motor, row in self.gains.items():
-            all_known(row, names.sensors, f"gains.{motor}", "sensor")
-        for field_name, own in (("inputs", names.inputs), ("outputs", names.outputs)):
+            all_known(row, sensors, f"gains.{motor}", "sensor")
+        for field_name, own in (("inputs", inputs), ("outputs", outputs)):
             if own and set(own) != set(getattr(self, field_name)):
                 raise InputError("differ from those of the gains", field=field_name, value=", ".join(own),
                                  remedy="leave it out")  # fmt: skip

@@ -10,8 +10,9 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
-from paraflex.control.laws.law import Law, LawNames, given
+from paraflex.control.laws.law import Law, given
 from paraflex.errors import InputError
+from paraflex.mechanism import Mechanism
 
 if TYPE_CHECKING:
     from paraflex.control.laws.discrete import DiscreteModel
@@ -26,14 +27,9 @@ class StateSpaceLaw(Law, kind="state-space", title="state space"):
 
     Attributes
     ----------
-    D : (outputs, inputs) rows
-        Feed-through matrix, from readings less their references to torques.
-    A : (n, n) rows
-        State matrix; empty for a model without states.
-    B : (n, inputs) rows
-        Input matrix.
-    C : (outputs, n) rows
-        Output matrix.
+    D, A, B, C : (outputs, inputs), (n, n), (n, inputs) and (outputs, n) rows
+        Feed-through, state, input and output matrix, from readings less their references to torques; A, B and C are
+        empty for a model without states.
 
     Raises
     ------
@@ -63,9 +59,9 @@ class StateSpaceLaw(Law, kind="state-space", title="state space"):
             rows = tuple(tuple(map(float, row)) for row in getattr(self, name))
             object.__setattr__(self, name, rows if any(rows) else ())
 
-    def check(self, names: LawNames) -> None:
+    def check(self, mechanism: Mechanism, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         """Check the numbers of sensors and motors: see `Law.check`."""
-        self._model().check_size(names.inputs, names.outputs, 1.0)
+        self._model().check_size(inputs, outputs, 1.0)
 
     def start(self, plant: Plant) -> LinearLaw:
         """Return the law in a run: see `Law.start`."""
