@@ -129,6 +129,20 @@ def test_a_controller_changed_in_python_is_written(tmp_path):
     assert pf.load(tmp_path / "new.toml").controllers == {"joint": one, "other": other}
 
 
+def test_laws_that_files_do_not_have_are_not_written(tmp_path):
+    class Mine(pf.JointPID):
+        """A law of a user, which has no table."""
+
+    model = read(PID)
+    for law, said in (
+        (Mine(1.0), r"controller.one.law: a model file cannot express this \(got 'Mine'\); give a law of type"),
+        (pf.JointPID([1.0]), r"controller.one.stiffness: a model file cannot express this .*numbers by name"),
+    ):
+        one = ControllerDescription("one", law, 1e-3)
+        with pytest.raises(InputError, match=said):
+            replace(model, controllers={"one": one}).save(tmp_path / "new.toml")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -197,6 +197,21 @@ def test_computed_torque_drives_alone(model, task):
     assert 10.0 * run.driven.deviation < beside.driven.deviation
 
 
+def test_computed_torque_goes_on_from_what_was_saved(model, task):
+    """The same bits: pose and rates are its state, and what started is the same before and after."""
+    sim, ends = Simulation(task, mode="++++"), []
+    controller = SampledController(model.controllers["ct"].law, period=1e-3)
+    sim.run(controller, until=0.0205, warning=False)
+    saved, started = sim.save(), controller.started
+    for _ in range(2):
+        sim.restore(saved)
+        assert controller.started is started
+        assert controller.law is model.controllers["ct"].law
+        ends.append(sim.run(warning=False).controllers[0].wanted)
+    assert np.array_equal(*ends)
+    assert np.array_equal(ends[0], Simulation(task, mode="++++").run(controller, warning=False).controllers[0].wanted)
+
+
 def test_no_second_torque_beside_the_whole_one(model, task):
     ct = model.controllers["ct"]
     with pytest.raises(
