@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 import paraflex as pf
-from paraflex import SampledController, Simulation
-from paraflex.control.laws.joints import JointPID, internal_torques
+from paraflex import JointPID, SampledController, Simulation
+from paraflex.control.laws.joints import internal_torques
 from paraflex.designs.measure import measure
 from paraflex.errors import ControllerError, InputError
 from paraflex.results import (

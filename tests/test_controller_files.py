@@ -12,8 +12,8 @@ import pytest
 
 import paraflex as pf
 from paraflex.cli.repeated import repeated_runs
-from paraflex.control import ControllerDescription, PIDDescription, Simulation, simulate_controlled
-from paraflex.control.laws.described_laws import LAWS
+from paraflex.control import ControllerDescription, Simulation, simulate_controlled
+from paraflex.control.laws.kinds import LAWS
 from paraflex.designs.derivatives.plans import check_open_and_whole
 from paraflex.designs.measure import measure
 from paraflex.errors import InputError
@@ -84,7 +84,7 @@ def test_a_state_space_controller_is_the_law():
 def test_a_pid_controller_is_what_it_says():
     model = read(PID)
     one = model.controllers["joint"]
-    assert one.law == PIDDescription(40.0, {"tau": 1.2}, cutoff=200.0)
+    assert one.law == pf.JointPID(40.0, {"tau": 1.2}, cutoff=200.0)
     assert (one.period, one.delay, one.limits, one.rates) == (1e-3, 0.5e-3, [-20.0, 30.0], {"tau": 5e4})
     run = Simulation(model, duration=0.01, samples=11).run(one)
     (done,) = run.controllers
@@ -99,7 +99,7 @@ def test_a_pid_controller_is_what_it_says():
 def test_references_are_functions_of_time():
     model = read(PID)
     held = replace(model.controllers["joint"], delay=0.0, filters={}, limits=None, rates=None, quantise=None,
-                   law=PIDDescription(40.0))  # fmt: skip
+                   law=pf.JointPID(40.0))  # fmt: skip
     (done,) = Simulation(model, duration=0.01, samples=11).run(held).controllers
     assert done.wanted[:, 0] == pytest.approx(-40.0 * (done.readings[:, 0] - 0.2 * np.sin(2.0 * done.t)), abs=1e-12)
 
@@ -122,11 +122,25 @@ def test_a_controller_changed_in_python_is_written(tmp_path):
     (tmp_path / "model.toml").write_text(ROTOR + START + PID)
     model = pf.load(tmp_path / "model.toml")
     one = replace(model.controllers["joint"], period=2e-3)
-    other = ControllerDescription("other", PIDDescription(1.0), 1e-3, reference={"hub": 0.5})
+    other = ControllerDescription("other", pf.JointPID(1.0), 1e-3, reference={"hub": 0.5})
     replace(model, controllers={"joint": one, "other": other}).save(tmp_path / "new.toml")
     text = (tmp_path / "new.toml").read_text()
     assert 'stiffness = "40 N m/rad"' in text
     assert pf.load(tmp_path / "new.toml").controllers == {"joint": one, "other": other}
+
+
+def test_laws_that_files_do_not_have_are_not_written(tmp_path):
+    class Mine(pf.JointPID):
+        """A law of a user, which has no table."""
+
+    model = read(PID)
+    for law, said in (
+        (Mine(1.0), r"controller.one.law: a model file cannot express this \(got 'Mine'\); give a law of type"),
+        (pf.JointPID([1.0]), r"controller.one.stiffness: a model file cannot express this .*numbers by name"),
+    ):
+        one = ControllerDescription("one", law, 1e-3)
+        with pytest.raises(InputError, match=said):
+            replace(model, controllers={"one": one}).save(tmp_path / "new.toml")
 
 
 @pytest.mark.parametrize(
@@ -192,7 +206,7 @@ def test_studies_name_controllers_with_periods_that_fit():
 def test_what_is_given_by_motor_is_used_of_those_of_a_mode():
     model = pf.load("raparm_i")
     motors = [motor.name for motor in model.mechanism.motors]
-    one = ControllerDescription("pd", PIDDescription(dict.fromkeys(motors, 60.0)), 1e-3,
+    one = ControllerDescription("pd", pf.JointPID(dict.fromkeys(motors, 60.0)), 1e-3,
                                 limits=dict.fromkeys(motors, 5.0))  # fmt: skip
     one.check(model.mechanism)
     task = pf.plan(model.mechanism.rigid(), model.paths["square"], duration=0.01, samples=11)

@@ -15,7 +15,7 @@ DEFINED = re.compile(r" +(?:class |def |\w+(?:: .*)? = ).*[([{:]$| from __future
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 
 
-def test_all_eight_kinds_of_additions_are_made_as_the_page_says(tmp_path):
+def test_all_nine_kinds_of_additions_are_made_as_the_page_says(tmp_path):
     # With the compiled kernels, which do not change.
     package = Path(shutil.copytree(Path(paraflex.__file__).parent, tmp_path / "paraflex"))
     ran, waiting = 0, []
@@ -33,7 +33,7 @@ def test_all_eight_kinds_of_additions_are_made_as_the_page_says(tmp_path):
         else:
             assert not file.exists()
             file.write_text(block.text, encoding="utf-8")
-    assert ran + check(waiting, tmp_path) == 15
+    assert ran + check(waiting, tmp_path) == 18
 
 
 def check(blocks, folder):
@@ -86,6 +86,62 @@ def test_a_joint_with_a_field_of_its_own_is_read_and_checked_by_what_the_field_s
         "own.toml: joint.NAME.angle: a bush joint has no angle (got 1.0); leave it out",
         "own.toml: joint.NAME.width: a weld joint has no width (got 2.0); leave it out",
         "the width in mm",
+    ]
+
+
+OWN_LAW = """
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from paraflex.control.laws.law import Law, StartedLaw, given
+from paraflex.mechanism.quantities import positive
+
+
+class Relay(StartedLaw):
+    def __init__(self, torque):
+        self.torque = torque
+
+    def step(self, state, k, t, y):
+        return -self.torque * np.sign(y), (state or 0) + 1
+
+
+@dataclass(frozen=True)
+class RelayLaw(Law, kind="relay", title="relay"):
+    torque: float | Mapping[str, float] = given("the torque in N m, of all motors or by motor", positive, "N m",
+                                                by="motors")
+
+    def start(self, plant):
+        values = self.torque if isinstance(self.torque, Mapping) else dict.fromkeys(plant.outputs, self.torque)
+        return Relay(np.array([values[name] for name in plant.outputs]))
+
+
+import paraflex as pf
+from paraflex.files import load_data, model_from
+
+data = load_data("five_bar")[0]
+for torque in ({"left": 0.1, "right": 0.2}, -1.0, {"lift": 0.1}, "0.1 N", {"left": 0.0}):
+    data["controller"] = {"relay": {"type": "relay", "torque": torque, "period": 1e-3}}
+    try:
+        model = model_from(data, "own.toml")
+        run = pf.Simulation(model, mode="left", duration=0.01, samples=11, start="outward").run(
+            model.controllers["relay"], warning=False)
+        print(run.controllers[0].law, run.controllers[0].outputs, len(run.controllers[0].t))
+    except pf.InputError as error:
+        print(error)
+"""
+
+
+def test_a_law_with_a_state_of_its_own_is_read_and_checked_by_what_its_fields_say(tmp_path):
+    (printed,) = run([Block("python", "", OWN_LAW, "")], tmp_path, Path(paraflex.__file__).parents[1])
+    assert printed.splitlines() == [
+        "relay ('left',) 10",
+        "own.toml: controller.relay.torque: must be positive (got -1.0); give it in N m",
+        "own.toml: controller.relay.torque: unknown motor (got 'lift'); did you mean \"left\"?",
+        "own.toml: controller.relay.torque: a quantity in N where one in N m is asked for (got '0.1 N'); give the "
+        "torque in N m, of all motors or by motor",
+        "own.toml: controller.relay.torque.left: must be positive (got 0.0); give it in N m",
     ]
 
 

@@ -15,7 +15,7 @@ from paraflex.campaign import Workers
 from paraflex.cli.commands.control import CompareLawsRequest
 from paraflex.cli.control_tables import print_laws
 from paraflex.cli.tables import plain_console
-from paraflex.control import ControllerDescription, PIDDescription, simulate_controlled
+from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.control.laws.joints import internal_torques
 from paraflex.errors import InputError
 from paraflex.plots.style import BLUE, VERMILLION
@@ -30,7 +30,7 @@ WORDS = [str(word) for name, value in SHORT.items() for word in (f"--{name}", va
 
 
 def pid(name="pd", stiffness=1.0, **more):
-    return ControllerDescription(name, PIDDescription(stiffness), 1e-3, **more)
+    return ControllerDescription(name, pf.JointPID(stiffness), 1e-3, **more)
 
 
 @pytest.fixture(scope="module")

@@ -15,15 +15,11 @@ import paraflex as pf
 from pages import blocks_of
 from paraflex import SampledController, Simulation
 from paraflex.control import (
-    ComputedTorqueDescription,
     ControllerDescription,
     DesignedLQG,
-    LQGDescription,
-    PIDDescription,
-    RateFeedbackDescription,
     simulate_controlled,
 )
-from paraflex.control.laws.described_laws import LAWS
+from paraflex.control.laws.kinds import LAWS
 from paraflex.designs.derivatives.plans import check_open_and_whole
 from paraflex.errors import InputError, ResultWarning
 from paraflex.files import model_from
@@ -107,10 +103,10 @@ def file(tmp_path):
 
 def test_laws_are_what_their_tables_say(model):
     laws = {name: one.law for name, one in model.controllers.items()}
-    assert laws["ct"] == ComputedTorqueDescription(15.0, cutoff=300.0)
-    assert laws["damp"] == RateFeedbackDescription({"tau1": {"root1": 0.3, "A1": 0.02}, "tau2": {"root1": -0.1}}, 100.0)
+    assert laws["ct"] == pf.ComputedTorque(15.0, cutoff=300.0)
+    assert laws["damp"] == pf.RateFeedback({"tau1": {"root1": 0.3, "A1": 0.02}, "tau2": {"root1": -0.1}}, 100.0)
     deviations = {"x": 0.5e-3, "y": 0.5e-3, **dict.fromkeys(ANGLES, 0.02)}
-    assert laws["lq"] == LQGDescription(deviations, 1.0)
+    assert laws["lq"] == DesignedLQG(deviations, 1.0)
 
 
 def test_files_are_written_and_read_again(file, model, tmp_path):
@@ -119,9 +115,7 @@ def test_files_are_written_and_read_again(file, model, tmp_path):
     assert (tmp_path / "same.toml").read_text().strip() == ROBOT.strip()
     replace(read, parameters={}, text="", source="").save(tmp_path / "new.toml")
     assert pf.load(tmp_path / "new.toml").controllers == model.controllers
-    changed = replace(
-        read.controllers["lq"], law=LQGDescription({"x": 1e-3}, {"tau1": 2.0}, noise=1e-4, states=8, at=0.1)
-    )
+    changed = replace(read.controllers["lq"], law=DesignedLQG({"x": 1e-3}, {"tau1": 2.0}, noise=1e-4, states=8, at=0.1))
     replace(read, controllers={"lq": changed}).save(tmp_path / "changed.toml")
     assert pf.load(tmp_path / "changed.toml").controllers == {"lq": changed}
 
@@ -129,7 +123,7 @@ def test_files_are_written_and_read_again(file, model, tmp_path):
 def test_a_law_and_its_description_agree_on_the_whole_torque(model):
     motors = [motor.name for motor in model.mechanism.motors]
     for one in model.controllers.values():
-        assert one.made(model.mechanism, motors).whole_torque is one.law.whole_torque
+        assert one.made(model.mechanism, motors).whole_torque is one.whole_torque is one.law.whole_torque
     assert [kind for kind, law in LAWS.items() if law.whole_torque] == ["computed-torque"]
 
 
@@ -203,6 +197,21 @@ def test_computed_torque_drives_alone(model, task):
     assert 10.0 * run.driven.deviation < beside.driven.deviation
 
 
+def test_computed_torque_goes_on_from_what_was_saved(model, task):
+    """The same bits: pose and rates are its state, and what started is the same before and after."""
+    sim, ends = Simulation(task, mode="++++"), []
+    controller = SampledController(model.controllers["ct"].law, period=1e-3)
+    sim.run(controller, until=0.0205, warning=False)
+    saved, started = sim.save(), controller.started
+    for _ in range(2):
+        sim.restore(saved)
+        assert controller.started is started
+        assert controller.law is model.controllers["ct"].law
+        ends.append(sim.run(warning=False).controllers[0].wanted)
+    assert np.array_equal(*ends)
+    assert np.array_equal(ends[0], Simulation(task, mode="++++").run(controller, warning=False).controllers[0].wanted)
+
+
 def test_no_second_torque_beside_the_whole_one(model, task):
     ct = model.controllers["ct"]
     with pytest.raises(
@@ -223,9 +232,7 @@ def test_no_second_torque_beside_the_whole_one(model, task):
 
 
 def test_feedback_beside_the_whole_torque_adds_to_it(model, task):
-    run = simulate_controlled(
-        task, "++++", [model.controllers["ct"], ControllerDescription("pd", PIDDescription(5.0), T)]
-    )
+    run = simulate_controlled(task, "++++", [model.controllers["ct"], ControllerDescription("pd", pf.JointPID(5.0), T)])
     whole, more = (one.given for one in run.controllers)
     assert np.max(np.abs(more)) > 0.0
     assert run.applied[2:] == pytest.approx((whole + more)[1:], abs=1e-12)
@@ -258,7 +265,7 @@ def test_gains_are_used_of_the_motors_of_a_mode(model):
     flexible = model.plan(duration=0.01, samples=11)
     (done,) = simulate_controlled(flexible, "+-+-", [model.controllers["damp"]]).controllers
     assert (done.inputs, done.outputs, done.law) == (("root1", "A1"), ("tau1",), "rate feedback")
-    damp = replace(model.controllers["damp"], law=RateFeedbackDescription({"tau2": {"root1": 1.0}}))
+    damp = replace(model.controllers["damp"], law=pf.RateFeedback({"tau2": {"root1": 1.0}}))
     with pytest.raises(InputError, match=r"gains: names no active motor \(got .tau2.\); give some of tau1, tau5"):
         simulate_controlled(flexible, "+-+-", [damp])
 
@@ -438,14 +445,14 @@ def test_lqg_of_few_states_and_another_time(model):
     read = (*ANGLES, *(gauge.name for gauge in gauges))
     deviations = {"x": 0.5e-3, "y": 0.5e-3, **dict.fromkeys(ANGLES, 0.02)}
     noise = {name: 1e-3 if name in ANGLES else 3e-5 for name in read}
-    law = LQGDescription(deviations, 1.0, noise=noise, states=20, at=0.05)
+    law = DesignedLQG(deviations, 1.0, noise=noise, states=20, at=0.05)
     controller = ControllerDescription("lq", law, 1e-3, delay=1e-3, inputs=read).made(damped, MOTORS)
     run = Simulation(task, mode="++++", feed_forward=True).run(controller, until=0.005, warning=False)
     full = pf.linearise(task, mode="++++", at=0.05)
     design = pf.lqg(
         pf.reduce(full, 20), 1e-3, measured=read, deviations=deviations, effort=1.0, noise=noise, delay=1e-3
     )
-    assert np.allclose(controller.law.design.K, design.K, rtol=0.0, atol=1e-9)
+    assert np.allclose(controller.started.design.K, design.K, rtol=0.0, atol=1e-9)
     assert controller.title == "LQG of 20 states"
     assert pf.closed_loop(full, design).stable
     assert "loop-unstable" not in [one.code for one in run.doubts]
@@ -468,7 +475,7 @@ def test_a_loop_that_is_unstable_with_all_states_is_found(model):
 def test_a_disturbance_that_lasts_is_part_of_the_design(model, task):
     """At a motor and at a point, by its filter: what `pf.lqg` makes of the model with that force as an input."""
     lasting = {"link4.C.x": (0.7, 15.0), "tau1": (0.2, ((1.0,), (0.02, 1.0))), "tau2": (0.2, 5.0)}
-    law = LQGDescription({"x": 1e-3, "y": 1e-3}, 1.0, noise=1e-4, coloured=lasting)
+    law = DesignedLQG({"x": 1e-3, "y": 1e-3}, 1.0, noise=1e-4, coloured=lasting)
     one = ControllerDescription("lq", law, 1e-3)
     one.check(model.mechanism)
     controller = one.made(task.mechanism, ("tau1", "tau5"))
@@ -478,9 +485,9 @@ def test_a_disturbance_that_lasts_is_part_of_the_design(model, task):
         deviations={"x": 1e-3, "y": 1e-3}, effort={"tau1": 1.0, "tau5": 1.0}, noise=1e-4,
         coloured={name: each for name, each in lasting.items() if name != "tau2"},
     )  # fmt: skip
-    assert np.allclose(controller.law.design.K, design.K, rtol=0.0, atol=1e-9)
-    assert len(design.regulator.plant.states) == len(controller.law.design.regulator.plant.states)
-    bad = LQGDescription({"x": 1e-3}, 1.0, noise=1e-4, coloured={"link4.D.x": (1.0, 1.0)})
+    assert np.allclose(controller.started.design.K, design.K, rtol=0.0, atol=1e-9)
+    assert len(design.regulator.plant.states) == len(controller.started.design.regulator.plant.states)
+    bad = DesignedLQG({"x": 1e-3}, 1.0, noise=1e-4, coloured={"link4.D.x": (1.0, 1.0)})
     with pytest.raises(InputError, match=r"controller.lq.coloured: unknown motor or point .*link4.C.x"):
         ControllerDescription("lq", bad, 1e-3).check(model.mechanism)
 
@@ -506,9 +513,9 @@ def test_open_loop_is_what_the_flexible_mechanism_reads(model):
     ("change", "said"),
     [
         ({"quantise": {"A1": 1e-3}}, r"lq.noise: has no noise \(got .D1.\); give its standard deviation, or quantise"),
-        ({"inputs": ("x",), "quantise": 1e-6, "law": LQGDescription({"x": 1e-3, "y": 1e-3}, 1.0)},
+        ({"inputs": ("x",), "quantise": 1e-6, "law": DesignedLQG({"x": 1e-3, "y": 1e-3}, 1.0)},
          r"lq.measured: is not seen by the readings"),
-        ({"law": LQGDescription({"x": 1e-3, "y": 1e-3}, 1.0, at=0.3)}, r"lq.at: is not a time of the motion"),
+        ({"law": DesignedLQG({"x": 1e-3, "y": 1e-3}, 1.0, at=0.3)}, r"lq.at: is not a time of the motion"),
     ],
 )  # fmt: skip
 def test_what_a_design_cannot_do(model, task, change, said):
@@ -540,10 +547,10 @@ def test_a_design_is_for_the_motors_that_it_drives(model, task):
 
 def test_a_design_in_python_starts_anew(task):
     """Started for one mode, then another."""
-    law = DesignedLQG({"x": 1e-3, "y": 1e-3}, 1.0, noise=1e-4)
+    controller = SampledController(DesignedLQG({"x": 1e-3, "y": 1e-3}, 1.0, noise=1e-4), period=T)
     for mode, motors in (("+-+-", ("tau1", "tau5")), ("++++", MOTORS)):
-        run = Simulation(task, mode=mode, feed_forward=True).run(SampledController(law, period=T), warning=False)
-        assert run.controllers[0].outputs == law.design.outputs == motors
+        run = Simulation(task, mode=mode, feed_forward=True).run(controller, warning=False)
+        assert run.controllers[0].outputs == controller.started.design.outputs == motors
 
 
 # --- Runs, sweeps -----------------------------------------------------------------------------------------------------
@@ -626,7 +633,7 @@ def test_a_study_shapes_planned_torques():
 def test_controllers_act_beside_shaped_torques():
     model = model_from(tomllib.loads(SHAPED), "robot.toml")
     task = model.plan(mechanism=model.mechanism.rigid(), samples=101)
-    run = simulate_controlled(task, "++++", [ControllerDescription("pd", PIDDescription(5.0), 1e-3)])
+    run = simulate_controlled(task, "++++", [ControllerDescription("pd", pf.JointPID(5.0), 1e-3)])
     reached = run.solution.t
     assert run.torques.evaluate(reached) == pytest.approx(task.torques("++++").evaluate(reached), abs=1e-12)
     assert np.max(np.abs(run.controllers[0].given)) < 0.01 * np.max(np.abs(run.applied))

@@ -10,6 +10,7 @@ from numba import njit
 
 import paraflex as pf
 from paraflex import CompiledLaw, JointPID, RateFeedback, SampledController, Simulation
+from paraflex.control import LinearLaw
 from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.errors import ControllerError, InputError
 from paraflex.files import model_from
@@ -282,9 +283,14 @@ def test_an_event_ends_it_between_samples():
 def test_what_stays_outside():
     """Laws whose steps are another class's, several controllers, readings that are no products with states."""
 
+    class Doubled(LinearLaw):
+        def step(self, state, k, t, y):
+            torques, state = super().step(state, k, t, y)
+            return 2.0 * torques, state
+
     class Other(JointPID):
-        def step(self, k, t, y):
-            return 2.0 * super().step(k, t, y)
+        def start(self, plant):
+            return Doubled(**vars(super().start(plant)))
 
     hub = {"period": T, "inputs": ["hub"], "reference": {"hub": 0.1}}
     for given in (
@@ -295,10 +301,14 @@ def test_what_stays_outside():
         sim = Simulation(rotor(), duration=0.01, samples=11)
         sim.run(given, warning=False)
         assert sim._loop.inside is None
-    law = JointPID(1.0)
+    law = pf.lqg(pf.linearise(rotor()), T, measured=["hub"], deviations={"hub": 0.1}, effort=1.0, noise=1e-4).law()
+    sim.run(SampledController(law, reference={"hub": 0.1}), warning=False)
+    assert sim._loop.inside is not None
     law.step = lambda k, t, y: -y
-    sim.run(SampledController(law, **hub), warning=False)
+    sim.run(SampledController(law, reference={"hub": 0.1}), warning=False)
     assert sim._loop.inside is None
+    with pytest.raises(TypeError, match="give it to the object that `start` returns"):
+        type("Stepped", (JointPID,), {"step": lambda self, k, t, y: -y})
 
 
 @pytest.mark.parametrize(("make", "said"), [
@@ -396,7 +406,7 @@ def test_what_a_compiled_function_is_given():
 
 
 def test_functions_are_compiled_once():
-    first, second = CompiledLaw(pd), CompiledLaw(pd)
-    for law in (first, second):
-        Simulation(rotor(), duration=0.01, samples=11).run(SampledController(law, **BOTH), warning=False)
-    assert first.address == second.address
+    first, second = (SampledController(CompiledLaw(pd), **BOTH) for _ in range(2))
+    for controller in (first, second):
+        Simulation(rotor(), duration=0.01, samples=11).run(controller, warning=False)
+    assert first.started.address == second.started.address

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from paraflex import SampledController, Simulation
-from paraflex.control.laws.computed_torque import ComputedTorque
+from paraflex import JointPID, SampledController, Simulation
 from paraflex.control.laws.controllers import Plant
-from paraflex.control.laws.joints import JointPID, internal_torques, joint_gains, task_inertia, torque_projectors
-from paraflex.control.laws.rates import RateFeedback
+from paraflex.control.laws.joints import internal_torques, joint_gains, task_inertia, torque_projectors
+from paraflex.control.laws.kinds.computed_torque import ComputedTorque, RigidInverseState
+from paraflex.control.laws.kinds.rate_feedback import RateFeedback
 from paraflex.control.loop.references import planned_readings
 from paraflex.files import model_from
 from paraflex.mechanism import TorsionalSpring
@@ -72,8 +72,8 @@ def test_an_integral_does_not_wind_up():
     """Torques stay at a limit below the load for half a second; with it forgotten what remains is a short overshoot."""
 
     class WindsUp(JointPID):
-        def limited(self, torques):
-            pass
+        def start(self, plant):
+            return dataclasses.replace(super().start(plant), E=np.zeros((0, 0)))
 
     peaks = {}
     for kind in (JointPID, WindsUp):
@@ -101,12 +101,10 @@ def test_projected_torques_do_not_strain_links(task):
 
 
 def test_encoders_that_contradict_one_another_make_no_internal_torque(task):
-    law = JointPID(40.0, 1.2)
-    law.start(plant_of(task))
-    torques = law.step(0, 0.0, np.array([1e-3, 0.0, 0.0, 0.0]))
-    alone = JointPID(40.0, 1.2, project=False)
-    alone.start(plant_of(task))
-    assert np.allclose(alone.step(0, 0.0, np.array([1e-3, 0.0, 0.0, 0.0])), [-0.04, 0.0, 0.0, 0.0])
+    law = JointPID(40.0, 1.2).start(plant_of(task))
+    torques, _ = law.step(None, 0, 0.0, np.array([1e-3, 0.0, 0.0, 0.0]))
+    alone = JointPID(40.0, 1.2, project=False).start(plant_of(task))
+    assert np.allclose(alone.step(None, 0, 0.0, np.array([1e-3, 0.0, 0.0, 0.0]))[0], [-0.04, 0.0, 0.0, 0.0])
     row = np.tile(torques, (1, 1))
     assert np.max(np.abs(internal_torques(task, "++++", row))) < 1e-12
     assert np.linalg.norm(torques) > 1e-3
@@ -139,17 +137,14 @@ def rest_angles(task):
 def test_on_the_plan_it_is_the_feed_forward(task):
     """Readings of the plan, hardly any feedback."""
     plant = plant_of(task)
-    law = ComputedTorque(1e-4)
-    law.start(plant)
+    law = ComputedTorque(1e-4).start(plant)
     needed = task.torques("++++").evaluate(task.motion.t)
     readings = planned_readings(plant)
     for k in range(0, 100, 7):
         t = k * 1e-3
-        law._rates.start()
-        law._rates.step(
-            np.array([one(t) - 1e-3 * rate for one, rate in zip(readings, joint_rates(task, k), strict=True)])
-        )
-        given = law.step(k, t, np.array([one(t) for one in readings]))
+        before = np.array([one(t) - 1e-3 * rate for one, rate in zip(readings, joint_rates(task, k), strict=True)])
+        state = RigidInverseState(task.motion.q[k], law.rates.after(None, before))
+        given, _ = law.step(state, k, t, np.array([one(t) for one in readings]))
         assert given == pytest.approx(needed[k], abs=1e-5)
 
 
@@ -164,14 +159,12 @@ def task_rates(task, k):
 def test_an_error_makes_the_acceleration_that_returns_it(task):
     """tau - tau_plan = B^+ M (-Kp) dx, to first order in dx."""
     plant = plant_of(task)
-    law = ComputedTorque(10.0)
-    law.start(plant)
+    law = ComputedTorque(10.0).start(plant)
     readings = np.array([one(0.0) for one in planned_readings(plant)])
-    at_plan = law.step(0, 0.0, readings)
+    at_plan, _ = law.step(None, 0, 0.0, readings)
     dx = np.array([1e-6, -2e-6])
-    law.start(plant)
     B = task.effort.matrix[0]
-    away = law.step(0, 0.0, readings + B.T @ dx)
+    away, _ = law.step(None, 0, 0.0, readings + B.T @ dx)
     expected = np.linalg.pinv(B) @ task_inertia(task.effort)[0] @ (-((2.0 * np.pi * 10.0) ** 2) * dx)
     # Of the plan's own acceleration the change of inertia with the pose is a part as well.
     moved = np.linalg.norm(away - at_plan - expected)

@@ -20,8 +20,7 @@ from paraflex import plots
 from paraflex.cli.app import app
 from paraflex.control import (
     ControllerDescription,
-    PIDDescription,
-    StateSpaceDescription,
+    StateSpaceLaw,
     simulate_controlled,
     simulate_controlled_motion,
 )
@@ -128,10 +127,10 @@ def _runs(folder: Path) -> None:
     along = [pf.poses_along(task, 4, mode=mode) for mode in ("++", None)]
     save_results(pf.reduction_dataset(models, 16, along=along), folder / "reduction" / "reduced.nc")
     task = pf.plan(replace(model.mechanism, sensors=sensors), model.path("line"), duration=0.05, samples=26)
-    gentle = ControllerDescription("pd", PIDDescription(1.0), 1e-3, delay=1e-3, limits=1e-4)
+    gentle = ControllerDescription("pd", pf.JointPID(1.0), 1e-3, delay=1e-3, limits=1e-4)
     run = tracking_dataset([simulate_controlled(task, "++", [gentle])])
     # One of them fails where it has no motor.
-    one = ControllerDescription("one", PIDDescription(1.0), 1e-3, outputs=("left",))
+    one = ControllerDescription("one", pf.JointPID(1.0), 1e-3, outputs=("left",))
     laws = {"pd": [gentle], "one, with a long name": [one]}
     pf.compare_laws(model, ["++", "right"], laws, duration=0.05, samples=26).save(folder / "laws")
     # A second mode by name; the first is all that the motors can do.
@@ -150,7 +149,7 @@ def _runs(folder: Path) -> None:
         pf.AccelerationSensor("felt", end, "y", body), pf.JointForceSensor("pull", joint, 0.3),
     )  # fmt: skip
     driven = replace(pendulum, motors=(Motor("drive", joint),), sensors=sensors)
-    brake = ControllerDescription("brake", StateSpaceDescription([[-1e-3, -1e-3]]), 2e-3, inputs=("angle", "rate"))
+    brake = ControllerDescription("brake", StateSpaceLaw([[-1e-3, -1e-3]]), 2e-3, inputs=("angle", "rate"))
     run = simulate_controlled_motion(driven, 0.1, [brake], samples=21)
     save_results(motion_dataset(run), folder / "motion" / "results.nc")
 

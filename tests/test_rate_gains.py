@@ -11,7 +11,7 @@ from paraflex import SampledController, Simulation
 from paraflex.control.design.closed_loops import named_law
 from paraflex.control.design.rate_gains import _Search, _Tried
 from paraflex.control.laws.discrete import DiscreteModel, side_by_side
-from paraflex.control.laws.rates import RateFeedback
+from paraflex.control.laws.kinds.rate_feedback import RateFeedback
 
 # An oscillator x'' = -omega^2 x + u, sampled slowly, torques a sample late.
 F, T = 10.0, 5e-3
@@ -160,8 +160,11 @@ def test_laws_as_models_are_the_laws(arm):
         (rates, rates.sampled(1e-3), readings), (pid, pid.sampled(1e-3, arm), readings[:, :1])
     ):  # fmt: skip
         controller = SampledController(law, period=1e-3, inputs=sampled.inputs, reference={})
-        law.start(sim._plant(controller))
-        assert stepped(sampled, y) == pytest.approx(np.array([law.step(k, 0.0, one) for k, one in enumerate(y)]))
+        started, state, torques = law.start(sim._plant(controller)), None, []
+        for k, one in enumerate(y):
+            given, state = started.step(state, k, 0.0, one)
+            torques.append(given)
+        assert stepped(sampled, y) == pytest.approx(np.array(torques))
 
 
 def test_laws_side_by_side_add_up(arm):

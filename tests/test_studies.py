@@ -13,7 +13,7 @@ import xarray as xr
 import paraflex as pf
 from made_up import STUDY, made_up, write_study
 from paraflex.campaign import Progress, Result, Study, Workers
-from paraflex.control import ControllerDescription, PIDDescription
+from paraflex.control import ControllerDescription
 from paraflex.errors import InputError
 from paraflex.studies import (
     ComparisonOptions,
@@ -73,7 +73,7 @@ def studies(task, tmp_path_factory):
     differentiated = differentiated.replace("samples = 26", "samples = 5").replace("lump.end.mass", "lump.tool.mass")
     sensitivity = load_sensitivities(write_study(folder, differentiated, "sensitivity.toml"))
     read = {kind: load(write_study(folder, text, f"{kind}.toml")) for kind, (load, text) in OF_FILES.items()}
-    gentle = ControllerDescription("pd", PIDDescription(1.0), 1e-3)
+    gentle = ControllerDescription("pd", pf.JointPID(1.0), 1e-3)
     return read | {
         "tracking": TrackingStudy(task, ["++"], LOOSE),
         "verification": VerificationStudy(task, ["++"], ("rigid", "linear"), VerificationOptions(tolerance=1e-3)),

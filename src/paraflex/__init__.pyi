@@ -108,10 +108,11 @@ from .equilibria import statics as statics, Statics as Statics
 from .control.loop.simulation import Simulation as Simulation
 from .control.loop.chain import SampledController as SampledController
 from .control.laws.controllers import Controller as Controller, Plant as Plant
-from .control.laws.joints import JointPID as JointPID, joint_gains as joint_gains, internal_torques as internal_torques
-from .control.laws.computed_torque import ComputedTorque as ComputedTorque
-from .control.loop.inside import CompiledLaw as CompiledLaw
-from .control.laws.rates import RateFeedback as RateFeedback
+from .control.laws.kinds.joint_pid import JointPID as JointPID
+from .control.laws.joints import joint_gains as joint_gains, internal_torques as internal_torques
+from .control.laws.kinds.computed_torque import ComputedTorque as ComputedTorque
+from .control.laws.compiled import CompiledLaw as CompiledLaw
+from .control.laws.kinds.rate_feedback import RateFeedback as RateFeedback
 from .control.design.rate_gains import rate_feedback_gains as rate_feedback_gains, RateGains as RateGains
 from .control.shaping.shapers import Shaper as Shaper, shaper as shaper
 from .control.shaping.shaped import ShapedPath as ShapedPath, shape_torques as shape_torques

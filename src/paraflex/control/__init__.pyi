@@ -1,13 +1,9 @@
 from .laws.controllers import Controller as Controller, Plant as Plant
 from .laws.described import ControllerDescription as ControllerDescription
-from .laws.described_laws import (
-    ComputedTorqueDescription as ComputedTorqueDescription,
-    LQGDescription as LQGDescription,
-    PIDDescription as PIDDescription,
-    RateFeedbackDescription as RateFeedbackDescription,
-    StateSpaceDescription as StateSpaceDescription,
-)
-from .laws.designed import DesignedLQG as DesignedLQG
+from .laws.kinds.lqg import DesignedLQG as DesignedLQG
+from .laws.kinds.state_space import StateSpaceLaw as StateSpaceLaw
+from .laws.law import Law as Law, StartedLaw as StartedLaw, given as given
+from .laws.linear_law import LinearLaw as LinearLaw
 from .loop.chain import SampledController as SampledController
 from .loop.run_loop import ControllerRecord as ControllerRecord
 from .loop.runs import ControlledMotion as ControlledMotion, ControlledTracking as ControlledTracking

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from paraflex.control.laws.described import TABLE, ControllerDescription, check_controllers
-from paraflex.control.laws.described_laws import LAWS
+from paraflex.control.laws.kinds import LAWS
 from paraflex.errors import InputError, renamed, within
 from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.laws import components_table, read_components
 from paraflex.files.said import fields_said, unsayable
-from paraflex.files.schema import ControllerTable, ModelTable, TorqueTable
+from paraflex.files.schema import ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism
-from paraflex.mechanism.loads import InTime
 
 
 def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, ControllerDescription]:
@@ -33,23 +34,18 @@ def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, Contr
     return found
 
 
-def _read(
-    name: str, table: ControllerTable, parameters: Mapping[str, float], duration: float | None
-) -> ControllerDescription:
+def _read(name: str, table: Any, parameters: Mapping[str, float], duration: float | None) -> ControllerDescription:
     said = {key: value for key, value in table if value is not None}
     kind = LAWS[said.pop("type")]
     law = kind(**{each.name: said.pop(each.name) for each in fields(kind) if each.name in said})
     if isinstance(table.reference, Mapping):
-        said["reference"] = {
-            sensor: _reference(sensor, given, parameters, duration) for sensor, given in table.reference.items()
-        }
+        said["reference"] = found = {}
+        for sensor, given in table.reference.items():
+            # A reference is written like the torque of a motor.
+            torque = TorqueTable.model_construct(torque=given)
+            with renamed(f"reference.{sensor}"):
+                found[sensor] = read_components(torque, "torque", parameters, duration)[0]
     return ControllerDescription(name, law, **said)
-
-
-def _reference(sensor: str, given: Any, parameters: Mapping[str, float], duration: float | None) -> InTime:
-    """Build the reference of a sensor, which is written like the torque of a motor."""
-    with renamed(f"reference.{sensor}"):
-        return read_components(TorqueTable.model_construct(torque=given), "torque", parameters, duration)[0]
 
 
 def controller_table(one: ControllerDescription) -> dict[str, Any]:
@@ -58,15 +54,21 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
     Raises
     ------
     InputError
-        Reference that cannot be expressed in a file.
+        Law or reference that cannot be expressed in a file.
     """
-    said = {"type": one.law.kind} | fields_said(one.law) | fields_said(one, "name", "law")
+    law, place = one.law, f"{TABLE}.{one.name}"
+    if LAWS.get(law.kind) is not type(law):
+        raise unsayable(f"{place}.law", type(law).__name__, f"give a law of type {', '.join(LAWS)}")
+    for each in fields(law):
+        given = getattr(law, each.name)
+        if each.metadata.get("by") and isinstance(given, Sequence | np.ndarray):
+            raise unsayable(f"{place}.{each.name}", given, "give one number, or numbers by name")
+    said = {"type": law.kind} | fields_said(law) | fields_said(one, "name", "law")
     if isinstance(one.reference, Mapping):
         try:
-            said["reference"] = {
-                sensor: components_table((law,), "torque")["torque"] for sensor, law in one.reference.items()
-            }
+            said["reference"] = {sensor: components_table((each,), "torque")["torque"]
+                                 for sensor, each in one.reference.items()}  # fmt: skip
         except (InputError, KeyError):
-            remedy = "give numbers or expressions of the time"
-            raise unsayable(f"{TABLE}.{one.name}.reference", dict(one.reference), remedy) from None
+            raise unsayable(f"{place}.reference", dict(one.reference),
+                            "give numbers or expressions of the time") from None  # fmt: skip
     return said

@@ -28,6 +28,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from paraflex.control.laws.described import ControllerDescription, References
+from paraflex.control.laws.kinds import LAWS
 from paraflex.equilibria.given import FACTORS, STEPS
 from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
@@ -188,27 +190,32 @@ def _number_or_word(words: Sequence[str]) -> Any:
 
 
 def _written(hint: Any) -> Any:
-    if get_origin(hint) is Literal:
-        return hint
-    if get_origin(hint) in (Union, UnionType) and float in (kinds := get_args(hint)) and NoneType not in kinds:
-        words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
-        return _number_or_word(words)
+    origin, inner = get_origin(hint), get_args(hint)
+    if hint in _WRITTEN or origin is Literal:
+        return _WRITTEN.get(hint, hint)
     if isinstance(hint, type) and issubclass(hint, Enum):
         return Literal[tuple(member.value for member in hint)]
-    if get_origin(hint) is tuple and get_args(hint)[1:] == (...,):
-        return list[_written(get_args(hint)[0])]
-    if isinstance(hint, UnionType):
-        return reduce(or_, map(_written, get_args(hint)))
-    return _WRITTEN[hint]
+    if origin in (Union, UnionType):
+        words = [word for kind in inner if get_origin(kind) is Literal for word in get_args(kind)]
+        if float in inner and (words or str in inner):
+            return _number_or_word(words)
+        # Of numbers for all, in order, or by name, files have no list in order.
+        by_name = any(get_origin(kind) is Mapping for kind in inner)
+        return reduce(or_, (_written(kind) for kind in inner if not (by_name and get_origin(kind) is Sequence)))
+    if origin is Mapping:
+        return dict[Text, _written(inner[1])]
+    if origin is tuple and inner[1:] != (...,):
+        return tuple[*map(_written, inner)]
+    return list[_written(inner[0])]
 
 
-def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
+def _fields_of(member: type, *, needed: bool = True, without: Sequence[str] = ("name",)) -> dict[str, Any]:
     """Return the fields of a member's table from those of its class, with two points or joints in one field.
 
     If `needed` is False, all fields become optional.
     """
     hints, found = get_type_hints(member), {}
-    together = ["name"]
+    together = [*without]
     if hints.get("a") is PointRef:
         found["points"] = (TwoPoints, Field(description='["body.point", "body.point"]'))
         together += ["a", "b"]
@@ -218,8 +225,8 @@ def _fields_of(member: type, *, needed: bool = True) -> dict[str, Any]:
         together += joints
     for each in fields(member):
         if each.name not in together:
-            missing = ... if needed else None
-            default = missing if each.default is MISSING else getattr(each.default, "value", each.default)
+            default = each.default if each.default_factory is MISSING else each.default_factory()
+            default = (... if needed else None) if default is MISSING else getattr(default, "value", default)
             description = each.metadata.get("description", f"its {each.name}")
             if hints[each.name] in _IN_TIME:
                 found |= _in_time(hints[each.name], each.name, description)
@@ -234,15 +241,15 @@ def _choice(words: Sequence[str], known: Sequence[str]) -> Any:
     return Literal[tuple(words)], Field(description=f"{', '.join(quoted[:-1])} or {quoted[-1]}")
 
 
-def _member_table(members: Sequence[Any]) -> Any:
-    """Return the table of a member that belongs to one of several classes."""
+def _member_table(members: Sequence[Any], base: type[_Table] = _Table) -> Any:
+    """Return the table of a member that belongs to one of several classes, with the fields of a base table as well."""
     tables = []
     for one in members:
         said = _fields_of(one)
         if len(members) > 1:
             said = {"type": _choice([one.kind], [each.kind for each in members])} | said
         about = one.__doc__.partition("\n\n")[0]
-        tables.append(create_model(f"{one.__name__}Table", __base__=_Table, __doc__=about, **said))
+        tables.append(create_model(f"{one.__name__}Table", __base__=base, __doc__=about, **said))
     return tables[0] if len(tables) == 1 else Annotated[reduce(or_, tables), Field(discriminator="type")]
 
 
@@ -611,121 +618,16 @@ TorqueEntry = Annotated[
 ]
 
 
-# One number for all motors or sensors, or numbers by motor or sensor.
-NumbersOf = Number | dict[str, Number]
-Matrix = list[list[Number]]
-
-
-ReferenceEntry = Annotated[
+_REFERENCE: Any = Annotated[
     Annotated[Literal["plan", "open-loop"], Tag("word[reference]")]
     | Annotated[dict[str, FunctionOfTime], Tag("ReferenceTable")],
     Discriminator(lambda value: "ReferenceTable" if isinstance(value, dict) else "word[reference]"),
 ]
-
-
-class ControllerTable(_Table):
-    """A sampled controller: settings common to all control laws."""
-
-    period: Number = Field(description="the time between samples in s")
-    delay: Number = _optional("the time from a sample until its torques act in s", 0.0)
-    inputs: list[Text] = _optional(
-        'sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the '
-        "encoders of its motors",
-        [],
-    )
-    outputs: list[Text] = _optional("motors; by default all of a mode", [])
-    reference: ReferenceEntry | None = _optional(
-        'the reference subtracted from readings: "plan", the planned motion; "open-loop", the readings where '
-        "the planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the "
-        'unit of the sensor; by default "plan" with "pid", "open-loop" with "lqg", nothing with others'
-    )
-    limits: Number | Pair | dict[str, Number | Pair] | None = _optional(
-        "the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all "
-        "motors or by motor"
-    )
-    rates: NumbersOf | None = _optional("the largest change of torques in N m/s or N/s, of all motors or by motor")
-    quantise: NumbersOf | None = _optional("the resolution of readings, in the unit of the sensor, of all or by sensor")
-    filters: dict[str, Number | list[list[Number]]] = _optional(
-        "by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients "
-        "of numerator and denominator in descending powers of s",
-        {},
-    )
-
-
-class PIDTable(ControllerTable):
-    """A PID control law of the angles or displacements of motors."""
-
-    type: Literal["pid"]
-    stiffness: NumbersOf = Field(description="the proportional gain in N m/rad or N/m, of all motors or by motor")
-    damping: NumbersOf = _optional("the derivative gain in N m s/rad or N s/m, of all motors or by motor", 0.0)
-    integral: NumbersOf = _optional("the integral gain in N m/rad/s or N/m/s, of all motors or by motor", 0.0)
-    project: Yes = _optional("whether torques that only strain links are removed", True)
-    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
-
-
-class StateSpaceTable(ControllerTable):
-    """A discrete state-space model from readings to torques."""
-
-    type: Literal["state-space"]
-    D: Matrix = Field(description="rows of the matrix from readings to torques")
-    A: Matrix = _optional("rows of the matrix of states; none without states", [])
-    B: Matrix = _optional("rows of the matrix from readings to states", [])
-    C: Matrix = _optional("rows of the matrix from states to torques", [])
-
-
-class ComputedTorqueTable(ControllerTable):
-    """Computed-torque control of the rigid mechanism in task space, in place of planned torques."""
-
-    type: Literal["computed-torque"]
-    frequency: Number = Field(description="the natural frequency of the end-effector's error in Hz")
-    damping_ratio: Number = _optional("the damping ratio of the end-effector's error", 0.7)
-    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
-
-
-class RateFeedbackTable(ControllerTable):
-    """Feedback of the rates of readings, such as strains."""
-
-    type: Literal["rate-feedback"]
-    gains: dict[str, dict[str, Number]] = Field(
-        description="by motor and sensor the torque or force over the rate of the reading, in N m s or N s by the unit "
-        "of the sensor"
-    )
-    cutoff: Number | None = _optional("the cut-off frequency of the low-pass of rates in Hz")
-
-
-class LQGTable(ControllerTable):
-    """LQG control, designed at the start of a run for the linear model of the mechanism in its mode."""
-
-    type: Literal["lqg"]
-    deviations: dict[str, Number] = Field(
-        description="by sensor the largest deviation allowed, in the unit of the sensor"
-    )
-    effort: NumbersOf = Field(
-        description="the largest torque in N m or N, of all motors or by motor; those not named are not used"
-    )
-    noise: NumbersOf | None = _optional(
-        "the standard deviation of readings, in the unit of the sensor, of all or by sensor; by default of "
-        "rounding to quantise"
-    )
-    disturbance: NumbersOf | None = _optional(
-        "the standard deviation of random torques in N m or N, of all motors or by motor; by default a tenth of effort"
-    )
-    integrators: dict[str, Number] = _optional(
-        "by sensor the time constant in s with which its error under constant loads decays", {}
-    )
-    coloured: dict[str, tuple[Number, Number | list[list[Number]]]] = _optional(
-        'coloured disturbances, by motor or as "link.tip.x" by point and axis: the standard deviation in '
-        "N m or N and the cut-off frequency in Hz, or lists of the coefficients of numerator and denominator of a "
-        "filter in descending powers of s",
-        {},
-    )
-    states: Count | None = _optional("the number of states of the reduced model, by default 16, or all if fewer")
-    at: Number | None = _optional("the time of the planned motion for which it is designed in s, by default its start")
-
-
-AnyControllerTable = Annotated[
-    PIDTable | StateSpaceTable | ComputedTorqueTable | RateFeedbackTable | LQGTable, Field(discriminator="type")
-]
+_WRITTEN[References | None] = _REFERENCE | None
+_CONTROLLER = create_model(
+    "ControllerTable", __base__=_Table, **_fields_of(ControllerDescription, without=("name", "law"))
+)
+AnyControllerTable = _member_table(list(LAWS.values()), _CONTROLLER)
 
 
 class StudyDefaultsTable(_Table):
@@ -847,7 +749,7 @@ class ModelTable(_WithGroups):
     )
     mode: dict[str, list[Text]] = _optional("the motors of each actuation mode", {})
     path: dict[str, PathTable] = Field(default={})
-    controller: dict[str, AnyControllerTable] = Field(default={})
+    controller: dict[str, AnyControllerTable] = Field(default={})  # pyright: ignore[reportInvalidTypeForm]
     start: StartTable | None = None
     study: StudyDefaultsTable = StudyDefaultsTable()
     statics: StaticsTable = StaticsTable()

@@ -14,7 +14,7 @@ from paraflex.arrays import Array
 from paraflex.control.design.closed_loops import ClosedLoop, Complex, closed_loop, damped_frequency, named_law
 from paraflex.control.design.sampled import SampledPlant, as_sampled
 from paraflex.control.laws.discrete import side_by_side
-from paraflex.control.laws.rates import RateFeedback
+from paraflex.control.laws.kinds.rate_feedback import RateFeedback
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel, ReducedModel
 from paraflex.mechanism import Mechanism

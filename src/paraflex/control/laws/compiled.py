@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import numpy as np
 from numba import cfunc, njit, types
 from numba.core.errors import NumbaError
 from numba.extending import is_jitted
 from numba.np.numpy_support import carray
 
+from paraflex.arrays import Array
+from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.law import Law, StartedLaw
 from paraflex.errors import InputError
 
 MOST_STATES = 100_000
@@ -25,62 +30,105 @@ _STYLES = re.compile(r"\x1b\[[0-9;]*m")
 _KEPT = ("error_model", "fastmath", "locals")
 
 
-class CompiledFunction:
-    """Compiled function of (k, t, y, x, torques) that evaluates a control law: see `CompiledLaw`.
+@dataclass(frozen=True)
+class CompiledLaw(Law):
+    """User-defined law that runs in the compiled time loop: a law for `SampledController`.
+
+    Attributes
+    ----------
+    function : callable
+        Function of (k, t, y, x, torques), compiled by Numba or such that Numba can compile it. From the errors y
+        (inputs,) of sample k at time t [s] and the states x (states,), which start at zero, it writes the torques
+        (outputs,) [N m, N], which are zero before, and updates x. It is compiled with array bounds checked, and so are
+        the functions that it calls; an exception ends the run.
+    states : int
+        Number of states.
+
+    Raises
+    ------
+    InputError
+        An object that is not a function, or a number of states below zero or above `MOST_STATES`; when started, a
+        function that Numba cannot compile.
+    """
+
+    _own = ("function",)
+
+    function: Callable[..., None]
+    states: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (is_jitted(self.function) or isinstance(self.function, FunctionType)):
+            raise InputError("is not a function", field="function", value=self.function,
+                             remedy="give one of (k, t, y, x, torques)")  # fmt: skip
+        if not 0 <= self.states <= MOST_STATES:
+            raise InputError("is out of range", field="states", value=self.states,
+                             remedy=f"give the number of states, at most {MOST_STATES}")  # fmt: skip
+
+    def start(self, plant: Plant) -> CompiledInRun:
+        """Return the law in a run: see `Law.start`."""
+        return CompiledInRun(self.function, len(plant.inputs), self.states, len(plant.outputs))
+
+
+class CompiledInRun(StartedLaw):
+    """Compiled function in a run, whose state is the array x (states,).
 
     Parameters
     ----------
     function : callable
-        Function compiled by Numba, or one that Numba can compile.
+        Function of a `CompiledLaw`.
+    inputs, states, outputs : int
+        Numbers of readings, of states and of torques.
+
+    Raises
+    ------
+    InputError
+        A function that Numba cannot compile.
     """
 
-    def __init__(self, function: Callable[..., None]) -> None:
-        self._entries: dict[tuple[int, int, int], Any] = {}
-        self.function: Any = checked(function if is_jitted(function) else njit(function), {})
+    def __init__(self, function: Callable[..., None], inputs: int, states: int, outputs: int) -> None:
+        if function not in _COMPILED:
+            _COMPILED[function] = checked(function if is_jitted(function) else njit(function), {}), {}
+        self._function, entries = _COMPILED[function]
+        sizes = inputs, states, outputs
+        if sizes not in entries:
+            entries[sizes] = _entry(self._function, *sizes)
+        self._entry, self.states, self._outputs = entries[sizes], states, outputs
+        name = getattr(function, "__name__", "")
+        self.title: str = f"compiled {name if name.isidentifier() else 'function'}"
 
-    def entry(self, inputs: int, states: int, outputs: int) -> Any:
-        """Return the C function for given numbers of inputs, states and outputs.
+    @property
+    def address(self) -> int:
+        """Address of the machine code."""
+        return int(self._entry.address)
 
-        It takes numbers and pointers, and returns 0, or 1 where an exception was raised.
+    def step(self, state: Array | None, k: int, t: float, y: Array) -> tuple[Array, Array]:
+        """Return the torques of a sample, and the states after it: see `StartedLaw.step`."""
+        x, torques = np.zeros(self.states) if state is None else state.copy(), np.zeros(self._outputs)
+        self._function(k, t, y.copy(), x, torques)
+        return torques, x
 
-        Parameters
-        ----------
-        inputs, states, outputs : int
-            Numbers of readings, of states and of torques.
 
-        Raises
-        ------
-        InputError
-            A function that Numba cannot compile.
-        """
-        sizes, law = (inputs, states, outputs), self.function
-        if sizes in self._entries:
-            return self._entries[sizes]
+def _entry(law: Any, inputs: int, states: int, outputs: int) -> Any:
+    """Return the C function of numbers and pointers, which returns 0, or 1 where an exception was raised."""
 
-        def entry(k, t, y, x, torques):
-            try:
-                law(k, t, carray(y, inputs), carray(x, states), carray(torques, outputs))
-            except Exception:
-                return 1
-            return 0
-
+    def entry(k, t, y, x, torques):
         try:
-            self._entries[sizes] = cfunc(_SIGNATURE)(entry)
-        except NumbaError as error:
-            cause = " ".join(_STYLES.sub("", str(error)).split())[:200]
-            raise InputError(f"cannot be compiled: {cause}", field="law", value=law.__name__,
-                             remedy="write it as Numba takes functions, or give a law in Python") from None  # fmt: skip
-        return self._entries[sizes]
+            law(k, t, carray(y, inputs), carray(x, states), carray(torques, outputs))
+        except Exception:
+            return 1
+        return 0
+
+    try:
+        return cfunc(_SIGNATURE)(entry)
+    except NumbaError as error:
+        cause = " ".join(_STYLES.sub("", str(error)).split())[:200]
+        raise InputError(f"cannot be compiled: {cause}", field="law", value=law.__name__,
+                         remedy="write it as Numba takes functions, or give a law in Python") from None  # fmt: skip
 
 
-_FUNCTIONS: WeakKeyDictionary[Any, CompiledFunction] = WeakKeyDictionary()
-
-
-def compiled_function(function: Callable[..., None]) -> CompiledFunction:
-    """Return the compiled function of a control law, compiled once and cached."""
-    if function not in _FUNCTIONS:
-        _FUNCTIONS[function] = CompiledFunction(function)
-    return _FUNCTIONS[function]
+# Checked functions, and their C functions by the numbers of inputs, states and outputs: each is compiled once.
+_COMPILED: WeakKeyDictionary[Any, tuple[Any, dict[tuple[int, int, int], Any]]] = WeakKeyDictionary()
 
 
 def checked(function: Any, done: dict[int, Any]) -> Any:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from paraflex.arguments import CheckedFields, given_as
-from paraflex.control.laws.described_laws import LawNames, of_names
+from paraflex.control.laws.kinds import LAWS
+from paraflex.control.laws.law import Law, given, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
 from paraflex.mechanism import AngleLaw, Mechanism
@@ -24,6 +25,11 @@ if TYPE_CHECKING:
 TABLE, NONE = "controller", "none"
 
 
+References = str | Mapping[str, InTime]
+Limits = float | tuple[float, float] | Mapping[str, float | tuple[float, float]]
+_DEFAULTS = ", ".join(f'"{law.reference}" with "{kind}"' for kind, law in LAWS.items() if law.reference)
+
+
 @given_as("a description of a controller", "a ControllerDescription, as [controller.NAME] of a model file is read")
 @dataclass(frozen=True)
 class ControllerDescription(CheckedFields):
@@ -31,45 +37,50 @@ class ControllerDescription(CheckedFields):
 
     Entries given by motor or sensor are used for those motors and sensors that a mode has.
 
+    The fields are arguments of `SampledController`.
+
     Attributes
     ----------
-    name : str
-        Name of the controller.
-    law : DescribedLaw
-        Control law, one of the descriptions in `LAWS`.
-    period, delay : float
-        Sampling period, and delay from a sample until its torques act [s].
+    law : Law
+        Control law, of a kind in `kinds.LAWS` if a file is to hold it.
     inputs, outputs : tuple of str
         Sensors and motors. If empty, those of the law, else the encoders of its motors and all motors of a mode.
-    reference : "plan", "open-loop" or mapping of str to float or AngleLaw, optional
-        Reference that is subtracted from the readings; the law's own by default.
-    limits : float, pair or mapping of str to either, optional
-        Limits of the torques [N m, N]; none by default.
-    rates : float or mapping of str to float, optional
-        Limits of the rates of the torques [N m/s, N/s]; none by default.
-    quantise : float or mapping of str to float, optional
-        Resolution of the readings; not quantised by default.
-    filters : mapping of str to float, or to numerator and denominator
-        Filters of the readings by sensor: cut-off frequency [Hz], or a transfer function.
     """
 
-    _own = ("law", "reference", "limits", "filters")
+    _own = ("reference", "limits", "filters")
     name: str
-    law: Any
-    period: float
-    delay: float = 0.0
-    inputs: tuple[str, ...] = ()
-    outputs: tuple[str, ...] = ()
-    reference: str | Mapping[str, InTime] | None = None
-    limits: Any = None
-    rates: Numbers | None = None
-    quantise: Numbers | None = None
-    filters: Mapping[str, Any] = field(default_factory=dict)
+    law: Law
+    period: float = given("the time between samples in s")
+    delay: float = given("the time from a sample until its torques act in s", default=0.0)
+    inputs: tuple[str, ...] = given(
+        'sensors, also joints of motors (their encoders), "x" and "y" of the end-effector; by default the encoders of '
+        "its motors", default=(),
+    )  # fmt: skip
+    outputs: tuple[str, ...] = given("motors; by default all of a mode", default=())
+    reference: References | None = given(
+        'the reference subtracted from readings: "plan", the planned motion; "open-loop", the readings where the '
+        "planned torques alone drive the mechanism; or by sensor a number or an expression of the time t, in the unit "
+        f"of the sensor; by default {_DEFAULTS}, nothing with others", by="inputs", default=None,
+    )  # fmt: skip
+    limits: Limits | None = given(
+        "the largest magnitude of torques in N m or N, or a pair of the lowest and the highest; of all motors or by "
+        "motor", by="motors", default=None,
+    )  # fmt: skip
+    rates: Numbers | None = given(
+        "the largest change of torques in N m/s or N/s, of all motors or by motor", by="motors", default=None
+    )
+    quantise: Numbers | None = given(
+        "the resolution of readings, in the unit of the sensor, of all or by sensor", by="inputs", default=None
+    )
+    filters: Mapping[str, float | Sequence[Sequence[float]]] = given(
+        "by sensor the cut-off frequency of a low-pass of first order in Hz, or lists of the coefficients of numerator "
+        "and denominator in descending powers of s", by="inputs", default={},
+    )  # fmt: skip
 
     @property
     def whole_torque(self) -> bool:
         """Whether the law gives the whole torque, so that no planned torque acts as well."""
-        return bool(self.law.whole_torque)
+        return self.law.whole_torque
 
     def check(self, mechanism: Mechanism) -> None:
         """Check the names and numbers of the description.
@@ -86,21 +97,15 @@ class ControllerDescription(CheckedFields):
         """
         motors = [motor.name for motor in mechanism.motors]
         sensors = [sensor.name for sensor in measured_sensors(mechanism)]
-        encoders = encoders_of(mechanism, self.outputs or motors)
-        points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
         with within(f"{TABLE}.{self.name}"):
-            self._check(LawNames(self.inputs, self.outputs, sensors, motors, encoders, points))
-
-    def _check(self, names: LawNames) -> None:
-        for field_name, all_names, what in (("inputs", names.sensors, "sensor"), ("outputs", names.motors, "motor")):
-            check_distinct(getattr(self, field_name), all_names, field_name, what)
-        self.law.check(names)
-        law = self.law.made(self.outputs or names.motors, self.period)
-        sampled = self._sampled(law, {"reference": self.reference})
-        among = sampled.inputs or names.sensors
-        if isinstance(self.reference, Mapping):
-            all_known(self.reference, among, "reference", "sensor")
-        sampled.check(among, sampled.outputs or names.motors)
+            check_distinct(self.inputs, sensors, "inputs", "sensor")
+            check_distinct(self.outputs, motors, "outputs", "motor")
+            self.law.check(mechanism, self.inputs, self.outputs)
+            sampled = self._sampled(self.law.of_motors(self.outputs or motors))
+            among = sampled.inputs or sensors
+            if isinstance(self.reference, Mapping):
+                all_known(self.reference, among, "reference", "sensor")
+            sampled.check(among, sampled.outputs or motors)
 
     def made(self, mechanism: Mechanism, motors: Sequence[str]) -> SampledController:
         """Return the controller for a mode with some motors of a mechanism.
@@ -117,26 +122,20 @@ class ControllerDescription(CheckedFields):
         InputError
             See `check`.
         """
-        law = self.law.made(self.outputs or tuple(motors), self.period)
-        outputs = self.outputs or tuple(getattr(law, "outputs", ())) or tuple(motors)
-        inputs = self.inputs or tuple(getattr(law, "inputs", ())) or encoders_of(mechanism, outputs)
-        chosen = {
-            "reference": _functions(of_names(self.reference, inputs)),
-            "limits": of_names(self.limits, outputs),
-            "rates": of_names(self.rates, outputs),
-            "quantise": of_names(self.quantise, inputs),
-            "filters": of_names(self.filters, inputs),
-        }
-        return self._sampled(law, chosen)
+        law = self.law.of_motors(self.outputs or tuple(motors))
+        outputs = self.outputs or law.outputs or tuple(motors)
+        inputs = self.inputs or law.inputs or encoders_of(mechanism, outputs)
+        among = {"inputs": inputs, "motors": outputs}
+        chosen = {each.name: of_names(getattr(self, each.name), among[each.metadata["by"]])
+                  for each in fields(self) if each.metadata.get("by")}  # fmt: skip
+        return self._sampled(law, **chosen | {"reference": _functions(chosen["reference"])})
 
-    def _sampled(self, law: Any, chosen: Mapping[str, Any]) -> SampledController:
+    def _sampled(self, law: Law, **chosen: Any) -> SampledController:
         from paraflex.control.loop.chain import SampledController
 
-        more = {name: getattr(self, name) for name in ("limits", "rates", "quantise", "filters")} | dict(chosen)
-        return SampledController(
-            law, period=self.period, delay=self.delay, inputs=self.inputs or None, outputs=self.outputs or None,
-            name=self.name, **more,
-        )  # fmt: skip
+        names = ("name", "period", "delay", "reference", "limits", "rates", "quantise", "filters")
+        own = {name: getattr(self, name) for name in names} | chosen
+        return SampledController(law, inputs=self.inputs or None, outputs=self.outputs or None, **own)
 
 
 def check_controllers(controllers: Mapping[str, ControllerDescription], mechanism: Mechanism) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,16 +11,18 @@ import scipy
 
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.law import Law
 from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.control.loop.together import same_period
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 
 
-class DiscreteModel:
+@dataclass(frozen=True, eq=False)
+class DiscreteModel(Law, title="state space"):
     """Discrete linear control law x_k+1 = A x_k + B y_k with torques C x_k + D y_k.
 
-    Parameters
+    Attributes
     ----------
     A, B, C, D : arrays
         State, input, output and feed-through matrices.
@@ -29,28 +32,15 @@ class DiscreteModel:
         Names of sensors and motors; empty if the model has none.
     """
 
-    title = "state space"
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    period: float | None
+    inputs: tuple[str, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
+    outputs: tuple[str, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    def __init__(
-        self,
-        A: Array,
-        B: Array,
-        C: Array,
-        D: Array,
-        period: float | None,
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-    ) -> None:
-        self.A: Array = A
-        self.B: Array = B
-        self.C: Array = C
-        self.D: Array = D
-        self.period: float | None = period
-        self.inputs: tuple[str, ...] = tuple(inputs)
-        self.outputs: tuple[str, ...] = tuple(outputs)
-        self.x: Array = np.zeros(len(A))
-
-    def check(self, inputs: Sequence[str], outputs: Sequence[str], period: float) -> None:
+    def check_size(self, inputs: Sequence[str], outputs: Sequence[str], period: float) -> None:
         """Check that the size and the period of the model are as required.
 
         Raises
@@ -66,21 +56,10 @@ class DiscreteModel:
             raise InputError(f"the model is sampled every {self.period:g} s", field="period", value=period,
                              remedy="leave it out")  # fmt: skip
 
-    def start(self, plant: Plant) -> None:
-        """Set the states to zero."""
-        _check_count(plant.inputs, self.B.shape[1], "inputs")
-        _check_count(plant.outputs, self.C.shape[0], "outputs")
-        self.x = np.zeros(len(self.A))
-
-    def linear_law(self) -> LinearLaw:
-        """Return the law for the compiled time loop."""
+    def start(self, plant: Plant) -> LinearLaw:
+        """Return the law in a run: see `Law.start`."""
+        self.check_size(plant.inputs, plant.outputs, plant.period)
         return LinearLaw(self.A, self.B, self.C, self.D)
-
-    def step(self, k: int, t: float, y: Array) -> Array:
-        """Return the torques of this sample, and advance the states to the next one."""
-        torques = self.C @ self.x + self.D @ y
-        self.x = self.A @ self.x + self.B @ y
-        return torques
 
 
 def _check_count(names: Sequence[str], count: int, field: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -75,10 +76,6 @@ class KalmanFilter:
     def corrected(self, x: Array, y: Array) -> Array:
         """Return the estimate (n,) corrected by readings (outputs,)."""
         return x + self.gain @ (y - self.C @ x)
-
-    def carried_on(self, x: Array, u: Array) -> Array:
-        """Return the estimate (n,) propagated to the next sample under torques (inputs,)."""
-        return self.A @ x + self.B @ u
 
 
 def kalman_filter(A: Array, B: Array, C: Array, process: Array, noise: Array) -> KalmanFilter:
@@ -212,17 +209,15 @@ class Differentiator:
         return found[0].copy(), found[1].copy()
 
 
-def checked_cutoff(cutoff: float | None) -> float | None:
-    """Return the cut-off frequency of a low-pass filter of rates [Hz] after checking it; None if there is no filter.
+# Description, check and unit of the field `cutoff` of control laws.
+CUTOFF: Any = "the cut-off frequency of the low-pass of rates in Hz", positive, "Hz"
 
-    Raises
-    ------
-    InputError
-        A frequency that is not positive.
-    """
-    if cutoff is not None:
-        positive(cutoff, "cutoff", "Hz")
-    return cutoff
+
+class Rates(NamedTuple):
+    """Readings (readings,) of a sample, and their rates."""
+
+    readings: Array
+    rates: Array
 
 
 class BackwardDifference:
@@ -247,25 +242,27 @@ class BackwardDifference:
     @checked_arguments()
     def __init__(self, period: float, cutoff: float | None = None) -> None:
         positive(period, "period", "s")
+        if cutoff is not None:
+            positive(cutoff, "cutoff", "Hz")
         self.period: float = period
-        self.cutoff: float | None = checked_cutoff(cutoff)
+        self.cutoff: float | None = cutoff
         self.share: float = 1.0 if cutoff is None else 1.0 - float(np.exp(-2.0 * np.pi * cutoff * period))
-        self._before: Array | None = None
-        self._rate: Array = np.zeros(0)
+        self._last: Rates | None = None
 
     def start(self) -> None:
         """Reset the states: the next reading is taken to be at rest."""
-        self._before = None
+        self._last = None
 
     def step(self, y: Array | float) -> tuple[Array, Array]:
         """Return the readings (readings,) unchanged, and their rates."""
-        y = np.atleast_1d(np.asarray(y, dtype=float))
-        if self._before is None:
-            self._rate = np.zeros_like(y)
-        else:
-            self._rate = self._rate + self.share * ((y - self._before) / self.period - self._rate)
-        self._before = y
-        return y, self._rate.copy()
+        self._last = self.after(self._last, np.atleast_1d(np.asarray(y, dtype=float)))
+        return self._last.readings, self._last.rates.copy()
+
+    def after(self, last: Rates | None, y: Array) -> Rates:
+        """Return readings (readings,) and their rates from those of the last sample; None before the first one."""
+        if last is None:
+            return Rates(y, np.zeros_like(y))
+        return Rates(y, last.rates + self.share * ((y - last.readings) / self.period - last.rates))
 
     def linear_law(self, readings: int) -> LinearLaw:
         """Return the linear law from readings to rates; its states are the previous readings, then their rates."""

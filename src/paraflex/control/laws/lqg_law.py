@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from paraflex.arrays import Array
 from paraflex.control.design.sampled import SampledPlant
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import KalmanFilter
-from paraflex.control.laws.linear_law import LinearLaw
+from paraflex.control.laws.linear_law import LinearLaw, LinearState
 from paraflex.control.loop.together import SAME
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
@@ -138,25 +138,59 @@ class LQGDesign:
         """Return the control law in its initial state, for `SampledController`."""
         return LQGLaw(self)
 
+    def in_run(self, plant: Plant | None = None) -> LQGInRun:
+        """Return the control law with the states of `state_space`, for a run or, without a plant, for steps by hand.
+
+        The estimate is propagated with the limited torques, and the integrals stay constant while any torque is
+        limited. Where planned torques act as well, they hold the equilibrium in place of the law.
+
+        Raises
+        ------
+        InputError
+            Sensors, motors, a period or a delay other than those of the design.
+        """
+        for what in ("inputs", "outputs") if plant else ():
+            wanted, have = getattr(self, what), tuple(getattr(plant, what))
+            if have != wanted:
+                raise InputError("differ from those of the design in name or order", field=what, value=", ".join(have),
+                                 remedy=f"leave them out, or give {', '.join(wanted)}")  # fmt: skip
+        for what in ("period", "delay") if plant else ():
+            wanted, have = getattr(self, what), getattr(plant, what)
+            if abs(have - wanted) > SAME * self.period:
+                raise InputError(f"the design is for {wanted:g} s", field=what, value=have,
+                                 remedy=f"leave it out, or design for that {what}")  # fmt: skip
+        n, rows = len(self.filter.A), len(self.regulator.integrated)
+        return LQGInRun(
+            *self.state_space,
+            E=np.vstack([-self.filter.B, np.zeros((rows, len(self.outputs)))]),
+            first=np.vstack([self.start, np.zeros((rows, len(self.inputs)))]),
+            holding=0.0 * self.holding_torques if plant and plant.feed_forward else self.holding_torques,
+            waiting=(np.arange(n + rows) >= n).astype(float),
+            design=self,
+        )
+
+
+@dataclass(frozen=True)
+class LQGInRun(LinearLaw):
+    """Linear law of an `LQGDesign`."""
+
+    design: LQGDesign = field(kw_only=True)
+
+    @property
+    def title(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Short description of the law, with the number of states of the model."""
+        return f"LQG of {self.design.regulator.plant.own} states"
+
 
 class LQGLaw:
-    """Control law of an `LQGDesign`: torques from errors of readings, with the estimate as its state.
-
-    `limited` accounts for limits: the estimate is propagated with the limited torques, and the integrals stay constant
-    while any torque is limited.
+    """Control law of an `LQGDesign` with its state, for `SampledController` or to be stepped by hand.
 
     Attributes
     ----------
     design : LQGDesign
         Design of the law.
-    period, delay : float
-        Sampling period, and delay from a sample until its torques act [s].
-    inputs, outputs : tuple of str
-        Sensors and motors.
-    x : (n,) array
-        Estimate after the last reading; None before the first one.
-    integrals : (integrated,) array
-        Integrals of outputs.
+    period, delay, inputs, outputs, state_space
+        Those of the design.
     holding_torques : (motors,) array
         Holding torques of the design, part of its torques; zero where planned torques act as well [N m, N].
     """
@@ -167,67 +201,41 @@ class LQGLaw:
         self.delay: float = design.delay
         self.inputs: tuple[str, ...] = design.inputs
         self.outputs: tuple[str, ...] = design.outputs
-        self._reset(design.holding_torques)
-
-    def _reset(self, holding: Array) -> None:
-        self.holding_torques: Array = holding
-        self.x: Array | None = None
-        self.integrals: Array = np.zeros(len(self.design.regulator.integrated))
-        self._wanted: Array = np.zeros(len(self.outputs))
-        self._given: Array = self._wanted
-        self._read: Array = np.zeros(len(self.inputs))
+        self.state_space: StateSpace = design.state_space
+        self._law = design.in_run()
+        self._state: LinearState | None = None
 
     @property
-    def state_space(self) -> StateSpace:
-        """Controller without limits: see `LQGDesign.state_space`."""
-        return self.design.state_space
+    def holding_torques(self) -> Array:
+        """Holding torques that are part of those of the law."""
+        return self._law.holding
 
-    def start(self, plant: Plant) -> None:
-        """Reset the states for a new run.
+    @property
+    def x(self) -> Array | None:
+        """Estimate (n,) after the last reading; None before the first one."""
+        state = self._state
+        return None if state is None else self.design.filter.corrected(state.x[: len(self.design.start)], state.errors)
 
-        Raises
-        ------
-        InputError
-            Sensors, motors, a period or a delay other than those of the design.
-        """
-        pairs = (("inputs", self.inputs, plant.inputs), ("outputs", self.outputs, plant.outputs))
-        for field, wanted, have in pairs:
-            if tuple(have) != wanted:
-                raise InputError("differ from those of the design in name or order", field=field, value=", ".join(have),
-                                 remedy=f"leave them out, or give {', '.join(wanted)}")  # fmt: skip
-        for field, wanted, have in (("period", self.period, plant.period), ("delay", self.delay, plant.delay)):
-            if abs(have - wanted) > SAME * self.period:
-                raise InputError(f"the design is for {wanted:g} s", field=field, value=have,
-                                 remedy=f"leave it out, or design for that {field}")  # fmt: skip
-        self._reset(np.zeros_like(self.holding_torques) if plant.feed_forward else self.design.holding_torques)
+    @property
+    def integrals(self) -> Array:
+        """Integrals of outputs (integrated,)."""
+        return (
+            np.zeros(len(self.design.regulator.integrated))
+            if self._state is None
+            else self._state.x[len(self.design.start) :]
+        )
+
+    def start(self, plant: Plant) -> LQGInRun | None:
+        """Reset the state, and return the law in a run: see `LQGDesign.in_run`; None if a subclass may step itself."""
+        self._law, self._state = self.design.in_run(plant), None
+        return self._law if type(self) is LQGLaw else None
 
     def step(self, k: int, t: float, y: Array) -> Array:
         """Return torques (motors,) from errors y (measured,) of the readings at sample k."""
-        design = self.design
-        if self.x is None:
-            before = design.start @ y
-        else:
-            before = design.filter.carried_on(self.x, self._given - self.holding_torques)
-            if np.array_equal(self._given, self._wanted):
-                self.integrals = self.integrals + design._integrals @ self._read
-        self.x = design.filter.corrected(before, y)
-        self._read = np.array(y, dtype=float)
-        self._wanted = self.holding_torques - design.K @ np.concatenate([self.x, self.integrals])
-        self._given = self._wanted
-        return self._wanted.copy()
-
-    def linear_law(self) -> LinearLaw:
-        """Return the law for the compiled time loop, with the states of `LQGDesign.state_space`."""
-        design, states = self.design, self.state_space
-        n, more = len(design.filter.A), len(self.integrals)
-        return LinearLaw(
-            *states,
-            E=np.vstack([-design.filter.B, np.zeros((more, len(self.outputs)))]),
-            holding=self.holding_torques,
-            first=np.vstack([design.start, np.zeros((more, len(self.inputs)))]),
-            waiting=(np.arange(n + more) >= n).astype(float),
-        )
+        torques, self._state = self._law.step(self._state, k, t, np.array(y, dtype=float))
+        return torques.copy()
 
     def limited(self, torques: Array) -> None:
         """Record the torques (motors,) that act in place of those that the law returned."""
-        self._given = np.array(torques, dtype=float)
+        if self._state is not None:
+            self._state = self._law.limited(self._state, np.array(torques, dtype=float))

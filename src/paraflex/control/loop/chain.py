@@ -6,6 +6,7 @@ loop that runs the controller.
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -20,6 +21,7 @@ from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.discrete import DiscreteModel, discrete_model, is_model
 from paraflex.control.laws.estimators import rounded
+from paraflex.control.laws.law import Law, StartedLaw
 from paraflex.control.loop.amplifiers import largest_commands
 from paraflex.control.loop.filters import transfer_function
 from paraflex.control.loop.references import Reference, references
@@ -31,6 +33,8 @@ from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
 Limit = float | tuple[float, float]
+# Attributes of a `SampledController` that hold its state: a law may step itself.
+CHANGING = ("law", "started", "chain_state")
 
 
 class ChainSample(NamedTuple):
@@ -51,6 +55,27 @@ class ChainSample(NamedTuple):
     given: Array
 
 
+class ChainState(NamedTuple):
+    """State of a controller between samples. None of its values is changed in place.
+
+    Attributes
+    ----------
+    law : any
+        State of the law: see `StartedLaw.step`.
+    filtered : list of array or None
+        States of the filter of each reading; None without a filter and before the first sample.
+    given : (outputs,) array
+        Torques of the last sample.
+    last : ChainSample or None
+        Signals of the last sample; None before the first one.
+    """
+
+    law: Any
+    filtered: list[Array | None]
+    given: Array
+    last: ChainSample | None
+
+
 class SampledController:
     """Control law with the signal chain of a real controller: a `Controller`.
 
@@ -60,11 +85,12 @@ class SampledController:
     Parameters
     ----------
     law : object
-        Control law: a discrete model of python-control or SciPy from readings to torques, as state space or transfer
-        function; a function of (k, t, y), with y (inputs,) the readings of sample k at time t, that returns torques
-        (outputs,); or an object with such a method `step`. The object may have `start(plant)`, which is called first,
-        `limited(torques)`, which receives the torques after limits, any of the attributes below, `whole_torque` if no
-        planned torque may act as well, and `absolute` if it takes readings without a reference.
+        Control law: a `Law`, such as `JointPID`; a discrete model of python-control or SciPy from readings to torques,
+        as state space or transfer function; a function of (k, t, y), with y (inputs,) the readings of sample k at time
+        t, that returns torques (outputs,); or an object with such a method `step`. The object may have `start(plant)`,
+        which is called first, `limited(torques)`, which receives the torques after limits, any of the attributes
+        below, `whole_torque` if no planned torque may act as well, and `absolute` if it takes readings without a
+        reference. Its attributes are its state.
     period : float, optional
         Sampling period [s]; the law's own by default.
     delay : float
@@ -91,6 +117,13 @@ class SampledController:
         Largest rates of the torques [N m/s, N/s]; unlimited by default.
     name : str
         Name in results and errors.
+
+    Attributes
+    ----------
+    started : StartedLaw
+        Law in the present run, available once started.
+    chain_state : ChainState
+        State of the chain and of the law.
 
     Raises
     ------
@@ -132,9 +165,10 @@ class SampledController:
         self.filters: Mapping[str, Any] = filters or {}
         self.limits: Any = limits
         self.rates: Any = rates
-        self.last: ChainSample | None = None
+        # The attributes named in `CHANGING` are all that a run changes.
+        self.chain_state: ChainState = ChainState(None, [], np.zeros(0), None)
         if isinstance(self.law, DiscreteModel):
-            self.law.check(self.inputs, self.outputs, self.period)
+            self.law.check_size(self.inputs, self.outputs, self.period)
 
     def check(self, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[list[Any], ...]:
         """Return the components of the chain in the order of sensors and motors, None where there is none.
@@ -170,17 +204,18 @@ class SampledController:
         self.found_references: list[Reference | None] = references(self.reference, plant)
         resolution, filters, limits, rates = self.check(plant.inputs, plant.outputs)
         self.resolution: Array = np.array([one or 0.0 for one in resolution])
-        self._filters = [None if given is None else _SettledFilter(given, plant.period) for given in filters]
+        self.filter_models: list[StateSpace | None] = [
+            None if given is None else _filter_model(given, plant.period) for given in filters
+        ]
         most = largest_commands(plant.mechanism, plant.outputs)
         self._lowest = np.maximum([-np.inf if one is None else one[0] for one in limits], -most)
         self._highest = np.minimum([np.inf if one is None else one[1] for one in limits], most)
         self._most = np.array([np.inf if one is None else one * plant.period for one in rates])
-        if hasattr(self.law, "start"):
-            resolution = tuple(self.resolution.tolist())
-            self.law.start(replace(plant, resolution=resolution) if any(resolution) else plant)
+        resolution = tuple(self.resolution.tolist())
+        self.started: StartedLaw = _started(self.law, replace(plant, resolution=resolution if any(resolution) else ()))
         # Torques with which the law holds an equilibrium act from before the first sample.
-        self.holding_torques: Array = np.clip(getattr(self.law, "holding_torques", 0.0), self._lowest, self._highest)
-        self._given: Array = self.holding_torques
+        self.holding_torques: Array = np.clip(self.started.holding_torques, self._lowest, self._highest)
+        self.chain_state: ChainState = ChainState(None, [None] * len(filters), self.holding_torques, None)
 
     @property
     def whole_torque(self) -> bool:
@@ -190,42 +225,44 @@ class SampledController:
     @property
     def title(self) -> str:
         """Short description of the law."""
-        return str(getattr(self.law, "title", type(self.law).__name__))
+        started: StartedLaw | None = getattr(self, "started", None)
+        return str((started and started.title) or getattr(self.law, "title", "") or type(self.law).__name__)
+
+    @property
+    def last(self) -> ChainSample | None:
+        """Signals of the last sample; None before the first one."""
+        return self.chain_state.last
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest torques (outputs, 2), and largest rates (outputs,); available once started."""
         return np.stack([self._lowest, self._highest], axis=1), self._most / self.period
 
-    @property
-    def filter_models(self) -> list[StateSpace | None]:
-        """Filters of the readings as discrete models; available once started."""
-        return [None if each is None else each.model for each in self._filters]
-
     def step(self, k: int, t: float, y: Array) -> Any:
         """Evaluate the chain and the law at a sample: see `Controller.step`."""
-        y = rounded(np.array(y, dtype=float), self.resolution)
-        for i, filtered in enumerate(self._filters):
-            if filtered is not None:
-                y[i] = filtered(y[i])
+        y, filtered = rounded(np.array(y, dtype=float), self.resolution), list(self.chain_state.filtered)
+        for i, model in enumerate(self.filter_models):
+            if model is not None:
+                y[i], filtered[i] = _filtered(model, filtered[i], y[i])
         errors = y.copy()
         for i, reference in enumerate(self.found_references):
             if reference is not None:
                 errors[i] -= reference(t)
-        said = self.law.step(k, t, errors)
+        said, state = self.started.step(self.chain_state.law, k, t, errors)
+        self.chain_state = self.chain_state._replace(law=state, filtered=filtered)
         if said is None:
             return None  # As a float array it would be NaN.
         wanted = real_numbers(said)
         if wanted is None:
             return said  # The loop reports the error.
-        if wanted.shape != self._given.shape or not np.all(np.isfinite(wanted)):
+        before = self.chain_state.given
+        if wanted.shape != before.shape or not np.all(np.isfinite(wanted)):
             return wanted
         given = np.clip(wanted, self._lowest, self._highest)
-        given = np.clip(given, self._given - self._most, self._given + self._most)
-        self._given = given
-        if hasattr(self.law, "limited"):
-            self.law.limited(given)
-        self.last = ChainSample(y, wanted, given)
+        given = np.clip(given, before - self._most, before + self._most)
+        self.chain_state = ChainState(
+            self.started.limited(state, given), filtered, given, ChainSample(y, wanted, given)
+        )
         return given
 
 
@@ -236,6 +273,33 @@ class _Function:
         self.step = function
         name = getattr(function, "__name__", "")
         self.title: str = name if name.isidentifier() else "function"
+
+
+class _OwnSteps(StartedLaw):
+    """Adapter from a law that steps itself: its attributes are its state."""
+
+    def __init__(self, law: Any) -> None:
+        self._law = law
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _OwnSteps:
+        return _OwnSteps(copy.deepcopy(self._law, memo))
+
+    @property
+    def holding_torques(self) -> Any:
+        return getattr(self._law, "holding_torques", 0.0)
+
+    def step(self, state: Any, k: int, t: float, y: Array) -> tuple[Any, Any]:
+        return self._law.step(k, t, y), None
+
+    def limited(self, state: Any, torques: Array) -> Any:
+        if hasattr(self._law, "limited"):
+            self._law.limited(torques)
+
+
+def _started(law: Any, plant: Plant) -> StartedLaw:
+    """Return the law in a run: what its `start` returns, or the law itself with its own steps."""
+    started = law.start(plant) if hasattr(law, "start") else None
+    return started if isinstance(started, StartedLaw) and "step" not in vars(law) else _OwnSteps(law)
 
 
 def as_law(given: Any) -> Any:
@@ -249,7 +313,7 @@ def as_law(given: Any) -> Any:
     # Models of SciPy have a method "step" as well, their step response.
     if is_model(given):
         return discrete_model(given)
-    if callable(getattr(given, "step", None)) and not inspect.isclass(given):
+    if isinstance(given, Law) or (callable(getattr(given, "step", None)) and not inspect.isclass(given)):
         return given
     if callable(given) and not inspect.isclass(given):
         return _Function(given)
@@ -259,20 +323,17 @@ def as_law(given: Any) -> Any:
     )  # fmt: skip
 
 
-class _SettledFilter:
-    """Transfer function of a sampled signal, in steady state at its first value."""
+def _filter_model(given: tuple[Array, Array], period: float) -> StateSpace:
+    """Return a transfer function, sampled with a first-order hold, as a discrete model."""
+    *matrices, _ = scipy.signal.cont2discrete(scipy.signal.tf2ss(*given), period, method="foh")
+    return StateSpace(*matrices)
 
-    def __init__(self, given: tuple[Array, Array], period: float) -> None:
-        continuous = scipy.signal.tf2ss(*given)
-        *matrices, _ = scipy.signal.cont2discrete(continuous, period, method="foh")
-        self.model: StateSpace = StateSpace(*matrices)
-        self._x: Array | None = None
 
-    def __call__(self, value: float) -> float:
-        A, B, C, D = self.model
-        x = np.linalg.solve(np.eye(len(A)) - A, B * value) if self._x is None else self._x
-        self._x = np.asarray(A @ x + B * value, dtype=float)
-        return float((C @ x + D * value).item())
+def _filtered(model: StateSpace, x: Array | None, value: float) -> tuple[float, Array]:
+    """Return a filtered value and the states of the filter after it, which is in steady state at the first value."""
+    A, B, C, D = model
+    x = np.asarray(np.linalg.solve(np.eye(len(A)) - A, B * value) if x is None else x, dtype=float)
+    return float((C @ x + D * value).item()), np.asarray(A @ x + B * value, dtype=float)
 
 
 def _in_order(given: Any, names: Sequence[str], field: str, what: str, take: Callable[[Any, str], Any]) -> list[Any]:

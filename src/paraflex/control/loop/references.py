@@ -11,6 +11,7 @@ import numpy as np
 from paraflex.actuation import required_effort
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
+from paraflex.control.loop.together import OPEN_LOOP, PLAN
 from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion
@@ -21,9 +22,6 @@ from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
 Reference = Callable[[float], float]
-# Names of the references: the planned motion, and the readings where the planned torques alone drive the flexible
-# mechanism.
-PLAN, OPEN_LOOP = "plan", "open-loop"
 
 
 def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, plant: Plant) -> list[Reference | None]:

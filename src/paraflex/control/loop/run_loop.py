@@ -12,7 +12,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.discrete import DiscreteModel
-from paraflex.control.loop.chain import ChainSample, SampledController, as_law
+from paraflex.control.loop.chain import CHANGING, ChainSample, SampledController, as_law
 from paraflex.control.loop.inside import exception_of, linear_model, wrong_torques
 from paraflex.control.loop.together import (
     check_distinct,
@@ -261,7 +261,8 @@ class Loop:
             return
         k = int(law.counts[SAMPLED]) - 1
         assert isinstance(controller, SampledController)
-        controller.last = ChainSample(law.readings[k].copy(), law.wanted[k].copy(), law.given[k].copy())
+        last = ChainSample(law.readings[k].copy(), law.wanted[k].copy(), law.given[k].copy())
+        controller.chain_state = controller.chain_state._replace(last=last)
 
     def torques_acted(self, after: int) -> Iterator[tuple[float, Array]]:
         """Yield times and torques (motors,) of all motors that began to act in the compiled time loop.
@@ -318,7 +319,7 @@ class Loop:
 
     def saved(self) -> Any:
         """Return the states of all controllers and of the schedule."""
-        state = [vars(each) for each in self.controllers]
+        state = [_changing(each) for each in self.controllers]
         own = (self._next, self._due, self.acting, self.kept)
         # Plants, with tasks and mechanisms, are not copied.
         memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
@@ -332,11 +333,18 @@ class Loop:
         states, own = copy.deepcopy(outside, memo)
         self._next, self._due, self.acting, self.kept = own
         for controller, state in zip(self.controllers, states, strict=True):
-            vars(controller).clear()
+            for name in _changing(controller):
+                del vars(controller)[name]
             vars(controller).update(state)
         if self.inside is not None:
             for mine, array in zip(self.inside, inside, strict=True):
                 mine[...] = array
+
+
+def _changing(controller: Controller) -> dict[str, Any]:
+    """Return the attributes that are the state of a controller: all of a user's class."""
+    own = vars(controller)
+    return {name: own[name] for name in CHANGING} if type(controller) is SampledController else dict(own)
 
 
 def _raised(name: str, error: Exception) -> LawFailure:

@@ -234,6 +234,11 @@ class Simulation:
         """Whether the run has reached its end or was ended by an event."""
         return self._integration.status == "stopped" or self.time >= self.end
 
+    @property
+    def compiled(self) -> bool:
+        """Whether the present controllers act within the compiled time loop."""
+        return self._loop is not None and self._loop.inside is not None
+
     def save(self) -> Saved:
         """Return the complete state, controllers included: a run restored from it continues bit for bit."""
         loop = self._loop

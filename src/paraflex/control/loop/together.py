@@ -14,6 +14,9 @@ from paraflex.errors import InputError
 from paraflex.limits import SAMPLES
 from paraflex.mechanism.quantities import all_known, known, positive
 
+# Names of the references: the planned motion, and the readings where the planned torques alone drive the flexible
+# mechanism.
+PLAN, OPEN_LOOP = "plan", "open-loop"
 # One number for all names, or numbers by name.
 Numbers = float | Mapping[str, float]
 # Instants closer than this fraction of the shortest period are regarded as equal.
