@@ -66,7 +66,7 @@ class Figure:
 
     name: str
     shows: str
-    charts: Charts = tuple
+    charts: Charts = lambda _: ()
     module: str = ""
     heading: str = ""
     takes: Takes = "results"
