@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from paraflex.errors import InputError, OutputError
-from paraflex.formatting import text_symbol as symbol
+from paraflex.formatting import number as format_number, text_symbol as symbol
 from paraflex.plots.catalogue import CATALOGUE
 from paraflex.report import (
     Chart,
@@ -95,11 +95,11 @@ def test_charts_are_titled_by_what_they_plot():
     charts = {chart.identity: chart for panel in page.panels for chart in panel.charts}
     condition = charts["condition"]
     assert condition.title == "Condition number of the actuation matrix"
-    assert condition.y == "condition number"
+    assert (condition.y.name, condition.y.unit) == ("condition number", "1")
     first = tracked()["actuation_condition"].values[0]
     assert np.nanmax(condition.curves[0].y) == pytest.approx(np.nanmax(first))
     # Not deflections, which are from the chord: so are the table's and the tile's.
-    assert "deflection" not in charts["deflections"].title + charts["deflections"].y
+    assert "deflection" not in charts["deflections"].title + charts["deflections"].y.name
     assert "tangent at its first end" in charts["deflections"].note
     singular = next(one for one in CATALOGUE["tracking"] if one.name == "actuation_condition")
     assert singular.shows == "condition number of the actuation matrix along the path, all modes"
@@ -169,11 +169,11 @@ def test_curves_are_the_values_of_the_dataset(page):
     assert len(alone) == len(MODES) * data.sizes["motor"]
     # All modes beside each other share the rows of those alone.
     beside = [curve for curve in chart_of(page, "torques")["curves"] if curve["choice"] == 1]
-    assert [curve["name"] for curve in beside] == list(MODES)
+    assert [curve["name"] for curve in beside] == [f"mode {mode}" for mode in MODES]
     assert {curve["y"] for curve in beside} <= {curve["y"] for curve in alone}
     chart = chart_of(page, "errors")
     far = np.linalg.norm(data["end_effector"].values - data["end_effector_desired"].values, axis=-1)
-    assert chart["y"] == "distance [mm]"
+    assert chart["y"] == ["distance [mm]"]
     for curve in chart["curves"]:
         shown, whole = rows[curve["y"]], 1e3 * far[curve["run"]]
         # On the logarithmic axis without the rise from zero.
@@ -202,12 +202,12 @@ def test_the_table_has_the_numbers_of_the_dataset(tracking_html):
     for k in (0, 1):
         row = text[text.index(f" {MODES[k]} complete ") :]
         cells = row.split()[2:]
-        assert cells[0] == number(float(data["tracking_rms"][k]), 1e3)
+        assert cells[0] == format_number(float(data["tracking_rms"][k]), factor=1e6)
         gaps = np.linalg.norm(data["end_effector"][k] - data["end_effector_desired"][k], axis=-1)
-        assert cells[1] == number(gaps.max(), 1e3)
-        assert cells[2] == number(float(data["peak_torque"][k, 0]))
-        assert cells[3] == number(float(data["rms_torque"][k, 0]))
-    assert count(int(data["newton_iterations"][0])) in tracking_html
+        assert cells[1] == format_number(float(gaps.max()), factor=1e6)
+        assert cells[2] == format_number(float(data["peak_torque"][k, 0]))
+        assert cells[3] == format_number(float(data["rms_torque"][k, 0]))
+    assert f"<td>{int(data['newton_iterations'][0])}</td>" in tracking_html
 
 
 def test_modes_that_failed_say_why(tracking_html):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -13,7 +13,7 @@ import xarray as xr
 
 from paraflex.errors import InputError
 from paraflex.figures.catalogue import figure
-from paraflex.figures.charts import DASHED, DOTTED, Array, Axis, Chart, Curve, Look, look
+from paraflex.figures.charts import DASHED, DOTTED, Axis, Chart, Curve, Look, look
 from paraflex.figures.run_motion import actual_name, effort_axis, start_mark
 from paraflex.figures.runs import after_motion, compared, followed, ranges, round_magnification, stopped_runs
 from paraflex.figures.selection import moving_directions, names_of, of_point, samples
@@ -80,7 +80,7 @@ def end_effector_path(
                 x, y = (desired[r] + times * away).T
                 curves.append(Curve(f"deviation × {number(times)}", y, x, Look(1), run=r, shown=(r,)))
         else:
-            curves.append(start_mark(*actual.T, r))
+            curves.append(start_mark(actual[:, 0], actual[:, 1], r))
     if desired is not None:
         # Designs may have paths of their own.
         common = bool(np.all(desired == desired[:1]))
@@ -182,8 +182,8 @@ def end_effector_motion(data: xr.Dataset, point: str | None = None) -> Iterator[
         Point "body.point" in place of the end-effector; it has no desired motion.
     """
     data = of_point(data, point)
-    for identity, _, _, _ in _MOTION:
-        yield _of_directions(data, identity, None, point)
+    for name, *_ in _MOTION:
+        yield _of_directions(data, [name], point)
 
 
 @figure("phase diagrams of the end-effector (Fig. 17)", takes="mode", written_as="phase_diagrams", points="point",
@@ -197,42 +197,42 @@ def phase_diagrams(data: xr.Dataset, point: str | None = None) -> Iterator[Chart
         Point "body.point" in place of the end-effector; it has no desired motion.
     """
     data = of_point(data, point)
-    for (across, _, _, _), (up, _, _, _) in pairwise(_MOTION):
-        yield _of_directions(data, up, across, point)
+    for (across, *_), (up, *_) in pairwise(_MOTION):
+        yield _of_directions(data, [across, up], point)
 
 
-def _of_directions(data: xr.Dataset, up: str, across: str | None, point: str | None) -> Chart:
-    """Return the chart of a quantity of the end-effector over another, or over time, in one direction at a time."""
+def _of_directions(data: xr.Dataset, names: Sequence[str], point: str | None) -> Chart:
+    """Return the chart of a variable of the end-effector over time, or of the second of two over the first.
+
+    It shows one direction at a time.
+    """
     axes = {name: (word, unit, dots) for name, word, unit, dots in _MOTION}
-    directions, curves, stopped = moving_directions(data), [], stopped_runs(data)
-
-    def values(name: str | None, direction: str, suffix: str = "") -> Array | None:
-        """Return values (runs, samples) in a direction; None for the time, or if there are none."""
-        return data[name + suffix].sel(axis=direction).values if name and name + suffix in data else None
-
-    def extent(name: str) -> float:
-        shown = data[f"{name}_desired" if f"{name}_desired" in data else name].values
-        return peak(ranges(shown, axis=1)) if across is None else peak(shown)
-
+    actual = [data[name].values for name in names]
+    desired = [data[f"{name}_desired"].values[0] for name in names if f"{name}_desired" in data]
+    directions, curves = moving_directions(data), []
     for k, direction in enumerate(directions):
-        y, x = values(up, direction), values(across, direction)
-        way, pace = values(across, direction, "_desired"), values(up, direction, "_desired")
-        for r, name in enumerate(actual_name(data, r, point) for r in range(len(stopped))):
-            own = None if x is None else x[r]
-            curves.append(Curve(name, y[r], own, look(0), run=r, shown=(r,), choice=k, stopped=stopped[r]))
-        if pace is not None:
-            curves.append(Curve("desired", pace[0], None if way is None else way[0], Look(dash=DOTTED), choice=k,
-                                desired=True))  # fmt: skip
-        if x is not None:
-            first = (x, y) if way is None else (way, pace)
-            curves += [start_mark(*(each[r] for each in first), r, k) for r in range(len(stopped))]
-    word, unit, dots = axes[up]
+        a = names_of(data, "axis").index(direction)
+        for r, stopped in enumerate(stopped_runs(data)):
+            *x, y = (each[r, :, a] for each in actual)
+            curves.append(Curve(actual_name(data, r, point), y, *x, look=look(0), run=r, shown=(r,), choice=k,
+                                stopped=stopped))  # fmt: skip
+            if x:
+                curves.append(
+                    start_mark(*(each[:1, a] for each in desired or [each[r] for each in actual]), run=r, choice=k)
+                )
+        if desired:
+            *x, y = (each[:, a] for each in desired)
+            curves.append(Curve("desired", y, *x, look=Look(dash=DOTTED), choice=k, desired=True))
+    *extents, extent = (peak(each) if len(names) > 1 else peak(ranges(each, axis=-2)) for each in desired or actual)
+    word, unit, dots = axes[names[-1]]
     chart = Chart(
-        f"{up}-{across or 'time'}", word.capitalize(),
-        [Axis(word, unit, f"{direction}{dots}", extent=extent(up)) for direction in directions], curves,
-        choices=directions, choosing="direction", spans=after_motion(data),
+        "-".join(names), word.capitalize(),
+        [Axis(word, unit, f"{direction}{dots}", extent=extent) for direction in directions], curves,
+        choices=directions, choosing="direction",
     )  # fmt: skip
-    return chart if across is None else replace(chart, x=Axis(*axes[across][:2], extent=extent(across)), spans=())
+    if extents:
+        return replace(chart, x=Axis(*axes[names[0]][:2], extent=extents[0]))
+    return replace(chart, spans=after_motion(data))
 
 
 def errors(data: xr.Dataset) -> xr.DataArray:

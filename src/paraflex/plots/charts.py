@@ -221,7 +221,8 @@ def _title_of_run(chart: Chart, k: int, name: str, several: bool) -> str:
 def _member(chart: Chart, run: int | None, k: int) -> _Cell:
     """Return the panel of the k-th member of a chart."""
     if not chart.choices:
-        return _Cell(chart, run, None, chart.title)
+        names = {curve.name for curve in chart.curves if not curve.desired}
+        return _Cell(chart, run, None, f"{names.pop()}: {chart.axis(None).name}" if len(names) == 1 else chart.title)
     choice = k + chart.overview
     title, name = chart.choices[choice], chart.axis(choice).name
     return _Cell(chart, run, choice, "" if title == name else f"{title}: {name}" if name else title)
