@@ -130,7 +130,7 @@ def print_figure(entry: CatalogueFigure, charts: Sequence[Chart], time: Any = No
 def _columns(entry: CatalogueFigure, count: int, charts: Sequence[Chart]) -> int:
     if is_narrow():
         return 1
-    return entry.columns or (min(count, 3) if not charts[0].over_time else 1)
+    return min(count, entry.columns or (3 if not charts[0].over_time else 1))
 
 
 def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Sequence[str]) -> list[list[_Cell]]:
