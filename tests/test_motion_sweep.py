@@ -89,7 +89,7 @@ def test_the_report_shows_drives_joints_and_stresses_of_the_best(swept):
     page = (swept / "report.html").read_text(encoding="utf-8")
     for text in (
         "largest torque of drive",
-        "Efforts of prescribed motions",
+        "Torques of prescribed motions",
         "Stresses of beams",
         "Sliding speeds of joints",
     ):

@@ -14,6 +14,7 @@ from paraflex.designs.measure import measure
 from paraflex.dynamics import build_system, consistent_state, momentum, static_equilibrium
 from paraflex.dynamics.state import State
 from paraflex.errors import InputError
+from paraflex.formatting import number
 from paraflex.mechanism import (
     Assembly,
     ConstantSpeed,
@@ -32,6 +33,7 @@ from paraflex.results import load_results, motion_dataset, motion_summary, save_
 from paraflex.results.export import result_tables
 from paraflex.results.loads import effort_lines, joint_line, load_figures, stress_line
 from paraflex.tracking import plan_tracking
+from paraflex.units import DisplayUnit
 from short_studies import check_derivatives, stress_study
 
 OPTIONS = pf.IntegrationOptions(tolerance=1e-7)
@@ -196,7 +198,7 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
         assert abs(then) == drive[f"{key}_max"] == abs(data[f"drive_{key}"]).max().item()
     name, one = max(loads["joints"].items(), key=lambda each: each[1]["force_max"])
     assert np.linalg.norm(data["joint_force"].sel(joint=name, time=one["force_time"])) == one["force_max"]
-    assert joint_line({"": loads}).endswith(f"N in {name} at t = {one['force_time']:.4g} s")
+    assert joint_line({"": loads}).endswith(f"N in {name} at t = {number(one['force_time'])} s")
     assert {one["unit"] for name, one in loads["joints"].items() if name != slider_joint(data)} == {"rad"}
     assert loads["joints"][slider_joint(data)]["unit"] == "m"
     # Below one, which is said three times.
@@ -214,8 +216,10 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
     assert "rad, m" not in tables["Joints and ground"]
     tiles = [name for name, _, _ in page.figures]
     assert tiles[:3] == ["largest stress", "largest drive torque", "largest joint force"]
-    identities = {chart.identity: chart.y for panel in page.panels for chart in panel.charts}
-    assert (identities["joint-rate"], identities["joint-speed"]) == ("angular velocity [rad/s]", "speed [m/s]")
+    shown = {chart.identity: chart for panel in page.panels for chart in panel.charts}
+    units = {name: shown[f"joint-{name}"].axis(None).unit for name in ("angle", "rate", "travel", "speed")}
+    assert units == {"angle": "rad", "rate": "rad/s", "travel": "m", "speed": "m/s"}
+    assert shown["joint-rate"].axis(None).label(DisplayUnit("rad/s", 1.0)) == "angular velocity φ̇ [rad/s]"
     tables = result_tables(data, shapes=True)
     assert "joint_speed_" + slider_joint(data) in tables["time_series"]
     assert len(tables["sections"]) == data.sizes["time"] * data.sizes["section"]

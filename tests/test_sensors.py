@@ -36,6 +36,7 @@ from paraflex.motion import simulate_motion
 from paraflex.report.motion import motion_page
 from paraflex.results import motion_summary
 from paraflex.results.export import result_tables
+from paraflex.units import DisplayUnit
 
 EVERYTHING = tomllib.loads("""
 name = "everything"
@@ -541,10 +542,10 @@ def test_a_motion_holds_its_readings(tmp_path):
     (panel,) = [panel for panel in motion_page(read).panels if panel.title == "Sensors"]
     assert len(panel.charts) == len(set(mechanism.sensor_units()))
     strain = next(chart for chart in panel.charts if chart.title == "Sensors: strain")
-    assert strain.y == "strain [µm/m]"
+    assert (strain.y.name, strain.y.shown) == ("strain", DisplayUnit("µm/m", 1e6))
     panels = [panel for panel in pf.plots.sensors(read).axes if panel.get_visible()]
     assert len(panels) == len(set(mechanism.sensor_units()))
-    strain = next(panel for panel in panels if panel.get_ylabel() == "[µm/m]")
+    strain = next(panel for panel in panels if panel.get_ylabel() == "strain [µm/m]")
     np.testing.assert_allclose(strain.get_lines()[0].get_ydata(), 1e6 * readings.sel(sensor="strain"))
 
 

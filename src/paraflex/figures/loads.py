@@ -131,10 +131,12 @@ def joint_motions(data: xr.Dataset) -> Iterator[Chart]:
 def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of torque or force, speed and power of motors and prescribed motions over time."""
     torque = "torque" if "torque" in data else "applied_torque"
-    for quantity, names in (
-        ("effort", {"motor": torque, "drive": "drive_torque"}),
-        ("speed", {"motor": "motor_speed", "drive": "drive_speed"}),
-        ("power", {"motor": "motor_power", "drive": "drive_power"}),
+    if not {"motor_power", "drive_power"} & set(data):
+        return  # results of an earlier version
+    for quantity, usual, names in (
+        ("effort", "N m", {"motor": torque, "drive": "drive_torque"}),
+        ("speed", "rad/s", {"motor": "motor_speed", "drive": "drive_speed"}),
+        ("power", "W", {"motor": "motor_power", "drive": "drive_power"}),
     ):
         found = {dim: data[name] for dim, name in names.items() if name in data and data.sizes[dim]}
         if not found:
@@ -143,7 +145,7 @@ def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
         values = [
             xr.broadcast(one, data["time"])[0].transpose("mode", "time", dim).values for dim, one in found.items()
         ]
-        units = dict.fromkeys(unit for one in found.values() for unit in str(one.attrs["units"]).split(", "))
+        units = dict.fromkeys(unit for one in found.values() for unit in str(one.attrs.get("units", usual)).split(", "))
         whose = " and ".join({"motor": "motors", "drive": "prescribed motions"}[dim] for dim in found)
         word = {"N m": "torque", "N": "force", "N m, N": "torque, force"}.get(unit := _joined(units), quantity)
         title = {"torque, force": "Efforts", "power": "Powers"}.get(word, f"{word.capitalize()}s")

@@ -28,7 +28,7 @@ _STRAIN = DisplayUnit("µm/m", 1e6)
 
 @figure(
     "reading of every sensor, a panel for each unit", heading="Sensors", takes="mode", variables=(READING,),
-    height=40.0,
+    columns=2, height=40.0,
     missing=("no readings of sensors in these results", "add [sensor.NAME] tables to the model, and run it again"),
 )  # fmt: skip
 def sensors(data: xr.Dataset) -> Iterator[Chart]:

@@ -34,7 +34,7 @@ _SHOWN_VARIABLES = (
     "end_effector", "end_effector_desired", "torque", "tip_transverse", "strain_energy", "shape", "shape_base",
     "joint_position", "joint_base", "joint_direction", "joint_direction_base", "spring_position", "point_station",
     "spring_station", "joint_rail", "gear_radius", "load_station", "load_force", "load_torque", "stress",
-    "joint_coordinate", "joint_speed", "drive_torque", "drive_power",
+    "joint_coordinate", "joint_speed", "drive_torque", "drive_power", "angle",
 )  # fmt: skip
 # Charts of the runs in motion, along a path and without one.
 _ALONG_PATH = ("tracking_distance", "end_effector_path", "motor_torques", "link_deflections")
