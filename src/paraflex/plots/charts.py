@@ -170,7 +170,8 @@ def _draw(panel: Axes, cell: _Cell, time: Any) -> None:
         panel.set_xlim(time[0], time[-1])
     values = joined(units.of(cell.choice).factor * np.asarray(curve.y, dtype=float) for curve in shown)
     _set_scale(panel, "y", axis, values, units.of(cell.choice))
-    _set_scale(panel, "x", chart.x, joined(curve.x for curve in shown if curve.x is not None), units.x)
+    xs = joined(units.x.factor * np.asarray(curve.x, dtype=float) for curve in shown if curve.x is not None)
+    _set_scale(panel, "x", chart.x, xs, units.x)
     for span in chart.spans:
         label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
         low, high = units.x.factor * span.low, units.x.factor * span.high
@@ -189,9 +190,8 @@ def _largest(curves: Sequence[Curve]) -> tuple[list[Curve], str]:
     if len(peaks) <= MOST_LINES:
         return list(curves), ""
     left_out = sorted(peaks, key=lambda name: -peaks[name])[MOST_LINES:]
-    return [
-        curve for curve in curves if curve.desired or curve.name not in left_out
-    ], f"{MOST_LINES} of {len(peaks)}, the largest"
+    shown = [curve for curve in curves if curve.desired or curve.name not in left_out]
+    return shown, f"{MOST_LINES} of {len(peaks)}, the largest"
 
 
 def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit: DisplayUnit, *, single: bool) -> None:
@@ -248,7 +248,7 @@ def _symmetrical(panel: Axes, direction: str, axis: Axis, unit: DisplayUnit) -> 
     """Make an axis linear below a magnitude and logarithmic beyond it."""
     own, set_scale = (panel.yaxis, panel.set_yscale) if direction == "y" else (panel.xaxis, panel.set_xscale)
     set_scale("symlog", linthresh=axis.linear_below * unit.factor, linscale=0.5)
-    own.set_major_locator(FixedLocator(unit.factor * symmetrical_numbers(axis)))
+    own.set_major_locator(FixedLocator((unit.factor * symmetrical_numbers(axis)).tolist()))
     own.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
 
 
