@@ -335,7 +335,7 @@ def _symmetrical(panel: Axes, direction: str, axis: Axis, unit: DisplayUnit) -> 
     """Make an axis linear below a magnitude and logarithmic beyond it."""
     own, set_scale = (panel.yaxis, panel.set_yscale) if direction == "y" else (panel.xaxis, panel.set_xscale)
     set_scale("symlog", linthresh=axis.linear_below * unit.factor, linscale=0.5)
-    own.set_major_locator(FixedLocator(unit.factor * symmetrical_numbers(axis)))
+    own.set_major_locator(FixedLocator((unit.factor * symmetrical_numbers(axis)).tolist()))
     own.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
 
 
