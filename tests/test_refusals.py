@@ -17,8 +17,8 @@ from paraflex.integrators.run import make_problem
 from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
 from paraflex.motion import simulate_motion
-from paraflex.plots.designs import read_designs
 from paraflex.plots import mode_conditions
+from paraflex.plots.designs import read_designs
 from paraflex.plots.film import FilmOptions, plan_film
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.scene import check_shapes, scene, select

@@ -147,7 +147,17 @@ def print_figure(
         for panel in axes.flat:
             panel.set_xlabel("")
         label_outer_time(axes)
+    if entry.panels != "charts":
+        _label_rows(axes)
     return lay_out(figure, axes, panel_height=max(map(_list_height, charts)) or entry.height)
+
+
+def _label_rows(axes: Any) -> None:
+    """Remove the label of the vertical axis from panels beside one with the same label."""
+    for row in axes:
+        for panel in row[1:]:
+            if panel.get_ylabel() == row[0].get_ylabel():
+                panel.set_ylabel("")
 
 
 def _list_height(chart: Chart) -> float:
@@ -251,7 +261,7 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         style = _DASHES[curve.look.dash] if curve.line else ""
         panel.plot(x, y, linestyle=style, marker=_MARKS[curve.mark], markersize=4.0, color=colour, label=label,
                    markerfacecolor="white" if curve.mark == "ring" else colour,
-                   clip_on=curve.mark != "cross")  # fmt: skip
+                   clip_on=curve.mark != "cross" or not y.size)  # fmt: skip
         return
     if curve.desired and (single or curve.look.colour is None):
         panel.plot(x, y, label=label, **_DESIRED)
