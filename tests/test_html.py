@@ -227,8 +227,10 @@ def test_a_study_with_a_mode_that_cannot(task) -> None:
 def test_models_compared(task) -> None:
     found = verify(task, ["++"], models=["rigid", "linear"])
     shown = read(found)
-    assert [cells[1] for cells in shown.rows[1:]] == ["rigid", "linear"]
-    assert [cells[2] for cells in shown.rows[1:]] == ["complete", "complete"]
+    heads, *rows = shown.rows
+    assert [cells[0] for cells in rows] == ["rigid", "linear geometry"]
+    # There is a status where a model did not run to its end.
+    assert "status" not in heads
 
 
 def test_a_sweep_and_a_search(tmp_path: Path) -> None:
@@ -273,7 +275,11 @@ def test_sensitivities_and_methods() -> None:
     assert "x<y" in read(found).text
     run = Measurement("esdirk5", tolerance=1e-4, wall_time=0.5, error=1e-5, steps=40)
     compared = MethodComparison("mode ++", "arm", 1.0, 11, 6, 4, Reference("a", 1e-9, "b", 1e-9, 1e-10, 1.0), (run,))
-    assert row(read(compared), "ESDIRK 5(4)")[1:] == ["1e-04", "", "complete", "1e-05", "0.5", "40"]
+    rows = read(compared).rows
+    assert ["method", "tolerance [mm]", "error [µm]", "wall time [s]"] in rows
+    assert [cells for cells in rows if cells[0] == "esdirk5"][:2] == [
+        ["esdirk5", "0.1", "10", "0.5"], ["esdirk5", "0.1", "40"],
+    ]  # fmt: skip
 
 
 def test_values_as_text() -> None:

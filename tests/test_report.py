@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from paraflex import formatting
 from paraflex.errors import InputError, OutputError
-from paraflex.formatting import number as format_number, text_symbol as symbol
+from paraflex.formatting import display_units, number as format_number, text_symbol as symbol, typeset
 from paraflex.plots.catalogue import CATALOGUE
 from paraflex.report import (
     Chart,
@@ -302,13 +303,18 @@ def test_a_verification_tells_distances_and_overlays_models():
     page, text = told(html), text_of(html)
     assert page["runs"] == ["rigid", "linear geometry", "finite segments"]
     mode = figures["modes"]["++++"]
-    # The largest of them is a tenth of a millimetre.
+
+    def is_in_text(value: float, unit: str, digits: int) -> bool:
+        shown = (typeset(formatting.number(value, digits, factor=one.factor)) for one in display_units(unit))
+        return any(one in text for one in shown)
+
     for name in ("rigid", "linear"):
-        assert number(mode["models"][name]["distance_max"], 1e3) in text
-        assert number(mode["models"][name]["angle_difference_rms"]["link3"], 1e3) in text
-    assert "[mrad], [rad/s]" in text
+        assert is_in_text(mode["models"][name]["distance_max"], "m", 4)
+        assert is_in_text(mode["models"][name]["angle_difference_rms"]["link3"], "rad", 3)
+        assert is_in_text(mode["models"][name]["angular_velocity_difference_rms"]["link3"], "rad/s", 3)
+    assert "[rad/s]" in text
     assert "kineto-elastodynamics" not in text
-    assert number(mode["distances"]["rigid"]["linear"], 1e3) in text
+    assert is_in_text(mode["distances"]["rigid"]["linear"], "m", 3)
     rows, chart = rows_of(page["series"]), chart_of(page, "angle_differences")
     reference = list(data["model"].values).index(data.attrs["reference"])
     assert chart["choices"][2] == "link3"

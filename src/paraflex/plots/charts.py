@@ -154,7 +154,17 @@ def print_figure(
         for panel in axes.flat:
             panel.set_xlabel("")
         label_outer_time(axes)
+    if entry.panels != "charts":
+        _label_rows(axes)
     return lay_out(figure, axes, panel_height=max(map(_list_height, charts)) or entry.height)
+
+
+def _label_rows(axes: Any) -> None:
+    """Remove the label of the vertical axis from panels beside one with the same label."""
+    for row in axes:
+        for panel in row[1:]:
+            if panel.get_ylabel() == row[0].get_ylabel():
+                panel.set_ylabel("")
 
 
 def _list_height(chart: Chart) -> float:
@@ -289,7 +299,7 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         if curve.faint:
             size, pale = _FAINT, {"alpha": max(0.15, min(0.6, 40.0 / max(y.size, 1))), "markeredgewidth": 0.6}
         panel.plot(x, y, linestyle=_DASHES[curve.look.dash] if curve.line else "", marker=_MARKS[curve.mark],
-                   color=colour, label=label, markersize=curve.size * size, clip_on=curve.mark != "cross",
+                   color=colour, label=label, markersize=curve.size * size, clip_on=curve.mark != "cross" or not y.size,
                    markerfacecolor="white" if curve.mark == "ring" else colour, **pale)  # fmt: skip
         return
     if curve.desired and (single or curve.look.colour is None):
