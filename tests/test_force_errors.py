@@ -9,11 +9,11 @@ from scipy.integrate import solve_ivp
 
 import paraflex as pf
 from paraflex.designs.derivatives.plans import given_torques
-from paraflex.dynamics import constant_signals, law_signal, pack_signals
+from paraflex.dynamics import constant_signals, pack_signals, profile_signal
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_loads import drive_torques, joint_loads
 from paraflex.errors import IntegrationError
-from paraflex.files.laws import ExpressionLaw
+from paraflex.files.profiles import ExpressionProfile
 from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.limits import step_limits
 from paraflex.results.loads import load_figures
@@ -117,8 +117,8 @@ def test_limits_of_steps_follow_what_is_given_in_time(model):
 
 def test_laws_are_followed_however_often_they_change_in_a_run():
     """A thousand seconds of 50 rad/s: pieces of half a second each would hold four vibrations."""
-    law, end = ExpressionLaw("sin(50*t)"), 1000.0
-    signal, _ = law_signal("load.F", law, end)
+    law, end = ExpressionProfile("sin(50*t)"), 1000.0
+    signal, _ = profile_signal("load.F", law, end)
     t = np.random.default_rng(0).uniform(0.0, end, 1000)
     piece = np.searchsorted(signal.breaks, t, side="right") - 1
     powers = (t - signal.breaks[piece])[:, None] ** np.arange(6)
@@ -126,7 +126,7 @@ def test_laws_are_followed_however_often_they_change_in_a_run():
         np.sum(powers * signal.coefficients[piece], axis=1), np.sin(50.0 * t), rtol=0.0, atol=1e-8
     )
     with pytest.raises(pf.InputError, match="changes too fast"):
-        law_signal("load.F", ExpressionLaw("sin(1e6*t)"), end)
+        profile_signal("load.F", ExpressionProfile("sin(1e6*t)"), end)
 
 
 @pytest.mark.parametrize("name", ["five_bar", "four_bar", "geared_five_bar", "slider_crank_flexible"])
@@ -331,7 +331,7 @@ def test_forces_of_damped_beams_are_right_by_default(damping):
     bodies = tuple(
         replace(body, damping=damping) if isinstance(body, pf.FlexibleBeam) else body for body in model.mechanism.bodies
     )
-    load = pf.PointForce("F", "coupler.B", (ExpressionLaw("5*sin(1200*t)"), ExpressionLaw("3*cos(700*t)")))
+    load = pf.PointForce("F", "coupler.B", (ExpressionProfile("5*sin(1200*t)"), ExpressionProfile("3*cos(700*t)")))
     mechanism = replace(model.mechanism, bodies=bodies, loads=(load,))
 
     def forces(**options):
@@ -412,7 +412,7 @@ def test_deflections_follow_a_slow_load(method):
     mechanism = pf.Mechanism(
         name="arm", ground={"O": (0.0, 0.0)}, bodies=(beam,), assemblies=(pf.Assembly("a", {"arm": 0.0}),),
         joints=(pf.WeldJoint("O", pf.PointRef("ground", "O"), pf.PointRef("arm", "O")),),
-        loads=(pf.PointForce("p", "arm.tip", (ExpressionLaw("0"), ExpressionLaw("500*sin(2*pi*t)"))),),
+        loads=(pf.PointForce("p", "arm.tip", (ExpressionProfile("0"), ExpressionProfile("500*sin(2*pi*t)"))),),
         gravity=(0.0, 0.0),
     )  # fmt: skip
     run = pf.simulate_motion(mechanism, 1.5, samples=301, warning=False, options=pf.IntegrationOptions(method=method))

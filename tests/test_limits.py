@@ -114,7 +114,7 @@ def test_long_chains_that_may_be_and_keys_of_numbers(tmp_path):
     driven = f'[prescribed.drive]\njoint = "O"\ntable = {rows}\n[study]'
     model = pf.load(model_with(tmp_path, "[study]", driven, text))
     assert model.mechanism.bodies[0].mass == 2.0
-    assert len(model.mechanism.prescribed[0].law.times) == 200
+    assert len(model.mechanism.prescribed[0].profile.times) == 200
 
 
 def test_elements_and_shape_functions_are_bounded():

@@ -269,7 +269,7 @@ def test_frequencies_of_info_are_those_of_the_pose_asked_for(raparm):
 
 def test_a_time_leads_along_prescribed_angles_or_nowhere():
     four_bar = load("four_bar")
-    speed = four_bar.mechanism.prescribed[0].law.evaluate(np.zeros(1))[1].item()
+    speed = four_bar.mechanism.prescribed[0].profile.evaluate(np.zeros(1))[1].item()
     here, round_, half = (
         describe(four_bar, InfoRequest(at=t))["frequencies"]["motors_free_hz"]
         for t in (0.0, 2 * np.pi / speed, np.pi / speed)

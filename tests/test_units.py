@@ -198,9 +198,11 @@ def with_table(folder, text, table):
 
 
 def columns_of(model):
-    """Times and values of the table of a model's law."""
-    members = [one.law for one in model.mechanism.prescribed] + [x for one in model.mechanism.loads for x in one.laws]
-    return [(law.times, law.values) for law in [*members, *model.study.torques.values()]]
+    """Times and values of the table of a model's profile."""
+    members = [one.profile for one in model.mechanism.prescribed] + [
+        x for one in model.mechanism.loads for x in one.profiles
+    ]
+    return [(profile.times, profile.values) for profile in [*members, *model.study.torques.values()]]
 
 
 @pytest.mark.parametrize(
@@ -282,7 +284,7 @@ def test_joints_that_slide_have_forces_and_lengths():
     }
 
 
-def test_laws_have_units():
+def test_profiles_have_units():
     text = """
 name = "rotor"
 ground = { O = [0.0, 0.0] }
@@ -298,7 +300,7 @@ joint = "O"
 angle = "30 deg * sin(2 * pi * 1 Hz * t)"
 """
     (drive,) = model_from(tomllib.loads(text), "rotor.toml").mechanism.prescribed
-    value, rate, _ = drive.law.evaluate(np.array([0.25, 0.5]))
+    value, rate, _ = drive.profile.evaluate(np.array([0.25, 0.5]))
     assert value == pytest.approx([math.radians(30), 0.0], abs=1e-15)
     assert rate == pytest.approx([0.0, -math.radians(30) * 2 * math.pi], abs=1e-12)
     with pytest.raises(pf.InputError, match=r"prescribed.drive.angle: a quantity in m where one in rad"):

@@ -48,8 +48,8 @@ from .mechanism import (
     ModalDamping as ModalDamping,
     PrescribedAngle as PrescribedAngle,
     ConstantSpeed as ConstantSpeed,
-    PiecewiseLaw as PiecewiseLaw,
-    TabulatedLaw as TabulatedLaw,
+    PiecewiseProfile as PiecewiseProfile,
+    TabulatedProfile as TabulatedProfile,
     SampledAngle as SampledAngle,
 )
 

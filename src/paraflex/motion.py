@@ -21,8 +21,8 @@ from paraflex.dynamics import (
     consistent_state,
     constant_signals,
     dependence,
-    law_signal,
     pack_signals,
+    profile_signal,
     standing_system,
     start_state,
 )
@@ -31,7 +31,7 @@ from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from paraflex.kernel.packed import Signals
 from paraflex.kinematics import ModelWithPaths
-from paraflex.mechanism import AngleLaw, Mechanism, Start
+from paraflex.mechanism import Mechanism, Start, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
 from paraflex.validity import Validity, assess, doubtful_results, moved_far, warn, with_blame
@@ -55,7 +55,7 @@ class MotionRun(Shown):
         Equations of motion of the mechanism.
     times : (k,) array
         Times at which results are kept [s]; if an event ends the run, those until then and that of the event.
-    torques : mapping of str to float or AngleLaw
+    torques : mapping of str to float or TimeProfile
         Torque of each motor, constant or a function of time [N m].
     solution : Solution
         Computed motion.
@@ -71,14 +71,15 @@ class MotionRun(Shown):
     @property
     def in_time(self) -> bool:
         """Whether torques change in time."""
-        return any(isinstance(law, AngleLaw) for law in self.torques.values())
+        return any(isinstance(profile, TimeProfile) for profile in self.torques.values())
 
     @property
     def applied(self) -> Array:
         """Torques (k, motors) at the times of the solution [N m]."""
         t = self.solution.t
         each = [
-            law.evaluate(t)[0] if isinstance(law, AngleLaw) else np.full(t.size, law) for law in self.torques.values()
+            profile.evaluate(t)[0] if isinstance(profile, TimeProfile) else np.full(t.size, profile)
+            for profile in self.torques.values()
         ]
         return np.stack(each, axis=1) if each else np.zeros((t.size, 0))
 
@@ -126,7 +127,7 @@ def simulate_motion(
         Duration of the run [s]; that of the model's study by default.
     samples : int
         Number of sample times at which results are kept, evenly spaced, both ends included.
-    torques : mapping of str to float or AngleLaw, optional
+    torques : mapping of str to float or TimeProfile, optional
         Torques by motor [N m], constant or functions of time, which may jump; zero for the others. Those of the model's
         study by default.
     start : State, Start or str, optional
@@ -173,7 +174,7 @@ def simulate_motion(
         torques = dict(getattr(getattr(given, "study", None), "torques", {}))
     for name, torque in torques.items():
         known(name, names, "torques", "motor")
-        if not isinstance(torque, AngleLaw) and not np.isfinite(torque):
+        if not isinstance(torque, TimeProfile) and not np.isfinite(torque):
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: torques.get(name, 0.0) for name in names}
     system, state, times = motion_start(given, duration, samples, start, balanced=balanced, warning=warning)
@@ -239,12 +240,12 @@ def _run(system: System, times: Array, torques: Mapping[str, InTime], solution: 
 def _signals(system: System, torques: Mapping[str, InTime], end: float) -> tuple[Signals, Array]:
     """Return torques and prescribed motions as signals, and the times between which they are smooth [s]."""
     motors, own = [], []
-    for name, law in torques.items():
-        if isinstance(law, AngleLaw):
-            signal, inner = law_signal(f"torques.{name}", law, end)
+    for name, profile in torques.items():
+        if isinstance(profile, TimeProfile):
+            signal, inner = profile_signal(f"torques.{name}", profile, end)
             own += inner
         else:
-            (signal,) = constant_signals([float(law)], end)
+            (signal,) = constant_signals([float(profile)], end)
         motors.append(signal)
     signals, knots = pack_signals(system.mechanism, motors, end)
     return signals, np.array([*own, *knots])

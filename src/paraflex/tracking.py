@@ -42,7 +42,7 @@ from paraflex.integrators.beam_ends import leave_beam
 from paraflex.integrators.between import SAMPLES
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode, standing
-from paraflex.mechanism.laws import stops
+from paraflex.mechanism.profiles import stops
 from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn, with_blame
 
 # Times closer than this fraction of the run are merged: a knot beside a sample would force a step of almost zero
@@ -520,9 +520,9 @@ def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Ar
     """
     knots = np.unique(np.concatenate([[0.0, end], [knot for knot in path.knots if 0.0 < knot < end]]))
     knots = knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]
-    laws = [law for load in mechanism.loads for law in load.laws] if mechanism else []
+    profiles = [profile for load in mechanism.loads for profile in load.profiles] if mechanism else []
     given = np.unique(
-        [knot for law in laws for knot in law.knots if _SAME_TIME * end < knot < end * (1.0 - _SAME_TIME)]
+        [knot for profile in profiles for knot in profile.knots if _SAME_TIME * end < knot < end * (1.0 - _SAME_TIME)]
     )
     # Where two knots coincide, that of the load is kept, as steps end there.
     apart = np.abs(knots[:, None] - given) > _SAME_TIME * end
@@ -531,5 +531,5 @@ def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Ar
 
 def path_stops(knots: Array, mechanism: Mechanism) -> Array:
     """Return the knots of planned torques at which steps must end, omitting most rows of long load tables."""
-    laws = [law for load in mechanism.loads for law in load.laws]
-    return knots[~np.isin(knots, [knot for law in laws for knot in set(law.knots) - set(stops(law))])]
+    profiles = [profile for load in mechanism.loads for profile in load.profiles]
+    return knots[~np.isin(knots, [knot for profile in profiles for knot in set(profile.knots) - set(stops(profile))])]

@@ -19,7 +19,6 @@ from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
 from paraflex.mechanism import (
     Actuator,
-    AngleLaw,
     AppliedTorque,
     ConstantSpeed,
     Mechanism,
@@ -27,6 +26,7 @@ from paraflex.mechanism import (
     PrescribedAngle,
     Relation,
     SumRelation,
+    TimeProfile,
     actuator_motors,
     grouped,
     loops,
@@ -150,16 +150,16 @@ def _actuator(mechanism: Mechanism, actuator: Actuator) -> str:
 
 def _load(load: PointForce | AppliedTorque) -> str:
     """Return name, kind, components and place of a load; a component that depends on time reads "in time"."""
-    parts = ["in time" if isinstance(one, AngleLaw) else f"{one:.4g}" for one in load.components]
+    parts = ["in time" if isinstance(one, TimeProfile) else f"{one:.4g}" for one in load.components]
     size = f"({', '.join(parts)})" if len(parts) > 1 else parts[0]
     return f"{load.name}: {load.kind} {size} {load.unit} at {load.point}"
 
 
 def _drive(drive: PrescribedAngle, unit: str) -> str:
     """Return name, joint and speed of a prescribed motion; "in time" if the speed is not constant."""
-    law = drive.law
+    profile = drive.profile
     return f"{drive.name}: joint {drive.joint}, " + (
-        speed_text(law.speed, unit) if isinstance(law, ConstantSpeed) else "in time"
+        speed_text(profile.speed, unit) if isinstance(profile, ConstantSpeed) else "in time"
     )
 
 

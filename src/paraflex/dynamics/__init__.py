@@ -37,10 +37,10 @@ from paraflex.dynamics.signals import (
     InputSignals as InputSignals,
     acting_loads as acting_loads,
     constant_signals as constant_signals,
-    law_signal as law_signal,
     moment_signals as moment_signals,
     pack_signals as pack_signals,
     piecewise_quintic as piecewise_quintic,
+    profile_signal as profile_signal,
     still_signals as still_signals,
 )
 from paraflex.dynamics.singularity import SingularityMeasure as SingularityMeasure

@@ -12,7 +12,7 @@ from paraflex.dynamics.sparse import sparse_mass
 from paraflex.dynamics.state import State, project_velocity
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import PrescribedAngle
-from paraflex.mechanism.laws import HeldAngle
+from paraflex.mechanism.profiles import HeldAngle
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def brake(system: System, state: State, joints: Sequence[str]) -> Braked:
     Raises
     ------
     InconsistentConstraintsError
-        A joint is moved by a prescribed law.
+        A joint is moved by a prescribed motion.
     """
     mechanism = system.mechanism
     names = [f"brake of {joint}" for joint in joints]

@@ -36,7 +36,7 @@ _LEAST_MASS = 1e-7
 NAMED = 6
 _GAP_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
 # Remedy for contradicting constraints.
-AGREE = "leave one of these joints, gears or prescribed motions out, or choose places and laws that agree"
+AGREE = "leave one of these joints, gears or prescribed motions out, or choose places and profiles that agree"
 # Largest residual of constraint rates (sizes of the mechanism, rad; s), as a fraction of the wanted rates.
 _CONFLICT = 1e-6
 

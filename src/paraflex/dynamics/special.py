@@ -13,7 +13,7 @@ from paraflex.dynamics.projection import NAMED, second_rates
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import Signals
-from paraflex.mechanism.laws import ConstantSpeed, HeldAngle
+from paraflex.mechanism.profiles import ConstantSpeed, HeldAngle
 
 # Curvatures and rates below this fraction of the largest are rounding.
 _ROUNDING = 1e-7
@@ -111,7 +111,7 @@ def branches_from_rest(system: System, signals: Signals, t: float, q: Array) -> 
     """Return whether prescribed motions, all at rest, are at a change point from which two branches lead on."""
     moves = np.zeros(system.m)
     for motion, row in driven_rows(system):
-        moves[row] = not isinstance(motion.law, HeldAngle | ConstantSpeed)
+        moves[row] = not isinstance(motion.profile, HeldAngle | ConstantSpeed)
     if not np.any(moves):
         return False
     found = special_start(system, signals, t, q, system.jacobian(q), moves)

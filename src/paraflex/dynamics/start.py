@@ -77,7 +77,7 @@ def start_state(
     q : (n,) array, optional
         Coordinates from elsewhere, for example of a static equilibrium; the start then gives velocities only.
     time : float
-        Time of prescribed laws [s]; zero by default.
+        Time of prescribed motions [s]; zero by default.
 
     Raises
     ------
@@ -313,7 +313,7 @@ def _refuse_velocities(system: System, given: list[_Given], slip: Array, bad: ND
     of_given = slip[system.m :]
     entry = given[int(np.argmax(of_given))] if given else None
     raise InputError(
-        f"joints, prescribed laws and given velocities contradict each other by {slip[worst]:.3g} m/s or rad/s in "
+        f"joints, prescribed motions and given velocities contradict each other by {slip[worst]:.3g} m/s or rad/s in "
         f"{where}",
         field="start" if entry is None else entry.field,
         value=None if entry is None else entry.value,

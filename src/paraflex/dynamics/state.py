@@ -258,7 +258,7 @@ def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Ar
     Raises
     ------
     InconsistentConstraintsError
-        There are none: two prescribed laws contradict one another.
+        There are none: two prescribed motions contradict one another.
     """
 
     def left(v: Array) -> Array:
@@ -331,8 +331,8 @@ def check_accelerations(system: System, signals: Signals, t: float, q: Array, v:
     Raises
     ------
     InconsistentConstraintsError
-        There are none: two prescribed laws contradict one another, or a singular configuration is in motion. Or there
-        are two, from rest at a change point.
+        There are none: two prescribed motions contradict one another, or a singular configuration is in motion. Or
+        there are two, from rest at a change point.
     """
     if not np.any(v) and branches_from_rest(system, signals, t, q):
         cause = "prescribed motions begin at rest at a change point, from which two branches lead on,"

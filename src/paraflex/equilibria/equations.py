@@ -107,14 +107,14 @@ class Equations:
     def number(self) -> dict[Coordinate, int]:
         """Row of every named coordinate in the extended system."""
         mechanism, names = self.extended.mechanism, {name: k for k, name in enumerate(self.extended.rows)}
-        law = {one.joint: one.name for one in mechanism.prescribed}
+        motion_of = {one.joint: one.name for one in mechanism.prescribed}
         numbers = {}
         for one in self.given.coordinates:
             joint = one.name if one.point is None else _pin(one.point)
             if one.point is not None and one.axis != "angle":
                 numbers[one] = names[f"{joint} {one.axis}"]
             else:
-                numbers[one] = names[f"{law[joint]} {coordinate_kind(mechanism.joint(joint))}"]
+                numbers[one] = names[f"{motion_of[joint]} {coordinate_kind(mechanism.joint(joint))}"]
         return numbers
 
     @cached_property

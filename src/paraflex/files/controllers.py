@@ -10,7 +10,7 @@ from paraflex.control.laws.described import TABLE, ControllerDescription, check_
 from paraflex.control.laws.described_laws import LAWS
 from paraflex.errors import InputError, renamed, within
 from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.laws import components_table, read_components
+from paraflex.files.profiles import components_table, read_components
 from paraflex.files.said import fields_said, unsayable
 from paraflex.files.schema import ControllerTable, ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism

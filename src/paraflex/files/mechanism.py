@@ -11,7 +11,7 @@ from paraflex.control.shaping.shapers import Shaper, ShaperKind
 from paraflex.errors import InputError, within
 from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.laws import quantities, read_components, read_law
+from paraflex.files.profiles import quantities, read_components, read_profile
 from paraflex.files.said import check_fields
 from paraflex.files.schema import (
     JointTable,
@@ -108,8 +108,8 @@ def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
     for name, entry in table.prescribed.items():
         _check_quantity(name, entry, table.joint.get(entry.joint))
         with within(f"prescribed.{name}"):
-            law = read_law(entry, parameters, table.study.duration)
-        made.append(PrescribedAngle(name, entry.joint, law))
+            profile = read_profile(entry, parameters, table.study.duration)
+        made.append(PrescribedAngle(name, entry.joint, profile))
     return tuple(made)
 
 

@@ -12,13 +12,12 @@ from paraflex.control.shaping.shaped import ShapedPath
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, within
 from paraflex.files.controllers import controller_table
-from paraflex.files.laws import components_table, law_parameters, law_table
 from paraflex.files.mechanism import PATHS
+from paraflex.files.profiles import components_table, profile_parameters, profile_table
 from paraflex.files.said import fields_said, unsayable
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
-    AngleLaw,
     AppliedTorque,
     Assembly,
     AssumedModesBeam,
@@ -35,6 +34,7 @@ from paraflex.mechanism import (
     ShapeFunction,
     Sine,
     Start,
+    TimeProfile,
     grouped,
 )
 from paraflex.mechanism.quantities import joint_pair
@@ -81,7 +81,7 @@ def model_tables(
         "description": mechanism.description,
         "geometry": "" if mechanism.geometry.value == "second-order" else mechanism.geometry.value,
         **{key: value for key, value in shared.items() if value != _SHARED[key]},
-        "parameters": law_parameters(_laws(model)),
+        "parameters": profile_parameters(_profiles(model)),
         "section": {name: _section(one, name, file or {}) for name, one in names["section"].values.items()},
         "material": {name: fields_said(material) for name, material in names["material"].values.items()},
         "lump": {name: {"mass": mass, "inertia": inertia} for name, (mass, inertia) in names["lump"].values.items()},
@@ -124,16 +124,20 @@ def _member(member: Any) -> dict[str, Any]:
     return pairs | fields_said(member, "name", *(name for names in together.values() for name in names))
 
 
-def _laws(model: Any) -> Iterator[tuple[str, AngleLaw]]:
+def _profiles(model: Any) -> Iterator[tuple[str, TimeProfile]]:
     """Yield the time profiles of a model, each with its field in a file."""
     torques = model.study.torques
-    yield from ((f"prescribed.{one.name}.law", one.law) for one in model.mechanism.prescribed)
-    yield from ((f"load.{load.name}.{load.kind}", law) for load in model.mechanism.loads for law in load.laws)
-    yield from ((f"study.torques.{name}", law) for name, law in torques.items() if isinstance(law, AngleLaw))
+    yield from ((f"prescribed.{one.name}.profile", one.profile) for one in model.mechanism.prescribed)
+    yield from (
+        (f"load.{load.name}.{load.kind}", profile) for load in model.mechanism.loads for profile in load.profiles
+    )
+    yield from (
+        (f"study.torques.{name}", profile) for name, profile in torques.items() if isinstance(profile, TimeProfile)
+    )
     for one in model.controllers.values():
-        for sensor, law in one.reference.items() if isinstance(one.reference, Mapping) else ():
-            if isinstance(law, AngleLaw):
-                yield f"controller.{one.name}.reference.{sensor}", law
+        for sensor, profile in one.reference.items() if isinstance(one.reference, Mapping) else ():
+            if isinstance(profile, TimeProfile):
+                yield f"controller.{one.name}.reference.{sensor}", profile
 
 
 def _plain(value: Any, field: str) -> Any:
@@ -273,8 +277,8 @@ def _functions(functions: Sequence[ShapeFunction], field: str, direction: str) -
 
 def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, Any]:
     with within(f"prescribed.{prescribed.name}"):
-        law = law_table(prescribed.law, "displacement" if mechanism.slides(prescribed.joint) else "angle")
-    return {"joint": prescribed.joint} | law
+        profile = profile_table(prescribed.profile, "displacement" if mechanism.slides(prescribed.joint) else "angle")
+    return {"joint": prescribed.joint} | profile
 
 
 def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
@@ -308,9 +312,9 @@ def _shaper(shaper: Shaper) -> dict[str, Any]:
 def _torques(study: StudyDefaults) -> dict[str, Any]:
     """Build the entries of motor torques: a single number or expression if sufficient, else a table."""
     said = {}
-    for name, law in study.torques.items():
+    for name, profile in study.torques.items():
         with within(f"study.torques.{name}"):
-            table = components_table((law,), "torque")
+            table = components_table((profile,), "torque")
         said[name] = table.get("torque", table)
     return said
 

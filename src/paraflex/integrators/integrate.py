@@ -53,7 +53,7 @@ _AROUND = "start or drive the mechanism so that it does not get there"
 _WITHIN_REACH = "prescribe motions that end, or turn back, before it"
 _SHORTER = "take a shorter step, or leave it out and choose a tolerance"
 _NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
-_UNITS_REMEDY = "look for masses, stiffnesses, loads and laws in a wrong unit"
+_UNITS_REMEDY = "look for masses, stiffnesses, loads and profiles in a wrong unit"
 # Causes and remedies by the code with which the kernel ends a run.
 CAUSES = {
     NO_CONVERGENCE: Breakdown(
@@ -66,7 +66,7 @@ CAUSES = {
     ),
     ERROR_TEST: Breakdown(
         "the error test asks for steps below the smallest one",
-        f"{_UNITS_REMEDY}, for loads and laws that jump, or choose a coarser tolerance",
+        f"{_UNITS_REMEDY}, for loads and profiles that jump, or choose a coarser tolerance",
     ),
 }
 

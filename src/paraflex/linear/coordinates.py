@@ -346,12 +346,12 @@ def with_coordinates(system: System, joints: Iterable[str], pins: Mapping[str, P
     """
     mechanism, origin = system.mechanism, PointRef(GROUND, _ORIGIN)
     driven = {one.joint for one in mechanism.prescribed}
-    laws = [PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0))
+    profiles = [PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0))
             for joint in joints if joint not in driven]  # fmt: skip
     pinned = [RevoluteJoint(name, origin, point) for name, point in pins.items()]
     extended = replace(
         mechanism, ground={**mechanism.ground, _ORIGIN: (0.0, 0.0)}, joints=(*mechanism.joints, *pinned),
-        prescribed=(*mechanism.prescribed, *laws), cut=mechanism.cut or Cut(mechanism, {}, {}),
+        prescribed=(*mechanism.prescribed, *profiles), cut=mechanism.cut or Cut(mechanism, {}, {}),
     )  # fmt: skip
     return with_constraints_of(system, extended)
 

@@ -314,11 +314,11 @@ def _along(points: Sequence[MotionPoint], coordinates: Coordinates, chosen: Chos
     mechanism = coordinates.system.mechanism
     t, q, v, a, multipliers, acting = (np.array(part) for part in zip(*points, strict=True))
     torques = acting[:, : len(mechanism.motors)]
-    laws = {one.name: one.law for one in mechanism.prescribed}
+    profiles = {one.name: one.profile for one in mechanism.prescribed}
     inputs = [
         *(torques[:, k] for k, motor in enumerate(mechanism.motors) if motor.name in ports.mode.motors),
         *(np.zeros_like(t) for _ in range(2 * len(ports.forces))),
-        *(laws[name].evaluate(t)[2] for name in ports.prescribed),
+        *(profiles[name].evaluate(t)[2] for name in ports.prescribed),
     ]
     readings = sensor_readings(coordinates.system, q, v, a, multipliers, torques, ports.sensors)
     return Along(coordinates.values(chosen, q, v), np.stack(inputs, axis=1), readings)

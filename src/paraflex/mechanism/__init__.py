@@ -44,13 +44,6 @@ from paraflex.mechanism.joints import (
     WeldJoint as WeldJoint,
     points_named as points_named,
 )
-from paraflex.mechanism.laws import (
-    AngleLaw as AngleLaw,
-    ConstantSpeed as ConstantSpeed,
-    PiecewiseLaw as PiecewiseLaw,
-    SampledAngle as SampledAngle,
-    TabulatedLaw as TabulatedLaw,
-)
 from paraflex.mechanism.loads import (
     AppliedTorque as AppliedTorque,
     JointFriction as JointFriction,
@@ -71,6 +64,13 @@ from paraflex.mechanism.members import (
 from paraflex.mechanism.modal import ModalBody as ModalBody, ModalPoint as ModalPoint
 from paraflex.mechanism.payload import Payload as Payload
 from paraflex.mechanism.poses import Pose as Pose, approximate_poses as approximate_poses, placed_poses as placed_poses
+from paraflex.mechanism.profiles import (
+    ConstantSpeed as ConstantSpeed,
+    PiecewiseProfile as PiecewiseProfile,
+    SampledAngle as SampledAngle,
+    TabulatedProfile as TabulatedProfile,
+    TimeProfile as TimeProfile,
+)
 from paraflex.mechanism.quantities import joints_named as joints_named
 from paraflex.mechanism.raparm import raparm_i as raparm_i
 from paraflex.mechanism.rotors import (

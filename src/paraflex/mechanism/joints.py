@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, given_as
 from paraflex.errors import InputError
-from paraflex.mechanism.laws import AngleLaw, check_motion
+from paraflex.mechanism.profiles import TimeProfile, check_motion
 from paraflex.mechanism.quantities import AT_JOINT, JointThat, finite, optional, positive, said
 
 GROUND = "ground"
@@ -265,12 +265,12 @@ class PrescribedAngle(CheckedFields):
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    law: AngleLaw
+    profile: TimeProfile
 
     def __post_init__(self) -> None:
         super().__post_init__()
         try:
-            check_motion(self.law)
+            check_motion(self.profile)
         except InputError as error:
             raise error.within(f"prescribed.{self.name}") from None
 

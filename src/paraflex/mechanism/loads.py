@@ -11,7 +11,7 @@ from paraflex.arguments import CheckedFields, given_as
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.joints import PointRef
-from paraflex.mechanism.laws import AngleLaw, marks
+from paraflex.mechanism.profiles import TimeProfile, marks
 from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, optional, positive, said
 
 
@@ -105,15 +105,18 @@ class LinearSpring(CheckedFields):
     damping: float = optional(0.0, "the damping in N s/m", not_negative, "N s/m")
 
 
-InTime = float | AngleLaw
-given_as("a number or a law in time", "a number, or a law in time: PiecewiseLaw, TabulatedLaw, ExpressionLaw")(InTime)
-given_as("two numbers or laws in time", "[x, y], each a number or a law in time")(tuple[InTime, InTime])
+InTime = float | TimeProfile
+given_as(
+    "a number or a profile in time",
+    "a number, or a profile in time: PiecewiseProfile, TabulatedProfile, ExpressionProfile",
+)(InTime)
+given_as("two numbers or profiles in time", "[x, y], each a number or a profile in time")(tuple[InTime, InTime])
 
 
-def _finite_or_law(values: InTime | tuple[InTime, ...], field: str) -> None:
+def _finite_or_profile(values: InTime | tuple[InTime, ...], field: str) -> None:
     """Check that numbers are finite; profiles are checked on evaluation."""
     several = values if isinstance(values, tuple) else (values,)
-    finite([each for each in several if not isinstance(each, AngleLaw)], field)
+    finite([each for each in several if not isinstance(each, TimeProfile)], field)
 
 
 @dataclass(frozen=True)
@@ -134,9 +137,9 @@ class _Load(CheckedFields):
         return given if isinstance(given, tuple) else (given,)
 
     @property
-    def laws(self) -> tuple[AngleLaw, ...]:
+    def profiles(self) -> tuple[TimeProfile, ...]:
         """Components that are profiles in time."""
-        return tuple(each for each in self.components if isinstance(each, AngleLaw))
+        return tuple(each for each in self.components if isinstance(each, TimeProfile))
 
     def evaluate(self, t: Array) -> Array:
         """Evaluate the components at times t (k,) [s]: (k, 2) of a force [N], (k, 1) of a torque [N m].
@@ -148,7 +151,7 @@ class _Load(CheckedFields):
         """
         try:
             each = [
-                one.evaluate(t)[0] if isinstance(one, AngleLaw) else np.full(t.shape, one) for one in self.components
+                one.evaluate(t)[0] if isinstance(one, TimeProfile) else np.full(t.shape, one) for one in self.components
             ]
         except InputError as error:
             raise error.within(f"load.{self.name}") from None
@@ -156,7 +159,7 @@ class _Load(CheckedFields):
 
     def largest(self, t: Array) -> float:
         """Return the largest magnitude at times t [s] and at the knots and table rows between them [N, N m]."""
-        within = [time for law in self.laws for time in marks(law) if np.min(t) <= time <= np.max(t)]
+        within = [time for profile in self.profiles for time in marks(profile) if np.min(t) <= time <= np.max(t)]
         return float(np.max(np.linalg.norm(self.evaluate(np.concatenate([t, within])), axis=1)))
 
 
@@ -167,7 +170,7 @@ class PointForce(_Load):
     kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
 
-    force: tuple[InTime, InTime] = field(metadata=said("[x, y] in the ground frame in N", _finite_or_law))
+    force: tuple[InTime, InTime] = field(metadata=said("[x, y] in the ground frame in N", _finite_or_profile))
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,7 @@ class AppliedTorque(_Load):
     kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"
 
-    torque: InTime = field(metadata=said("the torque in N m", _finite_or_law))
+    torque: InTime = field(metadata=said("the torque in N m", _finite_or_profile))
 
 
 Load = PointForce | AppliedTorque

@@ -10,7 +10,7 @@ from paraflex.display import facts, page, sentence, table, view
 from paraflex.dynamics.points import point_motion
 from paraflex.integrators import Solution
 from paraflex.integrators.methods import title_of
-from paraflex.mechanism import AngleLaw, PointRef
+from paraflex.mechanism import PointRef, TimeProfile
 from paraflex.motion import MotionRun
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import deflections
@@ -60,7 +60,9 @@ def motion_run_html(run: MotionRun) -> str:
         shown = [ref for ref in names if "._" not in str(ref)][:_MOST_LISTED]
         points = [(str(ref), *map(float, point_motion(system, ref, *last).position[0])) for ref in shown]
     given = {
-        name: "in time" if isinstance(law, AngleLaw) else f"{law:g}" for name, law in run.torques.items() if law != 0.0
+        name: "in time" if isinstance(profile, TimeProfile) else f"{profile:g}"
+        for name, profile in run.torques.items()
+        if profile != 0.0
     }
     torques = [f"{name} {value}" for name, value in given.items()]
     return page(

@@ -168,12 +168,12 @@ def _loaded(mechanism: Mechanism, size: float, weight: float, times: Array) -> I
         try:
             largest = load.largest(times)
         except InputError:
-            # A prescribed law may be undefined beyond an earlier end of the run; otherwise the run reports the error.
+            # The profile may be undefined beyond an earlier end of the run; otherwise the run reports the error.
             continue
         if largest > (most if force else most * size):
             yield Finding(
                 "load-large", f"load.{load.name}.{load.kind}",
-                f"{'up to ' if load.laws else ''}{largest:.3g} {load.unit}, where all bodies weigh {weight:.3g} N"
+                f"{'up to ' if load.profiles else ''}{largest:.3g} {load.unit}, where all bodies weigh {weight:.3g} N"
                 + ("" if force else f", in a mechanism of {size:.3g} m"),
                 f"it is in {load.unit}: is it in another unit, or are masses?",
             )  # fmt: skip

@@ -393,7 +393,7 @@ def _moving(mechanism: Mechanism, solution: Solution) -> str:
     """List prescribed motions with their largest rates, and loads with their sizes."""
     named: list[str] = []
     for one in mechanism.prescribed:
-        rate = float(np.max(np.abs(one.law.evaluate(solution.t)[1])))
+        rate = float(np.max(np.abs(one.profile.evaluate(solution.t)[1])))
         unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
         named.append(f"prescribed.{one.name} (up to {speed_text(rate, unit, '.3g')})")
     named += [f"load.{load.name} ({load.largest(solution.t):.3g} {load.unit})" for load in mechanism.loads]

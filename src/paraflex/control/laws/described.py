@@ -12,7 +12,7 @@ from paraflex.arguments import CheckedFields, given_as
 from paraflex.control.laws.described_laws import LawNames, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
-from paraflex.mechanism import AngleLaw, Mechanism
+from paraflex.mechanism import Mechanism, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known
@@ -41,7 +41,7 @@ class ControllerDescription(CheckedFields):
         Sampling period, and delay from a sample until its torques act [s].
     inputs, outputs : tuple of str
         Sensors and motors. If empty, those of the law, else the encoders of its motors and all motors of a mode.
-    reference : "plan", "open-loop" or mapping of str to float or AngleLaw, optional
+    reference : "plan", "open-loop" or mapping of str to float or TimeProfile, optional
         Reference that is subtracted from the readings; the law's own by default.
     limits : float, pair or mapping of str to either, optional
         Limits of the torques [N m, N]; none by default.
@@ -174,8 +174,8 @@ def _functions(reference: Any) -> Any:
     """Return references with angle laws replaced by functions of time."""
     if not isinstance(reference, Mapping):
         return reference
-    return {name: _value(each) if isinstance(each, AngleLaw) else each for name, each in reference.items()}
+    return {name: _value(each) if isinstance(each, TimeProfile) else each for name, each in reference.items()}
 
 
-def _value(law: AngleLaw) -> Callable[[float], float]:
+def _value(law: TimeProfile) -> Callable[[float], float]:
     return lambda t: float(law.evaluate(np.array([t]))[0][0])

@@ -195,12 +195,12 @@ class Change:
     @cached_property
     def knots(self) -> Numbers:
         """Knots of the path, with a complex step."""
-        laws = [law for load in self.planned.mechanism.loads for law in load.laws]
-        if any(law.knots for law in laws):
+        profiles = [profile for load in self.planned.mechanism.loads for profile in load.profiles]
+        if any(profile.knots for profile in profiles):
             raise InputError(
-                "loads whose law has pieces or a linear table: no derivative of the torques that a path takes",
+                "loads whose profile has pieces or a linear table: no derivative of the torques that a path takes",
                 field="load",
-                remedy='give their laws as one expression or a table of interpolation = "spline"',
+                remedy='give their profiles as one expression or a table of interpolation = "spline"',
             )
         knots = path_knots(self.there.path, self.there.end)
         if knots.size != self.planned.plan.knots.size:
@@ -242,13 +242,13 @@ class Change:
             target = target + 1j * np.imag(orientation) * np.eye(3)[0][:, None] * (closure.coordinates == 2)
         return [
             Nearby(
-                place, weight, with_numbers(closure.packed, numbers + place * change), self._laws(near),
+                place, weight, with_numbers(closure.packed, numbers + place * change), self._prescribed_signals(near),
                 motion.t + place * d_times, target.real + place * part(target),
             )
             for place, weight, near in zip(stencil.places, stencil.weights, self.near, strict=True)
         ]  # fmt: skip
 
-    def _laws(self, near: Described) -> Any:
+    def _prescribed_signals(self, near: Described) -> Any:
         mechanism = near.mechanism
         if not mechanism.prescribed:
             return self.closure.signals
