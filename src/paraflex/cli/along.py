@@ -19,7 +19,7 @@ from paraflex.cli.collected import apart, collected
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import check_stops, model_parameters
-from paraflex.cli.reduced import asked_reduction, kept_coordinates
+from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
 from paraflex.cli.request import acting_controllers, asked_of, at_fault, controllers_said, plan_study
 from paraflex.cli.tables import (
     below_tolerance,
@@ -107,7 +107,7 @@ def asked_tasks(
     if request.segments is not None:
         return task.in_segments(proportional_segments(mechanism, request.segments)), None
     kept = kept_coordinates(request, model.study)
-    return (task, None) if kept is None else (task.remodelled(asked_reduction(request, task, kept, modes)), task)
+    return (task, None) if kept is None else (task.remodelled(reduced_as_requested(request, task, kept, modes)), task)
 
 
 def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity: str, began: float) -> int:

@@ -18,7 +18,7 @@ from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, tell
 from paraflex.cli.integration import model_parameters
-from paraflex.cli.reduced import asked_reduction, kept_coordinates
+from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import acting_controllers, asked_of, blaming, controllers_said
 from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
@@ -34,7 +34,7 @@ from paraflex.folders import RUN, ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion, state_at
-from paraflex.reduction import size_of
+from paraflex.reduced_bodies import size_of
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.reduced_runs import beside_full
 
@@ -88,7 +88,7 @@ def _run_held(
     run, kept = full, kept_coordinates(request, study)
     # A full run that failed is no reference for a reduced one.
     if kept is not None and full.solution.status in DONE_STATUSES:
-        few = asked_reduction(request, full, kept)
+        few = reduced_as_requested(request, full, kept)
         start = None
         if not request.balanced:
             start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))

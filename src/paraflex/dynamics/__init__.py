@@ -19,6 +19,10 @@ from paraflex.dynamics.joint_coordinates import (
     place_along_beam as place_along_beam,
 )
 from paraflex.dynamics.linearise import Vibration as Vibration, natural_frequencies as natural_frequencies
+from paraflex.dynamics.modal_truncation import (
+    MissingRotation as MissingRotation,
+    missing_rotations as missing_rotations,
+)
 from paraflex.dynamics.numbers import numbers_of as numbers_of, same_layout as same_layout, with_numbers as with_numbers
 from paraflex.dynamics.packing import records as records
 from paraflex.dynamics.quasi_static import (
@@ -27,7 +31,6 @@ from paraflex.dynamics.quasi_static import (
     joint_motions as joint_motions,
 )
 from paraflex.dynamics.rank import Dependence as Dependence, dependence as dependence, redundant_rows as redundant_rows
-from paraflex.dynamics.reduction import MissedTurn as MissedTurn, missed_turns as missed_turns
 from paraflex.dynamics.sensors import (
     SensorRows as SensorRows,
     sensor_readings as sensor_readings,

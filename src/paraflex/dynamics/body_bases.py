@@ -16,7 +16,7 @@ from paraflex.dynamics.held import held_modes, static_shapes
 from paraflex.dynamics.interface import interface_rows
 from paraflex.errors import InputError
 from paraflex.fem import ModalBasis, modal_basis
-from paraflex.mechanism import Body, BodyReduction, FlexibleBeam, Mechanism, RigidBody
+from paraflex.mechanism import Body, ComponentModes, FlexibleBeam, Mechanism, RigidBody
 
 # A shape is dropped if its part independent of the others is below this fraction, by the root of its strain energy.
 _DEPENDENT = 1e-10
@@ -61,7 +61,7 @@ def reduced_body(
     assert not isinstance(described, RigidBody)
     if name in mechanism.bases:
         shapes = _vibrations(body, _given(body, np.array(mechanism.bases[name])))
-    elif isinstance(described, FlexibleBeam) and described.reduction is BodyReduction.CRAIG_BAMPTON:
+    elif isinstance(described, FlexibleBeam) and described.reduction is ComponentModes.CRAIG_BAMPTON:
         rows = interface_rows(mechanism, bodies, constraints, name)
         held = held_modes(body, rows)[1][:, : described.modes]
         shapes = _vibrations(body, np.hstack([static_shapes(body, rows), held]))

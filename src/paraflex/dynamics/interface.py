@@ -12,7 +12,7 @@ from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
 from paraflex.dynamics.held import place_rows, slope_rows
 from paraflex.errors import InputError
 from paraflex.kernel.packed import ANGLE, POINT
-from paraflex.mechanism import AppliedTorque, BodyReduction, FlexibleBeam, Mechanism, PointRef
+from paraflex.mechanism import AppliedTorque, ComponentModes, FlexibleBeam, Mechanism, PointRef
 
 Rows = Callable[[Marker], Numbers]
 
@@ -57,7 +57,7 @@ def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator
     for term in (term for constraint in constraints for term in constraint.terms):
         if term.carrier in ("frame", "track"):
             beam = None if term.a.on_ground else mechanism.body(term.a.body)
-            if isinstance(beam, FlexibleBeam) and beam.reduction is BodyReduction.CRAIG_BAMPTON:
+            if isinstance(beam, FlexibleBeam) and beam.reduction is ComponentModes.CRAIG_BAMPTON:
                 raise InputError(
                     "a joint slides along it, so that static shapes are not sufficient",
                     field=f"body.{beam.name}.reduction", value=beam.reduction.value,

@@ -22,7 +22,7 @@ from paraflex.limits import SHAPE_FUNCTIONS, at_most
 from paraflex.mechanism import (
     AssumedModesBeam,
     Body,
-    BodyReduction,
+    ComponentModes,
     Curvature,
     Damping,
     FlexibleBeam,
@@ -90,7 +90,7 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
         damping=_damping(body.damping, name),
         flexible=body.flexible,
         frames=body.frames,
-        reduction=BodyReduction(body.reduction),
+        reduction=ComponentModes(body.reduction),
     )
 
 

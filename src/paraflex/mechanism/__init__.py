@@ -10,7 +10,7 @@ from paraflex.mechanism.actuators import Actuator as Actuator, Amplifier as Ampl
 from paraflex.mechanism.bodies import (
     AssumedModesBeam as AssumedModesBeam,
     Body as Body,
-    BodyReduction as BodyReduction,
+    ComponentModes as ComponentModes,
     Curvature as Curvature,
     FlexibleBeam as FlexibleBeam,
     LumpedMass as LumpedMass,

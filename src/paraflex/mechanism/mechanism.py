@@ -12,7 +12,7 @@ from paraflex.arguments import checked_arguments, given_as, refused
 from paraflex.display import Shown
 from paraflex.errors import InputError, as_enum
 from paraflex.fem import ReferenceCondition
-from paraflex.mechanism.bodies import Body, BodyReduction, Curvature, FlexibleBeam, RigidBody, given_shapes
+from paraflex.mechanism.bodies import Body, ComponentModes, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
 from paraflex.mechanism.payload import Payload, loaded, together
@@ -162,7 +162,7 @@ class Mechanism(Members, Shown):
         reference: ReferenceCondition | str | None = None,
         curvature: Curvature | str | None = None,
         modes: int | None = None,
-        reduction: BodyReduction | str | None = None,
+        reduction: ComponentModes | str | None = None,
     ) -> Mechanism:
         """Return the mechanism with another mesh, reference condition, curvature or reduction of every flexible beam.
 
@@ -176,7 +176,7 @@ class Mechanism(Members, Shown):
             Continuity of the curvature at lumped moments of inertia.
         modes : int, optional
             Number of modes of lowest frequency that each beam, and each other flexible body, retains.
-        reduction : BodyReduction or str, optional
+        reduction : ComponentModes or str, optional
             Reduction of the beams: "modal" or "craig-bampton".
 
         Raises
@@ -191,7 +191,7 @@ class Mechanism(Members, Shown):
         for what in changes:
             self._refuse_given_shapes(what)
         if reduction is not None:
-            changes |= {"reduction": as_enum(BodyReduction, reduction, "reduction")}
+            changes |= {"reduction": as_enum(ComponentModes, reduction, "reduction")}
             changes |= {} if modes is None else {"modes": modes}
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
         changed = self.with_bodies(replace(beam, **changes) for beam in beams) if changes else self

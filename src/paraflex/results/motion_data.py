@@ -33,7 +33,7 @@ from paraflex.results.links import system_links
 from paraflex.results.loads import load_figures
 from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.record import RUN_FIGURES
-from paraflex.results.reduced_runs import reduction_figures
+from paraflex.results.reduced_runs import reduced_run_figures
 from paraflex.results.sensors import sensor_figures
 from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import doubtful_numbers
@@ -132,7 +132,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         **sensor_figures(data),
-        **reduction_figures(data),
+        **reduced_run_figures(data),
         **controller_figures(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {

@@ -15,7 +15,7 @@ from paraflex.results.numbers import finite_or_none
 
 if TYPE_CHECKING:
     # The module imports the kernels, which are not needed to read results.
-    from paraflex.reduction import Size
+    from paraflex.reduced_bodies import Size
 
 # Variable that identifies such a dataset, and prefix of the numbers of the full runs.
 DISTANCE, FULL = "reduction_distance", "full_"
@@ -75,7 +75,7 @@ def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def reduction_figures(data: xr.Dataset) -> dict[str, Any]:
+def reduced_run_figures(data: xr.Dataset) -> dict[str, Any]:
     """Return `reduction` of the single run of a dataset, with its distance to the full run and numbers of the latter.
 
     The dictionary is empty if the run has all flexible coordinates.

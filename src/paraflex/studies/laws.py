@@ -21,7 +21,7 @@ from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
-from paraflex.reduction import reduced_mechanism
+from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.labelled import provenance
 from paraflex.results.metrics import METRICS

@@ -22,7 +22,7 @@ from paraflex.folders import RUN
 from paraflex.integrators import IntegrationOptions
 from paraflex.interrupts import Calls
 from paraflex.mechanism import ActuationMode
-from paraflex.reduction import size_of
+from paraflex.reduced_bodies import size_of
 from paraflex.results import summary, tracking_dataset
 from paraflex.results.following import ErrorSpan
 from paraflex.results.reduced_runs import beside_full

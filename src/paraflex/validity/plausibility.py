@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, joint_coordinate, missed_turns
+from paraflex.dynamics import System, joint_coordinate, missing_rotations
 from paraflex.dynamics.joint_loads import drive_torques, load_errors, undetermined_loads
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
@@ -95,7 +95,7 @@ class _Where(NamedTuple):
 
 def stiff_modes(system: System) -> Iterator[Finding]:
     """Yield bodies whose kept modes cannot represent the moments at their joints and loads."""
-    for one in missed_turns(system):
+    for one in missing_rotations(system):
         yield Finding(
             "modes-too-stiff", f"body.{one.point.body}.modes",
             f"{one.modes} modes miss {100.0 * one.part:.0f} % of its rotation under a moment at {one.point.point} from "

@@ -9,8 +9,8 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import ActuationError, InputError, SingularActuationError
 from paraflex.mechanism import ActuationMode, Mechanism, mode_of_motors
 from paraflex.motion import MotionRun
-from paraflex.reduction.bases import bases_of, of_one_energy
-from paraflex.reduction.deflections import PlannedDeflections
+from paraflex.reduced_bodies.bases import bases_of, of_one_energy
+from paraflex.reduced_bodies.deflections import PlannedDeflections
 from paraflex.tracking import TrackingRun, TrackingTask
 
 
