@@ -87,9 +87,9 @@ def test_a_run_whose_energy_does_not_balance_says_so():
     model = pf.load("leaf_spring_guide")
     with pytest.warns(pf.ResultWarning, match="energy and work do not balance"):
         run = pf.simulate_motion(model, 0.1, samples=51, options=pf.IntegrationOptions(tolerance=1e-3))
-    assert any(one.code == "energy-unbalanced" for one in run.doubts)
+    assert any(one.code == "energy-unbalanced" for one in run.findings)
     other = pf.simulate_motion(model, 0.1, samples=51)
-    assert not any(one.code == "energy-unbalanced" for one in other.doubts)
+    assert not any(one.code == "energy-unbalanced" for one in other.findings)
 
 
 @pytest.mark.parametrize("geometry", ["linear", "second-order"])

@@ -401,7 +401,7 @@ def test_a_start_at_a_change_point_is_on_one_of_the_branches():
     assert run.solution.singular_positions == (0.0,)
     assert np.all(np.isnan(run.solution.multipliers[0]))
     assert np.all(np.isfinite(run.solution.multipliers[1:]))
-    assert not run.doubts
+    assert not run.findings
     model = pf.Model(mechanism, start=Start(angular={"rocker": 0.689898}))
     assert not [one for one in pf.check(model).findings if one.code == "assembly-open"]
 
@@ -410,7 +410,7 @@ def test_a_start_from_rest_at_a_change_point_is_a_singular_position_too():
     run = pf.simulate_motion(replace(folded(None), gravity=(0.0, -9.81)), 0.2, samples=11, warning=False)
     assert run.solution.singular_positions == (0.0,)
     assert np.isnan(run.solution.multipliers).any(axis=1).tolist() == [True, *[False] * 10]
-    assert not run.doubts
+    assert not run.findings
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -469,7 +469,7 @@ def test_forces_after_a_start_at_a_dead_centre_are_those_of_its_branch(side, met
     found = pf.motion_dataset(run)["drive_torque"].values.ravel()
     assert np.isnan(found[0])
     np.testing.assert_allclose(found[2:], exact, rtol=0, atol=part * 3.97)
-    assert not run.doubts
+    assert not run.findings
 
 
 FLAT = """

@@ -75,7 +75,7 @@ def test_a_turned_arm_needs_the_torque_of_its_weight(model, method):
     exact = 2.0 * np.hypot(-40.0 * np.cos(10.0 * t), 9.81 - 40.0 * np.sin(10.0 * t))
     np.testing.assert_allclose(force, exact, rtol=0.0, atol=1e-2)
     assert solution.energy_balance_max < 1e-3 * 125.0
-    assert not [one.code for one in run.doubts]
+    assert not [one.code for one in run.findings]
 
 
 @pytest.mark.parametrize("method", OWN)
@@ -101,7 +101,7 @@ def test_a_pulse_within_a_long_step_is_met(model):
     run = motion(model(pulse))
     whole = pf.simulate_motion(model(pulse), samples=2501, warning=False)
     assert np.max(np.abs(drive_torques(whole.system, whole.solution.multipliers))) == pytest.approx(8.0, rel=1e-2)
-    (found,) = [one for one in run.doubts if one.code == "samples-coarse"]
+    (found,) = [one for one in run.findings if one.code == "samples-coarse"]
     assert "prescribed.drive" in found.text
 
 
@@ -356,7 +356,7 @@ def test_forces_of_damped_beams_that_steps_do_not_resolve_are_a_finding(damping,
         run = pf.simulate_motion(
             mechanism, 0.3, samples=301, warning=False, options=pf.IntegrationOptions(control=control)
         )
-        says = [one.remedy for one in run.doubts if one.code == "forces-unresolved"]
+        says = [one.remedy for one in run.findings if one.code == "forces-unresolved"]
         assert bool(says) is (found and control == "positions")
         assert not says or 'control = "forces"' in says[0]
 
@@ -427,7 +427,7 @@ def test_deflections_follow_a_slow_load(method):
     work = force**2 * L**3 / (6.0 * EI)
     assert np.max(np.abs(run.solution.work - work)) < 0.01 * np.max(work)
     # Work of forces on deflections hardly above the tolerance is uncertain, which the tolerance explains.
-    assert all(one.code != "energy-unbalanced" for one in run.doubts)
+    assert all(one.code != "energy-unbalanced" for one in run.findings)
 
 
 @pytest.mark.parametrize("frames", [1, 4])
@@ -637,7 +637,7 @@ samples = 101
 def test_loads_faster_than_what_elements_resolve_are_a_finding(model, elements, fast, found):
     """At 30 times its lowest frequency a cantilever of one element has half of the force in its clamp."""
     given = model(CANTILEVER.replace("ELEMENTS", str(elements)).replace("FAST", str(fast)))
-    assert [one.code for one in motion(given).doubts].count("elements-few") == found
+    assert [one.code for one in motion(given).findings].count("elements-few") == found
 
 
 def slowly_begun(w, ramp=15.0):

@@ -46,7 +46,7 @@ from paraflex.mechanism.profiles import Interpolation
 from paraflex.motion import simulate_motion
 from paraflex.studies import load_sensitivities
 from paraflex.tracking import path_stops, plan_tracking
-from paraflex.validity.actions import doubtful_actions
+from paraflex.validity.actions import implausible_actions
 from shell import paraflex
 from test_loads import INERTIA, MASS, REACH, five_bar, pendulum
 from test_sensitivities import PLACES
@@ -303,7 +303,7 @@ def test_inputs_are_motors_then_loads_then_prescribed_motions():
 
 def test_a_load_beyond_what_is_plausible_is_seen_at_its_largest():
     def codes(force):
-        return [one.code for one in doubtful_actions(slider(force), 0.5, MASS, np.linspace(0.0, 1.0, 3))]
+        return [one.code for one in implausible_actions(slider(force), 0.5, MASS, np.linspace(0.0, 1.0, 3))]
 
     # The pulse lies between the times that are looked at.
     assert codes(zero_until(0.6, 1e6, 0.61)) == codes(1e6) == ["load-large"]

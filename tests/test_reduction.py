@@ -200,6 +200,6 @@ def test_runs_complain_too():
     reduced = replace(model, mechanism=model.mechanism.with_beams(reference=PINNED, modes=2))
     with pytest.warns(pf.ResultWarning, match=r"body\.beam\.modes: 2 modes miss 24 % .*craig-bampton"):
         run = pf.simulate_motion(reduced, 0.1, samples=11)
-    assert "modes-too-stiff" in [one.code for one in run.doubts]
+    assert "modes-too-stiff" in [one.code for one in run.findings]
     sound = pf.simulate_motion(replace(model, mechanism=with_static_shapes(model.mechanism, 2)), 0.1, samples=11)
-    assert "modes-too-stiff" not in [one.code for one in sound.doubts]
+    assert "modes-too-stiff" not in [one.code for one in sound.findings]

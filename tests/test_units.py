@@ -14,7 +14,7 @@ from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.fields import units_at
 from paraflex.files.schema import ModelTable
-from paraflex.units import FIELD_UNITS, UNITS, spelt, unit_named
+from paraflex.units import FIELD_UNITS, UNITS, dimension_text, unit_named
 
 # In SI units, by hand: with the float that a file would have in its place.
 KNOWN = {
@@ -44,10 +44,10 @@ def test_decimal_factors_are_rounded_once():
 def test_units_of_a_dimension_are_multiples_of_its_si_unit():
     for text, unit in {"g mm^2": "kg m^2", "N/mm": "N/m", "rpm": "rad/s", "psi": "Pa", "1/ms": "1/s"}.items():
         assert unit_named(text).dimension == unit_named(unit).dimension
-        assert spelt(unit_named(text).dimension) == ("Hz" if unit == "1/s" else unit)
+        assert dimension_text(unit_named(text).dimension) == ("Hz" if unit == "1/s" else unit)
     for unit in FIELD_UNITS:
         assert unit_named(unit).factor == 1
-    assert spelt((3, 1, 0, -1, 0)) == "kg m^3 rad^-1"
+    assert dimension_text((3, 1, 0, -1, 0)) == "kg m^3 rad^-1"
     assert UNITS["Nm"].dimension == unit_named("N m").dimension
     # An angle counts, so that frequencies are no speeds of rotation.
     assert unit_named("Hz").dimension != unit_named("rad/s").dimension
@@ -75,7 +75,7 @@ def test_units_in_expressions_stand_behind_numbers(text, value, unit):
     table = {"L": "300 mm", "m": 2.0}
     assert evaluate(text, {"L": 0.3, "m": 2.0}) == pytest.approx(value, rel=1e-15)
     dimension = dimension_of(text, dimensions_of_parameters(table))
-    assert (dimension if dimension is None else spelt(dimension)) == unit
+    assert (dimension if dimension is None else dimension_text(dimension)) == unit
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from paraflex.actuation import Electrical, electrical, electrical_findings
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import (
@@ -34,7 +34,7 @@ from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, doubtful_results, moved_far, warn, with_blame
+from paraflex.validity import Validity, assess, implausible_results, moved_far, warn, with_blame
 
 # Remedy for a balanced start that is not found.
 UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
@@ -44,7 +44,7 @@ UNBALANCED = "make links and springs stiff enough for weight and loads, or leave
 _COARSER, _GROWN, _SMALL = 100.0, 1e-3, 0.01
 
 
-@given_as("a run without a path", "the run that simulate_motion returns")
+@named_in_errors("a run without a path", "the run that simulate_motion returns")
 @dataclass(frozen=True)
 class MotionRun(Shown):
     """Run of a mechanism without a path.
@@ -94,9 +94,9 @@ class MotionRun(Shown):
         return electrical(self.system, self.system.described, self)
 
     @cached_property
-    def doubts(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings on events in the run, on implausible results and on limits of amplifiers."""
-        results = doubtful_results(self.system, self.solution)
+        results = implausible_results(self.system, self.solution)
         described = self.system.described
         amplifiers = electrical_findings(described, self.electrical) if described.actuators else ()
         grown = _grown_errors(self) if self.open_loop else ()
@@ -144,7 +144,7 @@ def simulate_motion(
     on_progress : callable, optional
         Function called with the time reached [s].
     warning : bool
-        Whether a doubtful run issues warnings; its `validity` and `doubts` contain the findings in any case.
+        Whether a doubtful run issues warnings; its `validity` and `findings` contain the findings in any case.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def simulate_motion(
     Warns
     -----
     ValidityWarning, ResultWarning
-        The run is outside the validity of its model, or its results are implausible; `validity` and `doubts` give the
+        The run is outside the validity of its model, or its results are implausible; `validity` and `findings` give the
         reasons.
 
     Raises
@@ -167,7 +167,7 @@ def simulate_motion(
     IntegrationError
         The run could not be finished; the error carries a MotionRun with the results so far.
     """
-    given, mechanism = mechanism, Mechanism.made_of(mechanism)
+    given, mechanism = mechanism, Mechanism.from_source(mechanism)
     options = choose(method, options)
     names = [motor.name for motor in mechanism.motors]
     if torques is None:
@@ -189,7 +189,7 @@ def simulate_motion(
     run = _run(system, times, values, solution)
     if warning:
         warn(run.validity)
-        warn_of(run.doubts, ResultWarning)
+        warn_of(run.findings, ResultWarning)
     return run
 
 
@@ -220,7 +220,7 @@ def motion_start(
         raise InputError(
             "a given state cannot be balanced", field="balanced", value=balanced, remedy="leave one of the two out"
         )
-    system = standing_system(Mechanism.made_of(given), start)
+    system = standing_system(Mechanism.from_source(given), start)
     if isinstance(start, State):
         state = start
     else:

@@ -83,8 +83,8 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
     starts = tuple(closure_of(standing_system(rigid.mechanism, one.name), one) for one in mechanism.assemblies)
     if not mechanism.assemblies:
         return Examination(system, rigid, starts, None, None, None)
-    wanted = mechanism.assembly(assembly)
-    chosen = next(start for start in starts if start.assembly == wanted.name)
+    requested = mechanism.assembly(assembly)
+    chosen = next(start for start in starts if start.assembly == requested.name)
     if chosen.state is None:
         return Examination(system, rigid, starts, chosen, None, None)
     try:

@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.actuation import actuation_condition
 from paraflex.control.shaping.shaped import ShapedPath
-from paraflex.equilibria.given import StaticsDefaults
+from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.errors import ActuationError, AssemblyError, InputError, NumericalError, UnreachablePathError
 from paraflex.files import Model
 from paraflex.findings import Finding
@@ -21,7 +21,7 @@ from paraflex.mechanism.profiles import PiecewiseProfile, TabulatedProfile, mark
 from paraflex.tracking import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import STANDARD_GRAVITY, mechanism_mass, mechanism_size
-from paraflex.validity.plausibility import doubtful_torques
+from paraflex.validity.plausibility import implausible_torques
 
 # Condition number of the actuation matrix above which a nearby singular configuration dominates torques.
 ILL_CONDITIONED = 1e3
@@ -120,7 +120,7 @@ def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, magnitu
             )  # fmt: skip
         yield from _friction(task.mechanism, mode, np.max(np.abs(torques), axis=0))
         if magnitudes:
-            yield from doubtful_torques(task.system, task.driven(mode.name, torques, condition), task.motion.t)
+            yield from implausible_torques(task.system, task.driven(mode.name, torques, condition), task.motion.t)
 
 
 def path_findings(model: Model, path: Path, name: str, duration: float) -> Iterator[Finding]:
@@ -199,14 +199,14 @@ def _turns(place: str, path: Path, orientation: float) -> Iterator[Finding]:
 
 def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> Iterator[Finding]:
     mechanism = model.mechanism
-    asked = model.modes(names or ())
-    if not asked:
+    requested = model.modes(names or ())
+    if not requested:
         what = "no actuation mode" if mechanism.motors else "no motor"
         yield Finding(
             "mode-missing", "mode", f"there is a path, but {what} to drive the mechanism along it",
             "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
         )  # fmt: skip
-    yield from task_findings(task, asked, magnitudes=True)
+    yield from task_findings(task, requested, magnitudes=True)
 
 
 def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from paraflex.cli import BAD_INPUT, TROUBLE
+from paraflex.cli import BAD_INPUT, FAILURE
 from paraflex.cli.collected import collecting
 from paraflex.cli.commands.once import Command
 from paraflex.cli.commands.requests import with_options
@@ -49,8 +49,8 @@ def all_commands(group: Any) -> dict[str, Any]:
     return found
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(requested: bool) -> None:
+    if requested:
         from importlib.metadata import version
 
         typer.echo(f"paraflex {version('paraflex')}")
@@ -77,7 +77,7 @@ def main() -> None:
         sys.exit(BAD_INPUT)
     except ParaflexError as error:
         _complain(error)
-        sys.exit(TROUBLE)
+        sys.exit(FAILURE)
     except OSError as error:
         # A file name that is too long raises this error wherever the file is first looked up.
         if error.errno != errno.ENAMETOOLONG:

@@ -13,7 +13,7 @@ from rich.table import Table
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import CompareRequest
-from paraflex.cli.ending import say_where, tell
+from paraflex.cli.ending import print_location, print_results
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.tables import plain_table, print_titled
 from paraflex.folders import RUN_COMPARISON
@@ -40,9 +40,9 @@ def compare_command(request: CompareRequest) -> int:
                 write_json(new / "compare.json", found.to_dict())
             with folder.amended() as new:
                 save_overlays(found, new / "figures")
-    tell(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, doubts=())
+    print_results(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, findings=())
     if request.out is not None and not request.json:
-        say_where(began, "numbers and figures", Path(request.out))
+        print_location(began, "numbers and figures", Path(request.out))
     return COMPLETE
 
 

@@ -12,7 +12,7 @@ from paraflex.cli.collected import printed
 from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.frequencies import frequencies, hertz
 from paraflex.cli.inspect_tables import print_facts, print_library
-from paraflex.cli.request import asked_model
+from paraflex.cli.request import requested_model
 from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, closure_of, mobility
 from paraflex.errors import ProportionError
 from paraflex.files import Model, library_names, load
@@ -43,7 +43,7 @@ def info_command(request: InfoRequest) -> int:
         facts: Any = library()
         verdict = None
     else:
-        facts = describe(asked_model(request.model), request)
+        facts = describe(requested_model(request.model), request)
         verdict = facts["verdict"]["level"]
         # The findings are printed with the facts.
         printed(map(Finding.from_dict, facts["verdict"]["findings"]))

@@ -14,7 +14,7 @@ from rich.table import Table
 from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
 from paraflex.cli.commands.models import ModesRequest
-from paraflex.cli.request import asked_model, find_path
+from paraflex.cli.request import find_path, requested_model
 from paraflex.cli.tables import framed_table, plain_console
 from paraflex.dynamics import build_system, closure_of, mobility, reach
 from paraflex.errors import ActuationError
@@ -32,7 +32,7 @@ def modes_command(request: ModesRequest) -> None:
 
     For a model without named modes, list the sets of motors that could be requested.
     """
-    model, path = asked_model(request.model), request.path
+    model, path = requested_model(request.model), request.path
     effort = _effort(model, path)
     # Modes of [mode] tables, and further ones of the study.
     studied = [parse_mode(model.mechanism, name) for name in model.study.modes]

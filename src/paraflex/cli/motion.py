@@ -16,11 +16,11 @@ from paraflex.cli.bars import bars, begun_late
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.ending import exit_code, print_results
 from paraflex.cli.integration import model_parameters
 from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import acting_controllers, asked_of, blaming, controllers_said
+from paraflex.cli.request import acting_controllers, blaming, command_provenance, controller_arguments
 from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
@@ -93,12 +93,12 @@ def _run_held(
         if not request.balanced:
             start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
         run = _simulate(console, model, few, options, controllers, balanced=request.balanced, start=start)
-    asked = {
+    requested = {
         "duration": study.duration,
         "samples": study.samples,
-        "controllers": controllers_said(model, controllers),
+        "controllers": controller_arguments(model, controllers),
     }
-    parameters = asked_of(model, asked | model_parameters(request, mechanism, kept) | how)
+    parameters = command_provenance(model, requested | model_parameters(request, mechanism, kept) | how)
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     if run is not full:
@@ -106,7 +106,7 @@ def _run_held(
         data = beside_full(data, motion_dataset(full, options=options), *sizes)
     summary = motion_summary(data)
     write_numbers(data, summary, folder)
-    tell(summary, lambda out: _report(out, summary), as_json=request.json)
+    print_results(summary, lambda out: _report(out, summary), as_json=request.json)
     finished = run.solution.status in DONE_STATUSES
     try:
         place = write_drawn_run(data, folder, request, began)

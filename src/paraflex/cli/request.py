@@ -21,7 +21,7 @@ from paraflex.tracking import TrackingTask
 from paraflex.validity import to_blame
 
 
-def asked_model(choice: ModelChoice) -> Model:
+def requested_model(choice: ModelChoice) -> Model:
     """Load the requested model, with the values of --set."""
     found = {}
     for text in choice.settings:
@@ -34,7 +34,7 @@ def asked_model(choice: ModelChoice) -> Model:
     return load(choice.name, set=found)
 
 
-def asked_of(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
+def command_provenance(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
     """Return the provenance of a command: parameters of the model, its file, --set and the settings of the run."""
     source = {"mechanism": model.source, "set": dict(model.settings)}
     if may_be_outside():
@@ -98,7 +98,7 @@ def acting_controllers(model: Model, request: RunRequest) -> tuple[ControllerDes
     return found
 
 
-def controllers_said(model: Model, acting: Sequence[ControllerDescription]) -> list[str]:
+def controller_arguments(model: Model, acting: Sequence[ControllerDescription]) -> list[str]:
     """Return the controllers of a run as values of --controller."""
     return [one.name for one in acting] or ([NONE] if model.study.controllers else [])
 

@@ -41,10 +41,10 @@ def plain_console(*, stderr: bool = False) -> Console:
 
 def warn_of(console: Console, findings: Iterable[Finding], whose: str = "") -> None:
     """Print a line for each finding, which begins with `whose`."""
-    from paraflex.results.doubts import doubt_lines  # imports xarray, which descriptions of mechanisms do not need
+    from paraflex.results.findings import finding_lines  # imports xarray, which descriptions of mechanisms do not need
 
     findings = list(findings)
-    for line in doubt_lines(findings):
+    for line in finding_lines(findings):
         console.print(f"{whose}{line}", soft_wrap=True)
     printed(findings)
 

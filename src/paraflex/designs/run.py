@@ -104,10 +104,10 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     Abandoned
         The task was abandoned by `watch`.
     """
-    for name, wanted in setting.versions.items():
-        if versions()[name] != wanted:
+    for name, version in setting.versions.items():
+        if versions()[name] != version:
             raise InputError(
-                f"a worker has {name} {versions()[name]}, the sweep was begun with {wanted}", field="--cluster",
+                f"a worker has {name} {versions()[name]}, the sweep was begun with {version}", field="--cluster",
                 remedy="give workers the same installation: results must not depend on the worker",
             )  # fmt: skip
     rows, kept = [_blank(setting, task, mode) for mode in setting.modes], {}
@@ -115,7 +115,7 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
         planned, options = ready(setting, task)
     except Exception as error:
         for row in rows:
-            row |= trouble(error)
+            row |= error_row(error)
         return Outcome(task, rows)
     for row in rows:
         measured, run = measured_mode(planned, row["mode"], options, setting.metrics, watch)
@@ -187,7 +187,7 @@ def table_schema(setting: Setting, members: Members) -> pa.Schema:
     return pa.schema(fields)
 
 
-def trouble(error: Exception) -> Row:
+def error_row(error: Exception) -> Row:
     """Return status, reason and time reached of a run that an error ended."""
     if isinstance(error, InputError):
         return {"status": STATUS_INVALID, "reason": str(error)}
@@ -281,7 +281,7 @@ def measured_mode(
         raise
     # An unexpected error of one design is recorded in its row and does not end the sweep.
     except Exception as error:
-        return trouble(error), None
+        return error_row(error), None
     return row, run
 
 

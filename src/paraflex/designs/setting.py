@@ -17,7 +17,7 @@ from paraflex.designs.own_statics import check_of_statics
 from paraflex.designs.samples import Varied
 from paraflex.designs.schema import SweepTable, VaryTable
 from paraflex.designs.units import check_unit_of
-from paraflex.equilibria.given import chosen_over
+from paraflex.equilibria.conditions import chosen_over
 from paraflex.errors import InputError, suggestion
 from paraflex.files import Model, library_names, model_from
 from paraflex.files.expressions import ExpressionError, evaluate
@@ -33,7 +33,7 @@ from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
 from paraflex.results.following import Part
 from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS
-from paraflex.validity import doubtful_numbers
+from paraflex.validity import implausible_numbers
 
 # Default limit of attempted steps, so that a single design with violent motion does not delay a study.
 DESIGN_MOST_STEPS = 200_000
@@ -114,9 +114,9 @@ class Setting:
     @cached_property
     def identity(self) -> str:
         """Digest of the common settings of all runs, part of their ids."""
-        asked = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
+        settings = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
         more = [name for name in ("balanced", "statics") if getattr(self, name)]
-        return digest([dict(self.data), *asked, *more])
+        return digest([dict(self.data), *settings, *more])
 
     def numbers(self, values: tuple[float, ...]) -> list[tuple[Place, float | int]]:
         """Return all places in the data that a design sets, with their values."""
@@ -154,7 +154,7 @@ class Setting:
         model = model_from(dict(self.data), self.source)
         parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
         duration = None if self.has_path or self.statics else own_duration(model, self.duration)
-        return Verdict([*doubtful_numbers(model.mechanism, duration), *parts])
+        return Verdict([*implausible_numbers(model.mechanism, duration), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
         """Return the integration options of a design: its own, else those of the study, else those of its file.
@@ -224,9 +224,9 @@ def digest(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def _with_statics(model: Model, said: Mapping[str, Any]) -> Model:
+def _with_statics(model: Model, changes: Mapping[str, Any]) -> Model:
     """Return the model with its [statics] table, if any, overridden by that of the study."""
-    data = dict(model.parameters) | {"statics": chosen_over(model.parameters.get("statics", {}), said)}
+    data = dict(model.parameters) | {"statics": chosen_over(model.parameters.get("statics", {}), changes)}
     try:
         return replace(model_from(data, model.source, model.text), settings=model.settings)
     except InputError as error:

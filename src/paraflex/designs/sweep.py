@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.campaign import (
     TRAJECTORIES,
@@ -38,7 +38,7 @@ from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, is_row_of, lost
 from paraflex.designs.samples import Varied, check_varied, designs
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
-from paraflex.equilibria.given import conditions
+from paraflex.equilibria.conditions import conditions
 from paraflex.errors import InputError
 from paraflex.files import Model, model_from
 from paraflex.folders import check_inside
@@ -126,7 +126,7 @@ class SweptResult(KeptResult):
         return self.sweep.complete
 
 
-@given_as("a sweep", "a SweepStudy")
+@named_in_errors("a sweep", "a SweepStudy")
 @dataclass(frozen=True)
 class SweepStudy(Study["SweepResult"]):
     """Parameter sweep of a mechanism: its settings, parameters and designs.

@@ -188,7 +188,7 @@ def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
 
 def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float]]:
     """Return records of loads: constant components as numbers, profiles in time as signal numbers."""
-    signals, made = iter(inputs_of(mechanism).loads), []
+    signals, records = iter(inputs_of(mechanism).loads), []
     for load in mechanism.loads:
         record: dict[str, float] = dict.fromkeys(("x_signal", "y_signal", "torque_signal"), -1)
         record["marker"] = packer.add_marker(load.point)
@@ -198,8 +198,8 @@ def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float
                 record[signal] = next(signals)
             else:
                 record[number] = given
-        made.append(record)
-    return made
+        records.append(record)
+    return records
 
 
 def _modal_rows(body: BodyCoordinates) -> Array:

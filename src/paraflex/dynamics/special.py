@@ -42,7 +42,7 @@ class Special(NamedTuple):
     drives: str = ""
 
 
-def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, wanted: Array) -> Special:
+def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, target: Array) -> Special:
     """Find whether the branches of a motion meet at a pose.
 
     Velocities v0 + x n, n the null vector of the rows, have accelerations if w Phi''(v0 + x n) = 0, a quadratic
@@ -68,7 +68,7 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
     null = scipy.linalg.null_space(scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-300), 1e-9)
     if null.shape[1] != 1:
         return Special()
-    v, along = system.units * np.linalg.lstsq(scaled, wanted, rcond=1e-9)[0], system.units * null[:, 0]
+    v, along = system.units * np.linalg.lstsq(scaled, target, rcond=1e-9)[0], system.units * null[:, 0]
 
     def missing(x: float, v: Array = v) -> Array:
         return found.conflict(second_rates(system, signals, t, q, v + x * along, np.zeros(system.n)))
@@ -77,9 +77,9 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
     k = int(np.argmax(np.abs(curvature)))
     if abs(curvature[k]) <= _ROUNDING * system.row_units[found.dropped[k]]:
         return Special()
-    drives = barred_drives(system, q, found)
-    barred = found.conflict(-wanted[: system.m])[k]
-    if abs(barred) > _ROUNDING * np.max(np.abs(wanted)):
+    drives = blocked_drives(system, q, found)
+    barred = found.conflict(-target[: system.m])[k]
+    if abs(barred) > _ROUNDING * np.max(np.abs(target)):
         return Special(
             f"a dead centre, the limit of reach, with {drives}, where prescribed motions are not at rest", _BESIDE
         )
@@ -118,7 +118,7 @@ def branches_from_rest(system: System, signals: Signals, t: float, q: Array) -> 
     return bool(found.velocities) and not found.drives
 
 
-def barred_drives(system: System, q: Array, found: Dependence) -> str:
+def blocked_drives(system: System, q: Array, found: Dependence) -> str:
     """List prescribed motions that take part in dependences of rows, with values of their joints; empty for none."""
     units, rows = system.row_units, set()
     for k, row in enumerate(found.dropped):

@@ -238,7 +238,7 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     _, rate = system.constraints(signals, time, q)
     given = _given_velocities(system, start, q)
     C = scipy.sparse.csr_matrix(scipy.sparse.vstack([constraint_jacobian(system, q), *(entry.row for entry in given)]))
-    wanted = np.concatenate([-rate, [entry.value for entry in given]])
+    target = np.concatenate([-rate, [entry.value for entry in given]])
     units = np.concatenate([system.row_units, [entry.unit for entry in given]])
     if set(start.rates) == set(system.index):
         v = np.zeros(system.n)
@@ -248,19 +248,19 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     else:
         for stiffness in (VELOCITY_STIFFNESS, 0.0):
             change = least_change(link_metric(system, q, stiffness), C, units)
-            v = project(change, np.zeros(system.n), lambda v: C @ v - wanted)
+            v = project(change, np.zeros(system.n), lambda v: C @ v - target)
             # Flexures move by bending alone: with stiff links their projection is too ill-conditioned.
-            missed, largest = (float(np.max(np.abs(each) / units, initial=0.0)) for each in (C @ v - wanted, wanted))
+            missed, largest = (float(np.max(np.abs(each) / units, initial=0.0)) for each in (C @ v - target, target))
             if missed <= _SLIP * _SMALL_TERMS * largest:
                 break
-    slip = np.abs(C @ v - wanted)
+    slip = np.abs(C @ v - target)
     # Residual relative to the terms of each row, lengths in sizes of the mechanism.
-    size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted)) / units
+    size = np.maximum(abs(C) @ np.abs(v), np.abs(target)) / units
     bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SMALL_TERMS)
     if np.any(bad):
         _refuse_velocities(system, given, slip, bad)
     fields = [entry.field for entry in given]
-    found = special_start(system, signals, time, q, C, wanted)
+    found = special_start(system, signals, time, q, C, target)
     if found.cause:
         raise InputError(found.cause, field=fields[0] if fields else "start", remedy=found.remedy)
     try:
@@ -268,10 +268,10 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     except InconsistentConstraintsError as error:
         # The branches are known without the velocity that contradicts them.
         for k, one in enumerate(fields):
-            others = np.arange(len(wanted)) != system.m + k
-            found = special_start(system, signals, time, q, C[others], wanted[others])
+            others = np.arange(len(target)) != system.m + k
+            found = special_start(system, signals, time, q, C[others], target[others])
             for branch in found.velocities:
-                if np.all(np.abs(C @ branch - wanted) < _PRINTED * units * np.max(np.abs(wanted))):
+                if np.all(np.abs(C @ branch - target) < _PRINTED * units * np.max(np.abs(target))):
                     return branch
             if found.cause:
                 problem = f"on neither branch of {found.cause}"

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import scipy
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.joint_coordinates import marker_position
@@ -45,7 +45,7 @@ _LARGEST_DEFLECTION = 0.1
 VELOCITY_STIFFNESS = 1e9
 
 
-@given_as("a state", "a state, as dynamics.consistent_state makes it")
+@named_in_errors("a state", "a state, as dynamics.consistent_state makes it")
 @dataclass(frozen=True)
 class State:
     """State of a system: time [s], coordinates q (n,) and velocities v (n,)."""
@@ -317,8 +317,8 @@ def consistent_state(
             v = project_velocity(system, signals, time, q, velocity)
         check_accelerations(system, signals, time, q, v)
     except InconsistentConstraintsError as error:
-        wanted = -system.constraints(signals, time, q)[1]
-        found = special_start(system, signals, time, q, system.jacobian(q), wanted)
+        target = -system.constraints(signals, time, q)[1]
+        found = special_start(system, signals, time, q, system.jacobian(q), target)
         if not found.cause:
             raise
         raise InconsistentConstraintsError(f"{found.cause},", error.moment, remedy=found.remedy) from None
@@ -338,8 +338,8 @@ def check_accelerations(system: System, signals: Signals, t: float, q: Array, v:
         cause = "prescribed motions begin at rest at a change point, from which two branches lead on,"
         raise InconsistentConstraintsError(cause, Moment(t, 0), remedy="start beside this pose, or in motion")
     rest = np.zeros(system.n)
-    wanted = second_rates(system, signals, t, q, v, rest)
-    if np.any(wanted):
+    target = second_rates(system, signals, t, q, v, rest)
+    if np.any(target):
         left = partial(second_rates, system, signals, t, q, v)
         found = project(constraint_change(system, q), rest, left)
-        refuse_conflict(system, "accelerations", t, q, wanted, left(found))
+        refuse_conflict(system, "accelerations", t, q, target, left(found))

@@ -10,8 +10,8 @@ from paraflex.control.laws.described import TABLE, ControllerDescription, check_
 from paraflex.control.laws.described_laws import LAWS
 from paraflex.errors import InputError, renamed, within
 from paraflex.files.expressions import evaluate_parameters
+from paraflex.files.field_values import changed_fields, inexpressible
 from paraflex.files.profiles import components_table, read_components
-from paraflex.files.said import fields_said, unsayable
 from paraflex.files.schema import ControllerTable, ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.loads import InTime
@@ -60,7 +60,7 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
     InputError
         Reference that cannot be expressed in a file.
     """
-    said = {"type": one.law.kind} | fields_said(one.law) | fields_said(one, "name", "law")
+    said = {"type": one.law.kind} | changed_fields(one.law) | changed_fields(one, "name", "law")
     if isinstance(one.reference, Mapping):
         try:
             said["reference"] = {
@@ -68,5 +68,5 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
             }
         except (InputError, KeyError):
             remedy = "give numbers or expressions of the time"
-            raise unsayable(f"{TABLE}.{one.name}.reference", dict(one.reference), remedy) from None
+            raise inexpressible(f"{TABLE}.{one.name}.reference", dict(one.reference), remedy) from None
     return said

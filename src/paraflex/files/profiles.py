@@ -116,8 +116,8 @@ def _try(profile: TimeProfile, duration: float | None) -> None:
 
 def quantities(entry: PrescribedTable) -> set[str]:
     """Return which of "angle" and "displacement" occur in a [prescribed.NAME] table."""
-    said: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
-    return {name for table in said for name in ("angle", "displacement") if getattr(table, name) is not None}
+    tables: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
+    return {name for table in tables for name in ("angle", "displacement") if getattr(table, name) is not None}
 
 
 def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
@@ -139,7 +139,7 @@ def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
             last = {quantity: _piece(pieces[-1])}
             before = zip(ends, pieces, strict=False)
             return {"pieces": [*({"until": end, quantity: _piece(piece)} for end, piece in before), last]}
-    raise _no_words(profile)
+    raise _inexpressible_profile(profile)
 
 
 def read_components(
@@ -225,7 +225,7 @@ def components_table(components: Sequence[InTime], quantity: str) -> dict[str, A
         Profiles that cannot be expressed in a file, or components with different pieces or times.
     """
 
-    def said(values: Sequence[Any]) -> Any:
+    def in_file(values: Sequence[Any]) -> Any:
         return list(values) if quantity == "force" else values[0]
 
     tables = [profile for profile in components if isinstance(profile, TabulatedProfile)]
@@ -243,12 +243,12 @@ def components_table(components: Sequence[InTime], quantity: str) -> dict[str, A
         table = {"table": [[*row] for row in zip(times, *columns, strict=True)]}
         return table | ({"interpolation": kind.value} if tables[0].linear else {})
     if not pieces:
-        return {quantity: said([_piece(profile) for profile in components])}
+        return {quantity: in_file([_piece(profile) for profile in components])}
     ends = pieces[0].ends
     if any(profile.ends != ends for profile in pieces):
         raise _unlike(components)
     rows = [
-        said(
+        in_file(
             [_piece(profile.pieces[k] if isinstance(profile, PiecewiseProfile) else profile) for profile in components]
         )
         for k in range(len(ends) + 1)
@@ -287,10 +287,10 @@ def _piece(profile: InTime) -> float | str:
         return (
             float(profile.angle) if profile.speed == 0.0 else f"{float(profile.angle)!r} + {float(profile.speed)!r} * t"
         )
-    raise _no_words(profile)
+    raise _inexpressible_profile(profile)
 
 
-def _no_words(profile: TimeProfile) -> InputError:
+def _inexpressible_profile(profile: TimeProfile) -> InputError:
     return InputError(
         "a model file cannot express this profile", field="profile", value=type(profile).__name__,
         remedy="give a ConstantSpeed, ExpressionProfile, PiecewiseProfile of these, or TabulatedProfile of its values",

@@ -186,8 +186,8 @@ def _is_listed(file: Path) -> bool:
         finish_change(folder)
         manifest = read_manifest(folder)
         if manifest is not None:
-            wanted = manifest.files.get(file.absolute().relative_to(folder).as_posix())
-            return wanted is None or wanted == digest_of(file)
+            expected = manifest.files.get(file.absolute().relative_to(folder).as_posix())
+            return expected is None or expected == digest_of(file)
     return True
 
 

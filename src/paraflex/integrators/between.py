@@ -47,18 +47,18 @@ class Between(NamedTuple):
     ----------
     times : (k,) array
         Sample times [s].
-    asked : (k,) array of bool
+    stored : (k,) array of bool
         Whether a sample is kept.
     """
 
     times: Array
-    asked: NDArray[np.bool_]
+    stored: NDArray[np.bool_]
 
     def kept(self, solution: Solution) -> Solution:
         """Return the solution with the requested samples and the state at an event only."""
         keep = np.ones(solution.t.size, dtype=bool)
         count = solution.t.size - bool(solution.event)
-        keep[:count] = self.asked[:count]
+        keep[:count] = self.stored[:count]
         names = ("t", "q", "v", "a", "multipliers", "kinetic_energy", "strain_energy", "work")
         return replace(solution, **{name: getattr(solution, name)[keep] for name in names})
 

@@ -14,7 +14,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, dependence
 from paraflex.dynamics.rank import DENSE_ROWS
-from paraflex.dynamics.special import barred_drives
+from paraflex.dynamics.special import blocked_drives
 from paraflex.errors import (
     ConstraintDriftError,
     IntegrationError,
@@ -22,7 +22,7 @@ from paraflex.errors import (
     SingularPositionError,
     SliderOffBeamError,
 )
-from paraflex.integrators import native, outside
+from paraflex.integrators import external_run, native
 from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
 from paraflex.integrators.between import samples_too_few, with_between
 from paraflex.integrators.crossing import Crossing, advance, samples_until
@@ -34,7 +34,7 @@ from paraflex.integrators.options import IntegrationOptions, loose_tolerance, re
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Instant, Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
-from paraflex.integrators.watch import Breakdown, bent_too_far, come_apart, least_norm
+from paraflex.integrators.watch import Breakdown, excessive_bending, least_norm, open_constraint
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import ERROR_TEST, FINISHED, LAW_FAILED, NO_CONVERGENCE, NOT_FINITE, PAUSED
 from paraflex.kernel.sampled import SampledLaw, no_law
@@ -185,7 +185,7 @@ class Integration:
         problem = make_problem(system, signals, initial, times, knots)
         self._between = with_between(problem.times, system.n, problem.limits) if samples and own else None
         if self._between is not None:
-            problem = replace(problem, times=self._between.times, asked=self._between.asked)
+            problem = replace(problem, times=self._between.times, stored=self._between.stored)
         self._ends = BeamEnds(system, initial)
         self._crossing: Crossing | None = None
         self._functions = (*event_functions(system, initial.q, options.events), *self._ends.functions)
@@ -300,8 +300,8 @@ class Integration:
         self._looked = run.attempts
         largest = run.figures().constraint_position_max
         limits = (run.dependent_rows, self._tolerance, options.treatment, largest)
-        bent = bent_too_far(self._system, now.q)
-        drift = come_apart(self._system, problem.signals, now.t, now.q, *limits)
+        bent = excessive_bending(self._system, now.q)
+        drift = open_constraint(self._system, problem.signals, now.t, now.q, *limits)
         self._broken, self._drifts = bent or drift, drift is not None and bent is None
         if self._broken is None and self._code == PAUSED and self._pace.look(run.attempts, now.t):
             self._broken = too_slow(self._system, now, problem.initial.q, self._pace, problem.jumps)
@@ -316,7 +316,7 @@ class Integration:
         # Near a singular position either Newton's iteration or the error test may fail first.
         stopped = code != PAUSED and self._broken is None
         lost, near = (dependence(system, now.q, part) for part in (_NEARLY_DEPENDENT, _NEAR))
-        drives = "" if self._drifts or near.dropped.size <= run.dependent_rows else barred_drives(system, now.q, near)
+        drives = "" if self._drifts or near.dropped.size <= run.dependent_rows else blocked_drives(system, now.q, near)
         error = ConstraintDriftError if self._drifts else IntegrationError
         if drives:
             error, cause = SingularPositionError, f"the constraints lose rank at the limit of reach, {drives},"
@@ -343,7 +343,7 @@ def _failed(error: IntegrationError) -> IntegrationError:
 
 def prepare(problem: Problem, options: IntegrationOptions) -> Run:
     """Prepare a run of a problem by the method of the options, without starting it."""
-    kind = native if isinstance(options.method, NativeMethod) else outside
+    kind = native if isinstance(options.method, NativeMethod) else external_run
     return kind.prepare(problem, options)
 
 
@@ -359,8 +359,8 @@ def _singular_start(run: Run, times: Array, q: Array) -> Array:
     """Return the start as a passage (2, 1) if more rows are dependent there than at the next sample, else (2, 0)."""
     initial, system = run.problem.initial.time, run.problem.system
     if run.dependent_at_start and times.size > 1 and times[0] == initial and system.m <= DENSE_ROWS:
-        lasting = dependence(system, q[1]).dropped.size
-        return np.full((2, int(lasting < run.dependent_at_start)), initial)
+        permanent = dependence(system, q[1]).dropped.size
+        return np.full((2, int(permanent < run.dependent_at_start)), initial)
     return np.zeros((2, 0))
 
 

@@ -261,10 +261,10 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     state = make_march(system.n, system.m, scheme.c.size, inputs_of(system.mechanism).acting, treatment)
     state.q[:], state.v[:] = initial.q, initial.v
     workspace = system.workspace()
-    at_start = lasting = _mark_redundant(system, initial.q, workspace)
+    at_start = permanent = _mark_redundant(system, initial.q, workspace)
     beside = beside_singular(problem) if at_start else None
     if beside is not None:
-        lasting = _mark_redundant(system, beside.q, workspace)
+        permanent = _mark_redundant(system, beside.q, workspace)
     # In steps shorter than the second value, rows near dependence are negligible.
     first = FIRST_STEP * span if beside is None else 0.1 * beside.later
     state.clock[TIME], state.clock[STEP] = initial.time, min(first, options.max_step)
@@ -293,7 +293,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         limit_h=phase * problem.limits.steps,
         turn_in_step=phase,
         dependent_part=ROUNDING_PART,
-        dependent_rows=lasting,
+        dependent_rows=permanent,
     )
     return NativeRun(
         problem=problem,
@@ -302,7 +302,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         state=state,
         workspace=workspace,
         slow=system.workspace(),
-        samples=empty_samples(problem.times, system, problem.asked),
+        samples=empty_samples(problem.times, system, problem.stored),
         aside=system.workspace(),
         law=no_law(),
         dependent_at_start=at_start,

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.kinematics.profiles import CruiseProfile, TrapezoidalProfile
@@ -39,7 +39,7 @@ class PathMotion(NamedTuple):
     acceleration: Array
 
 
-@given_as(
+@named_in_errors(
     "a path",
     "a path: Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath, or one that "
     "paraflex.load_path reads",
@@ -63,9 +63,9 @@ class Path(Protocol):
         ...
 
 
-given_as("a path", "a path such as Polygon, Line, Circle or PointPath; or with a model the name of one of its paths")(
-    Path | str
-)
+named_in_errors(
+    "a path", "a path such as Polygon, Line, Circle or PointPath; or with a model the name of one of its paths"
+)(Path | str)
 
 
 @dataclass(frozen=True)

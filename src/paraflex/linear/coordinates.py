@@ -227,10 +227,10 @@ class Coordinates:
         lam[number >= 0] = point.multipliers[number[number >= 0]]
         whole = self.tangency.at(point._replace(multipliers=lam))
 
-        def rows(wanted: NDArray[np.int64]) -> RowTangents:
-            at = np.searchsorted(whole.rows, wanted)
+        def rows(selected: NDArray[np.int64]) -> RowTangents:
+            at = np.searchsorted(whole.rows, selected)
             parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
-            return RowTangents(*rows_of(at, *parts), number=number[wanted])
+            return RowTangents(*rows_of(at, *parts), number=number[selected])
 
         # No row of the fictitious pin is a constraint, whether it is a coordinate or not.
         pin = [k for k, name in enumerate(names) if name.startswith(_TASK)]

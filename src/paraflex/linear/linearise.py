@@ -166,7 +166,7 @@ def sought_motion(
         motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
         point = motion.point(0 if at is None else nearest_sample(motion.times, at))
         return Sought(chart, point, ports, motion.about)
-    mechanism = Mechanism.made_of(source)
+    mechanism = Mechanism.from_source(source)
     chosen = mode_of(source, mechanism, mode)
     ports = ports_of(mechanism, chosen, forces, prescribed)
     given = start if start is not None or isinstance(source, Mechanism) else source.start
@@ -216,7 +216,7 @@ def linear_model(
         outputs=tuple(Variable(sensor.name, mechanism.sensor_unit(sensor)) for sensor in ports.sensors),
         minimal=minimal,
         rows=rows,
-        wanted=(np.arange(len(inputs)), np.arange(len(ports.sensors))),
+        selected=(np.arange(len(inputs)), np.arange(len(ports.sensors))),
     )
 
 

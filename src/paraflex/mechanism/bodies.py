@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import TypeVar
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.errors import InputError
 from paraflex.fem import (
     AssumedShapes,
@@ -306,7 +306,7 @@ class AssumedModesBeam(DeformableBody):
 
 
 Body = RigidBody | FlexibleBeam | AssumedModesBeam | ModalBody
-given_as("a body")(Body)
+named_in_errors("a body")(Body)
 
 
 def given_shapes(bodies: Iterable[Body]) -> list[str]:

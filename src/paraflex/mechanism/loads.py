@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.joints import PointRef
 from paraflex.mechanism.profiles import TimeProfile, marks
-from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, optional, positive, said
+from paraflex.mechanism.quantities import AT_JOINT, field_metadata, finite, not_negative, optional, positive
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class TorsionalSpring(CheckedFields):
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    stiffness: float = field(metadata=said("the stiffness in N m/rad", positive, "N m/rad, or N/m"))
+    stiffness: float = field(metadata=field_metadata("the stiffness in N m/rad", positive, "N m/rad, or N/m"))
     rest: float = optional(0.0, "the joint's angle at which the spring is free in rad", finite)
 
 
@@ -43,7 +43,7 @@ class TorsionalDamper(CheckedFields):
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    coefficient: float = field(metadata=said("the coefficient in N m s/rad", positive, "N m s/rad, or N s/m"))
+    coefficient: float = field(metadata=field_metadata("the coefficient in N m s/rad", positive, "N m s/rad, or N s/m"))
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,9 @@ class JointFriction(CheckedFields):
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    limit: float = field(metadata=said("the friction torque in N m, or force in N", positive, "N m, or N"))
+    limit: float = field(metadata=field_metadata("the friction torque in N m, or force in N", positive, "N m, or N"))
     speed: float = field(
-        metadata=said("the speed below which it acts as a damper in rad/s or m/s", positive, "rad/s, or m/s")
+        metadata=field_metadata("the speed below which it acts as a damper in rad/s or m/s", positive, "rad/s, or m/s")
     )
 
 
@@ -100,17 +100,17 @@ class LinearSpring(CheckedFields):
     name: str
     a: PointRef
     b: PointRef
-    stiffness: float = field(metadata=said("the stiffness in N/m", not_negative, "N/m"))
+    stiffness: float = field(metadata=field_metadata("the stiffness in N/m", not_negative, "N/m"))
     length: float = optional(0.0, "the free length in m", not_negative, "m")
     damping: float = optional(0.0, "the damping in N s/m", not_negative, "N s/m")
 
 
 InTime = float | TimeProfile
-given_as(
+named_in_errors(
     "a number or a profile in time",
     "a number, or a profile in time: PiecewiseProfile, TabulatedProfile, ExpressionProfile",
 )(InTime)
-given_as("two numbers or profiles in time", "[x, y], each a number or a profile in time")(tuple[InTime, InTime])
+named_in_errors("two numbers or profiles in time", "[x, y], each a number or a profile in time")(tuple[InTime, InTime])
 
 
 def _finite_or_profile(values: InTime | tuple[InTime, ...], field: str) -> None:
@@ -128,7 +128,7 @@ class _Load(CheckedFields):
     unit: ClassVar[str]
 
     name: str
-    point: PointRef = field(metadata=said('"body.point"'))
+    point: PointRef = field(metadata=field_metadata('"body.point"'))
 
     @property
     def components(self) -> tuple[InTime, ...]:
@@ -170,7 +170,7 @@ class PointForce(_Load):
     kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
 
-    force: tuple[InTime, InTime] = field(metadata=said("[x, y] in the ground frame in N", _finite_or_profile))
+    force: tuple[InTime, InTime] = field(metadata=field_metadata("[x, y] in the ground frame in N", _finite_or_profile))
 
 
 @dataclass(frozen=True)
@@ -180,8 +180,8 @@ class AppliedTorque(_Load):
     kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"
 
-    torque: InTime = field(metadata=said("the torque in N m", _finite_or_profile))
+    torque: InTime = field(metadata=field_metadata("the torque in N m", _finite_or_profile))
 
 
 Load = PointForce | AppliedTorque
-given_as("a load")(Load)
+named_in_errors("a load")(Load)

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from paraflex.arguments import checked_arguments, given_as, refused
+from paraflex.arguments import checked_arguments, named_in_errors, refused
 from paraflex.display import Shown
 from paraflex.errors import InputError, as_enum
 from paraflex.fem import ReferenceCondition
@@ -21,7 +21,7 @@ from paraflex.mechanism.quantities import known
 from paraflex.mechanism.tracks import with_meshes
 
 
-@given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
+@named_in_errors("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Mechanism(Members, Shown):
     """Planar mechanism of rigid and flexible bodies, checked on construction.
@@ -103,7 +103,7 @@ class Mechanism(Members, Shown):
         import_module("paraflex.files").Model(self).save(path)
 
     @classmethod
-    def made_of(cls, given: object) -> Mechanism:
+    def from_source(cls, given: object) -> Mechanism:
         """Return the mechanism of a model, or the given mechanism.
 
         Raises
@@ -186,8 +186,8 @@ class Mechanism(Members, Shown):
         """
         reference = None if reference is None else as_enum(ReferenceCondition, reference, "reference")
         curvature = None if curvature is None else as_enum(Curvature, curvature, "curvature")
-        asked = {"elements": elements, "reference": reference, "curvature": curvature}
-        changes: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+        chosen = {"elements": elements, "reference": reference, "curvature": curvature}
+        changes: dict[str, Any] = {name: value for name, value in chosen.items() if value is not None}
         for what in changes:
             self._refuse_given_shapes(what)
         if reduction is not None:

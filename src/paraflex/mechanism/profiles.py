@@ -12,7 +12,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import scipy
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 
@@ -27,7 +27,7 @@ _DEGREE = 5
 _MOST_STOPS = 200
 
 
-@given_as("a profile", "a profile in time: ConstantSpeed, PiecewiseProfile, TabulatedProfile or SampledAngle")
+@named_in_errors("a profile", "a profile in time: ConstantSpeed, PiecewiseProfile, TabulatedProfile or SampledAngle")
 @runtime_checkable
 class TimeProfile(Protocol):
     """Profile of an angle, a travel, a force or a torque in time."""

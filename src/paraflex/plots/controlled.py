@@ -16,7 +16,16 @@ from paraflex.plots.labels import display_unit, symbol
 from paraflex.plots.runs import finish_over_time, largest_columns, listed_panels
 from paraflex.plots.selection import names_of, one_run
 from paraflex.plots.style import BLACK, COLOURS, look_of
-from paraflex.results.controllers import GIVEN, INPUT, OUTPUT, READINGS, SAMPLE, WANTED, ControllerData, controllers_of
+from paraflex.results.controllers import (
+    APPLIED,
+    INPUT,
+    OUTPUT,
+    READINGS,
+    REQUESTED,
+    SAMPLE,
+    ControllerData,
+    controllers_of,
+)
 
 _WANTED = {"linestyle": (0, (1, 1)), "linewidth": 0.8}
 _LIMIT = {"color": "0.5", "linestyle": (0, (5, 1.5)), "linewidth": 0.7, "zorder": 1.0}
@@ -54,7 +63,7 @@ def controllers(data: xr.Dataset, mode: str | None = None) -> Figure:
 
 def _panels(one: ControllerData) -> Iterator[_Panel]:
     """Yield the panels of a controller: torques, then readings, each by unit; signals that a mode lacks are omitted."""
-    for dim, variable in ((OUTPUT, GIVEN), (INPUT, READINGS)):
+    for dim, variable in ((OUTPUT, APPLIED), (INPUT, READINGS)):
         names = [name for name in names_of(one.data, dim)
                  if np.isfinite(one.data[variable].sel({dim: name}).values).any()]  # fmt: skip
         for unit in dict.fromkeys(one.units[name] for name in names):
@@ -74,8 +83,8 @@ def _draw_torques(panel: Axes, shown: _Panel) -> None:
     """
     one = shown.controller
     times = one.data[SAMPLE].values
-    for k, name in enumerate(_largest(shown, GIVEN)):
-        given, wanted = (one.data[variable].sel({OUTPUT: name}).values for variable in (GIVEN, WANTED))
+    for k, name in enumerate(_largest(shown, APPLIED)):
+        given, wanted = (one.data[variable].sel({OUTPUT: name}).values for variable in (APPLIED, REQUESTED))
         panel.step(times + one.delay, given, where="post", label=symbol(name), **look_of(k))
         panel.step(times, wanted, where="post", color=COLOURS[k % len(COLOURS)], **_WANTED)
         for bound in one.limits[name]:

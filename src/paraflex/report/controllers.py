@@ -16,13 +16,13 @@ from paraflex.report.curves import DOTTED, MOST_SAMPLES, look
 from paraflex.report.page import Chart, Curve, Look, Panel
 from paraflex.report.text import NO_VALUE, count, number, table
 from paraflex.results.controllers import (
+    APPLIED,
     CONTROLLERS,
-    GIVEN,
     INPUT,
     OUTPUT,
     READINGS,
+    REQUESTED,
     SAMPLE,
-    WANTED,
     ControllerData,
     controller_figures,
     controllers_of,
@@ -97,7 +97,7 @@ def _charts(one: ControllerData, runs: Sequence[str]) -> Iterator[Chart]:
     note = "Solid: torques as they act, after the delay and until the next sample; dotted: those of the law."
     label = f"torque [{', '.join(dict.fromkeys(one.units[name] for name in names_of(few, OUTPUT)))}]"
     torques = Chart(f"torques-{one.name}", f"Controller {one.name}: torques", label, note=note)
-    given, wanted = (few[name].transpose(..., SAMPLE, OUTPUT).values for name in (GIVEN, WANTED))
+    given, wanted = (few[name].transpose(..., SAMPLE, OUTPUT).values for name in (APPLIED, REQUESTED))
     curves = []
     for r in range(len(runs)):
         for p, motor in enumerate(names_of(few, OUTPUT)):

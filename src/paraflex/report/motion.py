@@ -30,7 +30,7 @@ from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, run_command_line, verdict_word
 from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import count, number, pairs, quantity
-from paraflex.results.doubts import doubt_lines, finished, verdict_of
+from paraflex.results.findings import finding_lines, finished, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
@@ -64,7 +64,7 @@ def motion_page(data: xr.Dataset) -> Page:
         no_film="" if moving else NO_SHAPES,
         notes=[
             *([] if status == "complete" else [f"{status}: {data['message'].item()}"]),
-            *doubt_lines(verdict_of(data)),
+            *finding_lines(verdict_of(data)),
         ],
         remarks=list(filter(None, [validity_line({"": validity_summary(data)})])) if finished(data).all() else [],
     )

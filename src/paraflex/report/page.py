@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.errors import InputError
 from paraflex.folders import added_to
 from paraflex.plots.themes import THEMES
@@ -205,7 +205,7 @@ class Panel:
     charts: Sequence[Chart]
 
 
-@given_as("a page", "what tracking_page or motion_page returns")
+@named_in_errors("a page", "what tracking_page or motion_page returns")
 @dataclass(frozen=True)
 class Page:
     """Content of a report.

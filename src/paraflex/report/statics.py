@@ -19,7 +19,7 @@ from paraflex.report.page import Page
 from paraflex.report.provenance import asked, model_words, repeated, verdict_word
 from paraflex.report.statics_charts import statics_panels
 from paraflex.report.text import NO_VALUE, number, table
-from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.findings import finding_lines, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.statics_data import as_samples, statics_summary, step_kinds
 from paraflex.results.statics_rows import (
@@ -71,7 +71,7 @@ def statics_page(data: xr.Dataset) -> Page:
         no_film="" if film else NO_SHAPES,
         notes=[
             *([] if summary["status"] == "complete" else [f"{summary['status']}: {summary['message']}"]),
-            *doubt_lines(verdict_of(data)),
+            *finding_lines(verdict_of(data)),
         ],
         remarks=list(filter(None, [validity_line({"": summary["validity"]}), no_buckling(data)])),
     )

@@ -41,7 +41,7 @@ from paraflex.report.provenance import asked, common_facts, run_command_line, su
 from paraflex.report.reduced_runs import reduction_tables
 from paraflex.report.text import NO_VALUE, count, number, quantity, table
 from paraflex.results.controllers import controller_names
-from paraflex.results.doubts import doubt_lines, finished, verdict_of
+from paraflex.results.findings import finding_lines, finished, verdict_of
 from paraflex.results.following import headline, ranked_by_motion
 from paraflex.results.formulas import during_motion
 from paraflex.results.kinds import check_kind
@@ -101,7 +101,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         selected=runs.index(default_mode(data)),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=[*_unfinished(data, failed or {}), *doubt_lines(verdict_of(data))],
+        notes=[*_unfinished(data, failed or {}), *finding_lines(verdict_of(data))],
         remarks=[valid] if valid else [],
     )
 

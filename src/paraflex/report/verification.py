@@ -22,7 +22,7 @@ from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Chart, Curve, Page, Panel
 from paraflex.report.provenance import asked, common_facts, summary_beside, verdict_word, verify_command_line
 from paraflex.report.text import NO_VALUE, common_unit, count, number, quantity, table
-from paraflex.results.doubts import doubt_lines
+from paraflex.results.findings import finding_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.kinds import check_kind
 
@@ -120,7 +120,7 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
         selected=runs.models.index(reference),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=doubt_lines(map(Finding.from_dict, summary.get("verdict", {}).get("findings", [])))
+        notes=finding_lines(map(Finding.from_dict, summary.get("verdict", {}).get("findings", [])))
         + [
             f"Mode {name}, {printed(model)}: {one['message']}"
             for name, mode in summary["modes"].items()

@@ -74,7 +74,7 @@ class Metric:
         Whether the metric is zero without motors.
     kept_of : tuple of str, optional
         Kinds of runs for which the metric is kept unless metrics are named; by default all that have it.
-    judged : bool
+    ranked : bool
         Whether a smaller value is better, so that designs can be selected by the metric.
     member : str
         Single member of an expression; empty for other metrics.
@@ -93,7 +93,7 @@ class Metric:
     runs: tuple[str, ...] = (PATH, MOTION)
     of_motors: bool = False
     kept_of: tuple[str, ...] | None = None
-    judged: bool = True
+    ranked: bool = True
     member: str = ""
 
     def value(self, traces: Any) -> Any:
@@ -272,11 +272,11 @@ def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = Fa
 
 def _of_statics(
     name: str, meaning: str, unit: str, formula: Callable[[Any], Any], label: str = "", *, each: str = "",
-    whole: bool = False, judged: bool = False,
+    whole: bool = False, ranked: bool = False,
 ) -> Metric:  # fmt: skip
     """Return a metric of static equilibria, by default one that does not rank designs."""
     return Metric(name, meaning, unit, _as_it_is(formula), label, each=each, smooth=False, whole=whole,
-                  runs=(STATICS,), judged=judged)  # fmt: skip
+                  runs=(STATICS,), ranked=ranked)  # fmt: skip
 
 
 def _peaks(values: Trace) -> Trace:
@@ -368,7 +368,7 @@ _ALL = (
     Metric("stress_max", "largest magnitude of the stress in any beam, bending and axial; sections need outer_fibre",
            "Pa", _stress, "largest stress", runs=_ANY),
     Metric("safety_factor_min", "least strength over stress of any beam; materials need strength", "1",
-           _safety_factor, "least safety factor", runs=_ANY, judged=False),
+           _safety_factor, "least safety factor", runs=_ANY, ranked=False),
     Metric("section_moment_max", "largest magnitude of the bending moment in any beam", "N m",
            _section_moment, "largest bending moment", runs=_ANY),
     Metric("total_mass", "mass of all bodies", "kg",
@@ -386,20 +386,20 @@ _ALL = (
     _of_statics("travel", "change of each named coordinate from the start to the last step, with its sign", "rad",
                 lambda x: x.travel[-1], each=COORDINATE),
     _of_statics("travel_max", "largest magnitude of each named coordinate's change in all steps", "rad",
-                lambda x: _peaks(x.travel), "largest travel", each=COORDINATE, judged=True),
+                lambda x: _peaks(x.travel), "largest travel", each=COORDINATE, ranked=True),
     _of_statics("effort", "force or torque at each named coordinate at the last step: given, or what holds or moves it",
                 "N m", lambda x: x.effort[-1], "force or torque", each=COORDINATE),
     _of_statics("effort_max", "largest magnitude of the force or torque at each named coordinate", "N m",
-                lambda x: _peaks(x.effort), "largest force or torque", each=COORDINATE, judged=True),
+                lambda x: _peaks(x.effort), "largest force or torque", each=COORDINATE, ranked=True),
     _of_statics("stiffness", "stiffness of each requested coordinate at the last step", "N m/rad",
                 lambda x: x.stiffness[-1], each=DIRECTION),
     _of_statics("stiffness_min", "least stiffness of each requested coordinate, of all steps", "N m/rad",
                 lambda x: np.min(x.stiffness, axis=0), "least stiffness", each=DIRECTION),
     _of_statics("compliance", "displacement by a unit force of each requested coordinate at the last step; infinite "
                 "past buckling", "rad/N/m",
-                lambda x: x.compliance[-1], each=DIRECTION, judged=True),
+                lambda x: x.compliance[-1], each=DIRECTION, ranked=True),
     _of_statics("compliance_max", "largest compliance of each requested coordinate, of all steps", "rad/N/m",
-                lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, judged=True),
+                lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, ranked=True),
     _of_statics("frequency", "lowest natural frequency at the last step, held and moved coordinates fixed", "Hz",
                 lambda x: x.frequency[-1], "lowest natural frequency at the last step"),
     _of_statics("frequency_free", "lowest natural frequency at the last step, moved coordinates released", "Hz",
@@ -411,7 +411,7 @@ _ALL = (
     _of_statics("limit_load", "load factor at the first limit point; NaN for none", "1",
                 lambda x: x.limit_load),
     _of_statics(UNSTABLE, "unstable equilibria among the steps", "1", lambda x: x.unstable_steps, whole=True,
-                judged=True),
+                ranked=True),
 )  # fmt: skip
 
 METRICS: Mapping[str, Metric] = _Metrics({metric.name: metric for metric in _ALL})

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.findings import Finding
-from paraflex.results.doubts import MODE, keep_findings, verdict_of
+from paraflex.results.findings import MODE, keep_findings, verdict_of
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.numbers import finite_or_none
 

@@ -24,7 +24,7 @@ from paraflex.dynamics.joint_loads import (
     undetermined_loads,
 )
 from paraflex.dynamics.points import point_motion
-from paraflex.equilibria.given import Coordinate
+from paraflex.equilibria.conditions import Coordinate
 from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
 from paraflex.motion import MotionRun

@@ -9,7 +9,7 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.results.controllers import controller_figures
-from paraflex.results.doubts import verdict_of
+from paraflex.results.findings import verdict_of
 from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures

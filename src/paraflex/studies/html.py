@@ -8,7 +8,7 @@ from typing import Any
 from paraflex.designs.sweep import SweepResult
 from paraflex.display import facts, page, sentence, table, view
 from paraflex.results import summary
-from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.findings import finding_lines, verdict_of
 from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 from paraflex.results.metrics import metric_label
 from paraflex.results.validity import validity_line
@@ -56,7 +56,7 @@ def study_html(result: StudyResult) -> str:
     title += ", interrupted" if result.interrupted else ""
     holds = validity_line({name: mode.get("validity") for name, mode in found["modes"].items()})
     why += [sentence(holds)] if holds else []
-    return page(title, *map(sentence, doubt_lines(verdict_of(result.data))), table(heads, rows), *why)
+    return page(title, *map(sentence, finding_lines(verdict_of(result.data))), table(heads, rows), *why)
 
 
 @view.register(SweepResult)
@@ -99,7 +99,7 @@ def identification_html(result: IdentificationResult) -> str:
             name,
             result.start[name],
             value,
-            _given(deviations.get(name), reasons.get(name, result.stopped)),
+            _value_or_reason(deviations.get(name), reasons.get(name, result.stopped)),
             result.bounds.get(name, ""),
         )
         for name, value in result.values.items()
@@ -215,7 +215,7 @@ def _state(finished: bool, interrupted: bool) -> str:
     return "interrupted" if interrupted else "finished" if finished else "not finished"
 
 
-def _given(deviation: float | None, reason: str) -> float | str:
+def _value_or_reason(deviation: float | None, reason: str) -> float | str:
     return f"not given: {reason}" if deviation is None else deviation
 
 

@@ -26,11 +26,11 @@ from paraflex.validity.indicators import (
     of_linear,
     of_second_order,
 )
-from paraflex.validity.numbers import doubtful_numbers as doubtful_numbers, mechanism_size as mechanism_size
+from paraflex.validity.numbers import implausible_numbers as implausible_numbers, mechanism_size as mechanism_size
 from paraflex.validity.plausibility import (
     Driven as Driven,
-    doubtful_results as doubtful_results,
-    doubtful_stresses as doubtful_stresses,
+    implausible_results as implausible_results,
+    implausible_stresses as implausible_stresses,
     moved_far as moved_far,
     shared_loads as shared_loads,
     stiff_modes as stiff_modes,

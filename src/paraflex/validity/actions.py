@@ -28,7 +28,7 @@ LONG = 5.0
 _G = 9.81
 
 
-def doubtful_actions(mechanism: Mechanism, size: float, mass: float, times: Array) -> Iterator[Finding]:
+def implausible_actions(mechanism: Mechanism, size: float, mass: float, times: Array) -> Iterator[Finding]:
     """Yield findings about joints, springs, friction, damping and loads, from the description alone.
 
     Parameters

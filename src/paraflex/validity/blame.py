@@ -9,7 +9,7 @@ from paraflex.errors import IntegrationError, SliderOffBeamError
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.mechanism import Mechanism
-from paraflex.validity.numbers import doubtful_numbers
+from paraflex.validity.numbers import implausible_numbers
 
 # Codes of findings about numbers that make motions impossible; other doubtful numbers do not make a run fail.
 _CODES = ("modulus", "density", "material", "mass", "beam-thin", "beam-thick", "section-turned", "size", "angle")
@@ -25,7 +25,7 @@ def to_blame(mechanism: Mechanism, text: str = "") -> str:
     text : str
         Text of the error: numbers of the bodies it names come first.
     """
-    found = [one for one in doubtful_numbers(mechanism) if one.code in _CODES]
+    found = [one for one in implausible_numbers(mechanism) if one.code in _CODES]
     return most_likely(found, [body.name for body in mechanism.bodies if f" {body.name} " in f" {text} "])
 
 

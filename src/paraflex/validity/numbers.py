@@ -18,7 +18,7 @@ from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalB
 from paraflex.mechanism.bodies import Body, Material
 from paraflex.mechanism.poses import local_points
 from paraflex.mechanism.tracks import longest_element, too_long, tracks
-from paraflex.validity.actions import doubtful_actions
+from paraflex.validity.actions import implausible_actions
 
 Place = tuple[float, float]
 Beam = FlexibleBeam | AssumedModesBeam
@@ -62,7 +62,7 @@ _TURN = 2.0 * math.pi
 _LOOKS = 201
 
 
-def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> list[Finding]:
+def implausible_numbers(mechanism: Mechanism, duration: float | None = None) -> list[Finding]:
     """Return findings about a mechanism's own numbers, from its description alone.
 
     Parameters
@@ -87,7 +87,7 @@ def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> lis
         elif isinstance(body, RigidBody):
             found += _rigid(body, size)
     found += [*_masses(mechanism, size), *_hinges(mechanism), *_one_place(mechanism, size), *_meshes(mechanism)]
-    return _shared([*found, *doubtful_actions(mechanism, size, mechanism_mass(mechanism), times)])
+    return _shared([*found, *implausible_actions(mechanism, size, mechanism_mass(mechanism), times)])
 
 
 def _meshes(mechanism: Mechanism) -> Iterator[Finding]:

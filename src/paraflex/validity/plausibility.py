@@ -23,7 +23,7 @@ from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_pose
 from paraflex.units import STRESS, speed_text
 from paraflex.validity.bending import bending_of
 from paraflex.validity.blame import most_likely
-from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, doubtful_numbers, mechanism_size
+from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, implausible_numbers, mechanism_size
 
 # Energy error relative to the largest energy: the library's runs have up to 3e-4 with the default tolerance. Energies
 # below the second fraction of weight times size count as zero.
@@ -41,7 +41,7 @@ TORQUE = 30.0
 # Force of a joint or drive, torques divided by the size, relative to the same; wide enough for the slowest mechanisms.
 FORCE = 1000.0
 # Fraction of the samples in which a force is at least as large, to exclude poles at singular configurations.
-_LASTING = 0.1
+_PEAK_SHARE = 0.1
 # Rotation of a body while loops are closed above which another angle or elbow was likely intended [rad].
 _FAR = 0.5
 # Condition number of the actuation matrix that explains large torques.
@@ -90,7 +90,7 @@ class _Where(NamedTuple):
 
     def blame(self, *bodies: str) -> str:
         """Return the number of the model that is the most likely cause, named bodies first; empty for none."""
-        return most_likely(doubtful_numbers(self.mechanism), bodies)
+        return most_likely(implausible_numbers(self.mechanism), bodies)
 
 
 def stiff_modes(system: System) -> Iterator[Finding]:
@@ -104,7 +104,7 @@ def stiff_modes(system: System) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def doubtful_results(
+def implausible_results(
     system: System, solution: Solution, driven: Driven | None = None, mechanism: Mechanism | None = None
 ) -> list[Finding]:
     """Return findings about implausible results of a run.
@@ -146,7 +146,7 @@ def doubtful_results(
     return found
 
 
-def doubtful_stresses(system: System, solution: Solution) -> list[Finding]:
+def implausible_stresses(system: System, solution: Solution) -> list[Finding]:
     """Return findings about the stresses of equilibria or a run."""
     return list(_overstressed(_Where("", system.described), system, solution))
 
@@ -156,12 +156,12 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
     names = [joint.name for joint in system.described.joints]
     found = undetermined_loads(system, names, solution.q, solution.acting)
     # Loads have poles at singular configurations.
-    lasting = np.isfinite(solution.multipliers).any(axis=1)
+    regular = np.isfinite(solution.multipliers).any(axis=1)
     drives = [f"prescribed.{one.name}" for one in system.described.prescribed]
     forces, moments, drives_too = (
-        np.any(found.force[lasting], axis=(0, 2)),
-        np.any(found.moment[lasting], axis=0),
-        np.any(found.drive[lasting], axis=0),
+        np.any(found.force[regular], axis=(0, 2)),
+        np.any(found.moment[regular], axis=0),
+        np.any(found.drive[regular], axis=0),
     )
     kinds = ("forces in", names, forces), ("moments in", names, moments), ("torques or forces of", drives, drives_too)
     named = [(kind, ", ".join(itertools.compress(whose, at))) for kind, whose, at in kinds]
@@ -175,7 +175,7 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
+def implausible_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
     """Return findings about the torques and forces of a plan at times t (k,), before a run."""
     return list(_large_torques(_Where(f"mode {driven.mode}", system.mechanism), system, driven, t))
 
@@ -367,10 +367,10 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
     accelerations = np.stack([np.linalg.norm(solution.a[:, body.position], axis=1) for body in system.bodies])
     expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))), solution.t)
     # Entries are NaN at singular configurations, and for rows without multipliers in a method.
-    lasting = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _LASTING, axis=0)
-    lasting[system.packed.rows["kind"] != CONSTRAINT] = 0.0
+    sustained = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _PEAK_SHARE, axis=0)
+    sustained[system.packed.rows["kind"] != CONSTRAINT] = 0.0
     arms = np.array([size if row.endswith(" angle") else 1.0 for row in system.rows])
-    forces = lasting / arms
+    forces = sustained / arms
     k = int(np.argmax(forces))
     if forces[k] > FORCE * (expected + turning / size) > 0.0:
         joint = joint_of_row(system.rows[k])

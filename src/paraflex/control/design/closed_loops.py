@@ -199,11 +199,11 @@ def closed_loop(
     places(sensors or (), plant.outputs, "inputs", "sensor")
     places(motors or (), plant.inputs, "outputs", "motor")
     plant = plant.select(motors, sensors)
-    wanted = (len(plant.outputs), len(plant.inputs))
-    if law.D.shape[::-1] != wanted:
+    shape = (len(plant.outputs), len(plant.inputs))
+    if law.D.shape[::-1] != shape:
         raise InputError(
             f"has {law.D.shape[1]} inputs and {law.D.shape[0]} outputs", field="controller", value=controller,
-            remedy=f"the model has {wanted[0]} sensors, {wanted[1]} motors: name as many, inputs=[...], outputs=[...]",
+            remedy=f"the model has {shape[0]} sensors, {shape[1]} motors: name as many, inputs=[...], outputs=[...]",
         )  # fmt: skip
     return ClosedLoop(plant, law, None if isinstance(model, SampledPlant) else model)
 

@@ -10,7 +10,7 @@ from paraflex.control.design.sampled import SampledPlant
 from paraflex.errors import InputError
 
 # Poles further inside the unit circle than this decay without control.
-_LASTING = 1e-9
+_ON_CIRCLE = 1e-9
 # Least singular value of the balanced [A - z, B] below which a motion is not reached.
 _NOT_REACHED = 1e-11
 _NAMED = 4
@@ -50,7 +50,7 @@ def check_reach(
     columns = columns / max(float(np.linalg.norm(columns)), np.finfo(float).tiny)
     missed = []
     for z in plant.poles:
-        if abs(z) < 1.0 - _LASTING or z.imag < 0.0:
+        if abs(z) < 1.0 - _ON_CIRCLE or z.imag < 0.0:
             continue
         least = np.linalg.svd(np.hstack([A - z * np.eye(len(A)), columns]), compute_uv=False)[-1]
         if least < _NOT_REACHED:

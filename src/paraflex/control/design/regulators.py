@@ -126,7 +126,7 @@ def lqg(
     InputError
         See `lqr`; a free motion or undamped vibration, named by its frequency, that the readings do not show.
     """
-    plant, lasting = disturbed_plant(model, period, delay, coloured or {})
+    plant, persistent = disturbed_plant(model, period, delay, coloured or {})
     regulator = _regulator(plant, deviations, effort, integrators or {}, state_weights)
     measured = tuple(measured)
     C = plant.rows(measured, "measured")
@@ -140,7 +140,7 @@ def lqg(
                          "pf.quantisation_noise(resolution)")  # fmt: skip
     check_reach(plant, C.T, "measured", "is not seen by the readings", "measure more outputs", transposed=True)
     process = _disturbances(plant, regulator, disturbance, effort) + _padded(state_noise, plant, "state_noise")
-    process = process + lasting @ lasting.T
+    process = process + persistent @ persistent.T
     R = np.diag([given[name] ** 2 for name in measured])
     motors = plant.B[:, places(regulator.motors, plant.inputs, "effort", "input")]
     found = kalman_filter(plant.A, motors, C, process, R)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.control.laws.described_laws import LawNames, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 TABLE, NONE = "controller", "none"
 
 
-@given_as("a description of a controller", "a ControllerDescription, as [controller.NAME] of a model file is read")
+@named_in_errors(
+    "a description of a controller", "a ControllerDescription, as [controller.NAME] of a model file is read"
+)
 @dataclass(frozen=True)
 class ControllerDescription(CheckedFields):
     """Sampled controller as a model file describes it: a control law and its signal chain, see `SampledController`.

@@ -40,15 +40,15 @@ class ChainSample(NamedTuple):
     ----------
     readings : (inputs,) array
         Readings after quantisation and filters, before references are subtracted.
-    wanted : (outputs,) array
+    requested : (outputs,) array
         Torques that the law returns.
-    given : (outputs,) array
+    applied : (outputs,) array
         Torques after saturation and rate limiting, which act after the delay.
     """
 
     readings: Array
-    wanted: Array
-    given: Array
+    requested: Array
+    applied: Array
 
 
 class SampledController:
@@ -170,7 +170,7 @@ class SampledController:
         self.found_references: list[Reference | None] = references(self.reference, plant)
         resolution, filters, limits, rates = self.check(plant.inputs, plant.outputs)
         self.resolution: Array = np.array([one or 0.0 for one in resolution])
-        self._filters = [None if given is None else _SettledFilter(given, plant.period) for given in filters]
+        self._filters = [None if given is None else _SteadyStateFilter(given, plant.period) for given in filters]
         most = largest_commands(plant.mechanism, plant.outputs)
         self._lowest = np.maximum([-np.inf if one is None else one[0] for one in limits], -most)
         self._highest = np.minimum([np.inf if one is None else one[1] for one in limits], most)
@@ -180,7 +180,7 @@ class SampledController:
             self.law.start(replace(plant, resolution=resolution) if any(resolution) else plant)
         # Torques with which the law holds an equilibrium act from before the first sample.
         self.holding_torques: Array = np.clip(getattr(self.law, "holding_torques", 0.0), self._lowest, self._highest)
-        self._given: Array = self.holding_torques
+        self._applied: Array = self.holding_torques
 
     @property
     def whole_torque(self) -> bool:
@@ -212,21 +212,21 @@ class SampledController:
         for i, reference in enumerate(self.found_references):
             if reference is not None:
                 errors[i] -= reference(t)
-        said = self.law.step(k, t, errors)
-        if said is None:
+        returned = self.law.step(k, t, errors)
+        if returned is None:
             return None  # As a float array it would be NaN.
-        wanted = real_numbers(said)
-        if wanted is None:
-            return said  # The loop reports the error.
-        if wanted.shape != self._given.shape or not np.all(np.isfinite(wanted)):
-            return wanted
-        given = np.clip(wanted, self._lowest, self._highest)
-        given = np.clip(given, self._given - self._most, self._given + self._most)
-        self._given = given
+        requested = real_numbers(returned)
+        if requested is None:
+            return returned  # The loop reports the error.
+        if requested.shape != self._applied.shape or not np.all(np.isfinite(requested)):
+            return requested
+        applied = np.clip(requested, self._lowest, self._highest)
+        applied = np.clip(applied, self._applied - self._most, self._applied + self._most)
+        self._applied = applied
         if hasattr(self.law, "limited"):
-            self.law.limited(given)
-        self.last = ChainSample(y, wanted, given)
-        return given
+            self.law.limited(applied)
+        self.last = ChainSample(y, requested, applied)
+        return applied
 
 
 class _Function:
@@ -259,7 +259,7 @@ def as_law(given: Any) -> Any:
     )  # fmt: skip
 
 
-class _SettledFilter:
+class _SteadyStateFilter:
     """Transfer function of a sampled signal, in steady state at its first value."""
 
     def __init__(self, given: tuple[Array, Array], period: float) -> None:

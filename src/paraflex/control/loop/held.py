@@ -9,7 +9,7 @@ import numpy as np
 
 from paraflex.actuation import FeedForward
 from paraflex.arrays import Array
-from paraflex.control.loop.amplifiers import Amplifiers, relaxing, with_room
+from paraflex.control.loop.amplifiers import Amplifiers, padded_signal, relaxing
 from paraflex.control.loop.runs import TorqueLog
 from paraflex.control.loop.together import real_numbers
 from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
@@ -72,7 +72,7 @@ class HeldTorques:
         self.planned: FeedForward = replace(planned, signals=known_signals)
         lags = self.amplifiers.lags
         several: list[InputSignals] = [
-            with_room(each) if lag else each for each, lag in zip(known_signals, lags, strict=True)
+            padded_signal(each) if lag else each for each, lag in zip(known_signals, lags, strict=True)
         ]
         signals, knots = pack_signals(system.mechanism, several, end)
         self.signals: Signals = signals
@@ -160,5 +160,5 @@ class HeldTorques:
                 coefficients[pieces, 0] = self.base[pieces] + given[k]
                 continue
             signal = relaxing(self.planned.signals[k], since, begun[k], given[k], lag)
-            whole = with_room(signal, pieces.stop - pieces.start)
+            whole = padded_signal(signal, pieces.stop - pieces.start)
             breaks[pieces], coefficients[pieces] = whole.breaks[:-1], whole.coefficients

@@ -58,9 +58,9 @@ class ControllerRecord:
         Sample times [s].
     readings : (k, inputs) array
         Readings, after quantisation and filters if the controller has such a chain.
-    wanted : (k, outputs) array
+    requested : (k, outputs) array
         Torques that the law returned [N m, N].
-    given : (k, outputs) array
+    applied : (k, outputs) array
         Torques after saturation and rate limiting, applied from t + delay on [N m, N].
     law : str
         Short description of the law.
@@ -81,8 +81,8 @@ class ControllerRecord:
     output_units: tuple[str, ...]
     t: Array
     readings: Array
-    wanted: Array
-    given: Array
+    requested: Array
+    applied: Array
     law: str
     limits: Array
     rates: Array
@@ -91,7 +91,7 @@ class ControllerRecord:
     @property
     def limited(self) -> Array:
         """Whether a limit was active, for each sample (k,)."""
-        return np.any(self.given != self.wanted, axis=1)
+        return np.any(self.applied != self.requested, axis=1)
 
 
 class LawFailure(Exception):
@@ -251,7 +251,7 @@ class Loop:
             raise _not_finite(name, wrong)
         last = getattr(controller, "last", None)
         record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
-        self.kept[k].append((t, record.readings, record.wanted, torques))
+        self.kept[k].append((t, record.readings, record.requested, torques))
         return torques
 
     def keep_last(self) -> None:
@@ -293,10 +293,10 @@ class Loop:
         controller, plant = self.controllers[k], self._plants[k]
         inside = self.inside
         if inside is None:
-            t, readings, wanted, given = list(zip(*self.kept[k], strict=True)) or [()] * 4
+            t, readings, requested, applied = list(zip(*self.kept[k], strict=True)) or [()] * 4
         else:
             kept = (inside.t, inside.readings, inside.wanted, inside.given)
-            t, readings, wanted, given = (each[: inside.counts[SAMPLED]] for each in kept)
+            t, readings, requested, applied = (each[: inside.counts[SAMPLED]] for each in kept)
         law, limits, rates = _bounds(controller, len(plant.outputs))
         return ControllerRecord(
             name=self.names[k],
@@ -308,8 +308,8 @@ class Loop:
             output_units=tuple(units(motor) for motor in plant.outputs),
             t=np.array(t, dtype=float),
             readings=_columns(readings, plant.inputs),
-            wanted=_columns(wanted, plant.outputs),
-            given=_columns(given, plant.outputs),
+            requested=_columns(requested, plant.outputs),
+            applied=_columns(applied, plant.outputs),
             law=law,
             limits=limits,
             rates=rates,
@@ -340,8 +340,8 @@ class Loop:
 
 
 def _raised(name: str, error: Exception) -> LawFailure:
-    said = " ".join(str(error).split())
-    return LawFailure(f'controller "{name}" raised {type(error).__name__}: {said}')
+    message = " ".join(str(error).split())
+    return LawFailure(f'controller "{name}" raised {type(error).__name__}: {message}')
 
 
 def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:

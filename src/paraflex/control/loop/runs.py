@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.arguments import given_as
+from paraflex.arguments import named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.loop.loop_check import unstable_loop
 from paraflex.control.loop.run_loop import ControllerRecord
@@ -43,7 +43,7 @@ class Controlled:
         return self.acting
 
 
-@given_as("a run under controllers", "the run that Simulation.run returns")
+@named_in_errors("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
 class ControlledTracking(Controlled, TrackingRun):
     """Run of a plan under torques that were set at discrete instants."""
@@ -54,12 +54,15 @@ class ControlledTracking(Controlled, TrackingRun):
         return True
 
     @cached_property
-    def doubts(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings on controllers, on events in the run, and on results that are implausible for the mechanism."""
-        return (*unstable_loop(self, self.controllers, self.task.start.time, f"mode {self.mode.name}"), *super().doubts)
+        return (
+            *unstable_loop(self, self.controllers, self.task.start.time, f"mode {self.mode.name}"),
+            *super().findings,
+        )
 
 
-@given_as("a run under controllers", "the run that Simulation.run returns")
+@named_in_errors("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
 class ControlledMotion(Controlled, MotionRun):
     """Run without a path under torques that were set at discrete instants."""
@@ -72,9 +75,9 @@ class ControlledMotion(Controlled, MotionRun):
         return True
 
     @cached_property
-    def doubts(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings on controllers, on events in the run, and on implausible results."""
-        return (*unstable_loop(self, self.controllers, float(self.solution.t[0]), ""), *super().doubts)
+        return (*unstable_loop(self, self.controllers, float(self.solution.t[0]), ""), *super().findings)
 
 
 class TorqueLog:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.actuation import FeedForward, actuation_condition
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.described import ControllerDescription
@@ -40,7 +40,7 @@ from paraflex.validity import warn, with_blame
 _ROUNDING = 1e-12
 
 
-@given_as("a saved simulation", "what Simulation.save returned")
+@named_in_errors("a saved simulation", "what Simulation.save returned")
 @dataclass(frozen=True)
 class Saved:
     """Complete state of a simulation: see `Simulation.save`.
@@ -132,7 +132,9 @@ class Simulation:
     ) -> None:
         self._options = _projecting(choose(method, options))
         self.task: TrackingTask | None = source if isinstance(source, TrackingTask) else None
-        self.mechanism: Mechanism = source.mechanism if isinstance(source, TrackingTask) else Mechanism.made_of(source)
+        self.mechanism: Mechanism = (
+            source.mechanism if isinstance(source, TrackingTask) else Mechanism.from_source(source)
+        )
         self.mode: ActuationMode = _mode(self.mechanism, mode)
         names = [motor.name for motor in self.mechanism.motors]
         self.motors: tuple[str, ...] = tuple(name for name in names if name in self.mode.motors)
@@ -341,13 +343,15 @@ class Simulation:
             self._integration.interrupt()
         except LawFailure as failure:
             cause, moment = str(failure), Moment(self.time, self._integration.run.attempts)
-            partial = self._made(replace(self._integration.solution(), status="failed", message=f"{cause} at {moment}"))
+            partial = self._as_controlled(
+                replace(self._integration.solution(), status="failed", message=f"{cause} at {moment}")
+            )
             raise ControllerError(cause, moment, partial, "correct the controller") from failure.__cause__
-        made = self.result()
+        controlled = self.result()
         if warning:
-            warn(made.validity, "" if self.task is None else f"mode {self.mode.name}")
-            warn_of(made.doubts, ResultWarning)
-        return made
+            warn(controlled.validity, "" if self.task is None else f"mode {self.mode.name}")
+            warn_of(controlled.findings, ResultWarning)
+        return controlled
 
     def _begin(self, controllers: Sequence[Any]) -> None:
         """Restart under controllers, or in open loop if there are none."""
@@ -391,16 +395,16 @@ class Simulation:
             solution = self._integration.solution()
         except IntegrationError as error:
             with_blame(error, self.mechanism)
-            error.partial = self._made(error.partial)
+            error.partial = self._as_controlled(error.partial)
             raise
         if solution.status == "complete" and self.time < self.end:
             message = f"as far as t = {self.time:.6g} s"
             solution = replace(solution, status="interrupted", message=message)
-        return self._made(solution)
+        return self._as_controlled(solution)
 
     # --- Internals ---
 
-    def _made(self, solution: Solution) -> ControlledTracking | ControlledMotion:
+    def _as_controlled(self, solution: Solution) -> ControlledTracking | ControlledMotion:
         """Return the run with a solution."""
         k = solution.t.size - bool(solution.event)
         slack = _ROUNDING * (self.end - self._initial.time)

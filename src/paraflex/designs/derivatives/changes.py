@@ -157,7 +157,7 @@ class Change:
 
     def _near(self, setting: Setting, task: Task, k: int) -> tuple[Stencil, list[Described]]:
         """Return a stencil and the designs at its points: on both sides, or on one side if the other is invalid."""
-        trouble: ParaflexError | None = None
+        failure: ParaflexError | None = None
         for stencil in STENCILS:
             try:
                 near = [_described(setting, _moved(task, k, place * self.size)) for place in stencil.places]
@@ -165,9 +165,9 @@ class Change:
                 self.beside: list[System] = [build_system(each.mechanism) for each in (near[0], near[-1])]
                 return stencil, near
             except ParaflexError as error:
-                trouble = trouble or error
+                failure = failure or error
         raise InputError(
-            f"has no derivative: a nearby value fails, {trouble}", field=f"vary.{self.name}", value=task.values[k],
+            f"has no derivative: a nearby value fails, {failure}", field=f"vary.{self.name}", value=task.values[k],
             remedy="leave it out",
         )  # fmt: skip
 

@@ -60,7 +60,7 @@ class Confidence:
     weakest: Mapping[str, float]
 
     @property
-    def telling(self) -> bool:
+    def identifiable(self) -> bool:
         """Whether the targets distinguish the parameters: the condition number is below `ILL_CONDITIONED`."""
         return self.condition < ILL_CONDITIONED
 
@@ -75,7 +75,7 @@ class Confidence:
             "correlation": [[x if math.isfinite(x) else None for x in row] for row in self.correlation.tolist()],
             "condition": self.condition if math.isfinite(self.condition) else None,
             "weakest": dict(self.weakest),
-            "telling": self.telling,
+            "telling": self.identifiable,
         }
 
     def withheld(self, reason: str) -> Confidence:
@@ -139,7 +139,7 @@ def confidence(
         found = replace(found, correlation=covariance / np.outer(spread, spread))
     if freedom <= 0:
         return found.withheld(f"{len(targets)} targets are too few to judge {len(free)} free parameters")
-    if not found.telling:
+    if not found.identifiable:
         return found.withheld("the targets cannot tell the parameters apart")
     left = _standard_deviation(targets, design, freedom)
     scaled = left * spread * study.per_unit(design.design)[free]
@@ -182,8 +182,8 @@ def checked(
         if not all(each.complete for each in sides):
             return found.withheld(f"a design one standard error away does not run (along {along} of the ranges)")
         change = 0.5 * (residuals(targets, sides[1]) - residuals(targets, sides[0]))
-        said = jacobian @ step
-        off = float(np.linalg.norm(change - said) / np.linalg.norm(said))
+        predicted = jacobian @ step
+        off = float(np.linalg.norm(change - predicted) / np.linalg.norm(predicted))
         if not off <= _AGREES:
             return found.withheld(
                 f"one standard error along {along} of the ranges changes the residuals by {1e2 * off:.0f} % otherwise "

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
@@ -81,7 +81,7 @@ class IdentificationResult(SearchResult):
         }
 
 
-@given_as("an identification", "what load_identification returns")
+@named_in_errors("an identification", "what load_identification returns")
 @dataclass(frozen=True)
 class IdentificationStudy(DesignStudy[IdentificationResult]):
     """Identification of the parameters that reproduce targets, by bounded least squares; see `DesignStudy`.

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
@@ -56,7 +56,7 @@ class OptimisationResult(SearchResult):
     holds_limits: bool
 
 
-@given_as("an optimisation", "what load_optimisation returns")
+@named_in_errors("an optimisation", "what load_optimisation returns")
 @dataclass(frozen=True)
 class OptimisationStudy(DesignStudy[OptimisationResult]):
     """Optimisation study: the search for the design with the least objective; see `DesignStudy`.

@@ -90,16 +90,16 @@ class DesignProblem:
         away = x - self._safe
         return _REFUSED * self.cost * away / (float(np.linalg.norm(away)) or 1.0)
 
-    def room(self, x: Array) -> Array:
+    def slack(self, x: Array) -> Array:
         """Compute the margins of metrics to their limits (limits,); -1 if the design fails."""
         design = self.at(x)
-        return self.objective.room(design) if design.complete else np.full(len(self.objective.limits), -1.0)
+        return self.objective.slack(design) if design.complete else np.full(len(self.objective.limits), -1.0)
 
-    def room_slope(self, x: Array) -> Array:
+    def slack_gradient(self, x: Array) -> Array:
         """Compute the derivatives of `room` (limits, parameters); zero if the design fails."""
         design = self.at(x)
         if design.complete:
-            return self.objective.room_slope(design, self.slopes(design))
+            return self.objective.slack_gradient(design, self.slopes(design))
         return np.zeros((len(self.objective.limits), x.size))
 
     def _score(self, design: Evaluated) -> float:

@@ -132,11 +132,11 @@ def sampled_start(
     study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[Evaluated]], Evaluated | None]
 ) -> Evaluated:
     """Evaluate the start and the initial samples of the study, and return the best of them."""
-    number, asked = study.search.samples, [study.start]
+    number, batch = study.search.samples, [study.start]
     if number:
         points = designs(study.parameters, SOBOL, number, study.search.seed)
-        asked += [study.design(study.unit(point)) for point in points.tolist()]
-    done = evaluate(asked)
+        batch += [study.design(study.unit(point)) for point in points.tolist()]
+    done = evaluate(batch)
     return best(done) or done[0]
 
 
@@ -156,8 +156,8 @@ def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | No
     InputError
         Exact derivatives requested but not available, or not used by the method.
     """
-    asked = study.search.gradients
-    if asked == DIFFERENCES or (asked is None and (run is not None or not study.least_squares)):
+    requested = study.search.gradients
+    if requested == DIFFERENCES or (requested is None and (run is not None or not study.least_squares)):
         return None
     method = study.search.method or DEFAULT_SEARCH
     if not study.least_squares and method not in WITH_SLOPES:
@@ -166,7 +166,7 @@ def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | No
             remedy=f"leave it out, or choose from {', '.join(WITH_SLOPES)}",
         )  # fmt: skip
     reason = no_exact_slopes(study)
-    if reason and asked == EXACT:
+    if reason and requested == EXACT:
         raise InputError(
             f"no exact derivatives ({reason})", field="search.gradients", value=EXACT, remedy='write "differences"'
         )

@@ -11,7 +11,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.campaign import Row
 from paraflex.campaign.study import Result
-from paraflex.designs.run import Outcome, Task, trouble
+from paraflex.designs.run import Outcome, Task, error_row
 from paraflex.designs.setting import Setting
 from paraflex.errors import InputError, NumericalError
 from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
@@ -188,6 +188,6 @@ def run_slopes(
                 row |= {slope_column(column, name): x for name, x in zip(setting.names, found, strict=True)}
         # After any failure of exact derivatives, finite differences are used.
         except Exception as error:
-            row[NO_SLOPES] = trouble(error)["reason"]
+            row[NO_SLOPES] = error_row(error)["reason"]
         rows.append(row)
     return Outcome(task, rows)

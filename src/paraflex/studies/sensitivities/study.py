@@ -207,8 +207,8 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
         """Return a digest of everything that the results depend on."""
         setting = self.setting
         places = [[list(place) for place in places] for places in setting.places]
-        asked = [setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics]
-        return digest([*asked, dict(self.at)])
+        parts = [setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics]
+        return digest([*parts, dict(self.at)])
 
     def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], Sensitivities]:
         no_workers(workers, "paths are differentiated one after another")

@@ -24,7 +24,7 @@ from paraflex.report.choice import MOST_RUNS, Picked, best_runs
 from paraflex.report.search import IDENTIFICATION
 from paraflex.report.survey import Step
 from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
-from paraflex.results.doubts import doubt_lines
+from paraflex.results.findings import finding_lines
 from paraflex.results.metrics import VALIDITY
 from paraflex.writing import read_json
 
@@ -146,7 +146,7 @@ def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> l
     notes = []
     if not designs.complete.any():
         notes.append("No run is complete: there is nothing to draw. The reasons are given below.")
-    notes += doubt_lines(study.setting.verdict())
+    notes += finding_lines(study.setting.verdict())
     beyond = int(np.sum(designs.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
     if beyond:
         notes.append(f"{beyond_limits(beyond)}.")

@@ -8,8 +8,8 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError
+from paraflex.integrators.external_methods import IDA, ExternalMethod, SciPyMethod
 from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
-from paraflex.integrators.guests import IDA, Guest, SciPyMethod
 from paraflex.integrators.method import Treatment
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
@@ -29,7 +29,7 @@ _REFERENCE = 1e-4
 _SLICE_TIME = 0.1
 
 
-class OutsideRun:
+class ExternalRun:
     """Run by an external solver: a `Run`."""
 
     def __init__(self, problem: Problem, options: IntegrationOptions, stepper: Stepper) -> None:
@@ -156,7 +156,7 @@ class OutsideRun:
         self.reached = i + 1
 
 
-def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
+def prepare(problem: Problem, options: IntegrationOptions) -> ExternalRun:
     """Prepare a run.
 
     Raises
@@ -170,12 +170,12 @@ def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
             field="automatic_gains", value=True,
             remedy="give alpha and beta, or choose another method",
         )  # fmt: skip
-    return OutsideRun(problem, options, _stepper(problem, options))
+    return ExternalRun(problem, options, _stepper(problem, options))
 
 
 def _stepper(problem: Problem, options: IntegrationOptions) -> Stepper:
     method = options.method
-    assert isinstance(method, Guest)
+    assert isinstance(method, ExternalMethod)
     tolerance = options.tolerance_for(problem.system)
     error = method.error_factor * tolerance
     if method.multistep:
