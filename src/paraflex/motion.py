@@ -34,7 +34,7 @@ from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, implausible_results, moved_far, warn, with_blame
+from paraflex.validity import Validity, assess, implausible_results, moved_far, warn, with_likely_cause
 
 # Remedy for a balanced start that is not found.
 UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
@@ -184,7 +184,7 @@ def simulate_motion(
             system, signals, state, times, knots=knots, options=options, samples=samples, on_progress=on_progress
         )
     except IntegrationError as error:
-        error.partial = _run(system, times, values, with_blame(error, mechanism).partial)
+        error.partial = _run(system, times, values, with_likely_cause(error, mechanism).partial)
         raise
     run = _run(system, times, values, solution)
     if warning:

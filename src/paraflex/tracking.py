@@ -43,7 +43,7 @@ from paraflex.integrators.between import SAMPLES
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode, standing
 from paraflex.mechanism.profiles import stops
-from paraflex.validity import Driven, Following, Validity, assess, implausible_results, warn, with_blame
+from paraflex.validity import Driven, Following, Validity, assess, implausible_results, warn, with_likely_cause
 
 # Times closer than this fraction of the run are merged: a knot beside a sample would force a step of almost zero
 # length.
@@ -456,7 +456,7 @@ def _drive(
             on_progress=on_progress,
         )  # fmt: skip
     except IntegrationError as error:
-        with_blame(error, (task.whole or task).mechanism)
+        with_likely_cause(error, (task.whole or task).mechanism)
         raise
 
 
@@ -497,7 +497,7 @@ def _drive_and_hold(
             begun=driven, samples=times.size, on_progress=on_progress,
         )  # fmt: skip
     except IntegrationError as error:
-        error.partial = whole(with_blame(error, (task.whole or task).mechanism).partial)
+        error.partial = whole(with_likely_cause(error, (task.whole or task).mechanism).partial)
         raise
     return whole(held)
 

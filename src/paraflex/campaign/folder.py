@@ -105,7 +105,7 @@ def open_campaign(
             if journal.noted(SCHEMA_KEY) is None:
                 journal.note(SCHEMA_KEY, schema.serialize().to_pybytes())
             if not (folder / STUDY).exists():
-                with held.amended() as new:
+                with held.added_files() as new:
                     write_json(new / STUDY, study, remedy=GO_ON)
             yield Campaign(held, journal)
 

@@ -174,7 +174,7 @@ class KeptResult(Result):
         OutputError
             Files that cannot be written.
         """
-        with hold_folder(self.folder, self.kept_as, remedy=GO_ON) as held, held.amended() as new:
+        with hold_folder(self.folder, self.kept_as, remedy=GO_ON) as held, held.added_files() as new:
             yield new
 
     def write_files(self, folder: Path) -> None:

@@ -20,7 +20,7 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, print_results
 from paraflex.cli.integration import check_stops, model_parameters
 from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
-from paraflex.cli.request import acting_controllers, at_fault, command_provenance, controller_arguments, plan_study
+from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
 from paraflex.cli.tables import (
     below_tolerance,
     failures,
@@ -169,7 +169,7 @@ def _simulated(console: Console, model: Model, along: _Along) -> StudyResult:
             result = along.study.run(on_progress=report)
     except InputError as error:
         warn_of(console, collected(along.study.findings), along.whose)
-        raise at_fault(error, model) from None
+        raise located_error(error, model) from None
     if result.data is None:
         warn_of(console, collected(along.study.findings), along.whose)
         failures(console, result, along.whose)

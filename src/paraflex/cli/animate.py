@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
 from paraflex.cli import COMPLETE, signals
-from paraflex.cli.bars import bars, begun_late
+from paraflex.cli.bars import bars, stopped_at_end
 from paraflex.cli.commands.results import AnimateRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.tables import plain_console
@@ -65,7 +65,7 @@ def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film])
         progress.start()
         progress.update(bar, completed=done, total=total)
 
-    with begun_late(progress):
+    with stopped_at_end(progress):
         return draw(report)
 
 

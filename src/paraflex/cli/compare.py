@@ -38,7 +38,7 @@ def compare_command(request: CompareRequest) -> int:
             # The numbers are written first: a failure while figures are drawn does not lose them.
             with folder.replaced() as new:
                 write_json(new / "compare.json", found.to_dict())
-            with folder.amended() as new:
+            with folder.added_files() as new:
                 save_overlays(found, new / "figures")
     print_results(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, findings=())
     if request.out is not None and not request.json:

@@ -11,7 +11,7 @@ from paraflex.cli.compare_methods_tables import print_comparison
 from paraflex.cli.ending import exit_code, print_location, print_results
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import blaming, command_provenance, find_mode, find_path, plan_study, requested_model
+from paraflex.cli.request import command_provenance, find_mode, find_path, locating_errors, plan_study, requested_model
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
@@ -99,7 +99,7 @@ def _motion(model: Model, request: CompareMethodsRequest) -> Case:
     study = own_motion(model, request.plan)
     mechanism = standing(model.mechanism, study.assembly, model.start)
     assert study.duration is not None
-    with blaming(model):
+    with locating_errors(model):
         start = start_of(model, mechanism, study.assembly, balanced=False)
         if start is None:
             start = consistent_state(build_system(mechanism), mechanism.assembly(study.assembly))

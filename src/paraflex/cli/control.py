@@ -13,7 +13,14 @@ from paraflex.cli.commands.requests import flagged
 from paraflex.cli.control_tables import print_laws
 from paraflex.cli.ending import exit_code, print_location, print_results
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import blaming, command_provenance, find_modes, find_paths, plan_study, requested_model
+from paraflex.cli.request import (
+    command_provenance,
+    find_modes,
+    find_paths,
+    locating_errors,
+    plan_study,
+    requested_model,
+)
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
@@ -32,7 +39,7 @@ Paths = dict[str, Path]
 def compare_laws_command(request: CompareLawsRequest) -> int:
     """Run every control law in every mode, write the table and its figure; return the exit code."""
     model = requested_model(request.model)
-    with blaming(model):
+    with locating_errors(model):
         laws = laws_of(model, request.controllers)
     paths, modes = find_paths(model, request.paths), find_modes(model, request.modes)
     # All checks that need no computation come before the long runs.

@@ -128,7 +128,7 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "assemblies": [assembly.name for assembly in mechanism.assemblies],
         "modes": [mode.name for mode in mechanism.modes],
         "paths": list(model.paths),
-        **{group.words: list(map(_equation, members)) for group, members in grouped(mechanism) if group.relates},
+        **{group.plural_noun: list(map(_equation, members)) for group, members in grouped(mechanism) if group.relates},
         "sensors": [sensor.name for sensor in mechanism.sensors],
     }
 

@@ -14,10 +14,10 @@ from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.requests import conflict, flagged
 from paraflex.cli.request import (
-    blaming,
     command_provenance,
     find_modes,
     find_path,
+    locating_errors,
     of_assembly,
     plan_study,
     requested_model,
@@ -256,7 +256,7 @@ def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
         )
     compile_kernels_for(model.mechanism, plain_console(stderr=True).print)
     until = study.duration if request.along is not None or not request.at else request.at
-    with blaming(model):
+    with locating_errors(model):
         return simulate_motion(
             model.mechanism, until, samples=_SAMPLES, torques=study.torques,
             start=model.start or request.assembly or study.assembly,

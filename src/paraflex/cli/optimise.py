@@ -27,7 +27,7 @@ def _report(members: Members, console: Console, result: OptimisationResult) -> N
         unit = printed_unit(metric_unit(name, members))
         rows.append([name, unit.name, *(f"{unit.factor * one:.6g}" for one in (result.start_metrics[name], value))])
     console.print(plain_table("", "unit", numbers=("start", "best"), rows=rows))
-    for name, limit in [] if result.holds_limits else result.sought["limits"]:
+    for name, limit in [] if result.holds_limits else result.goal["limits"]:
         unit, value = printed_unit(metric_unit(name, members)), result.metrics[name]
         if value > limit:
             of, over = (f"{unit.factor * one:.6g} {unit.name}".rstrip() for one in (limit, value - limit))

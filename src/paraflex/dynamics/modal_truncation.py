@@ -85,7 +85,7 @@ def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
         if "angle" in joint.holds
     ]
     causes += [
-        (f"the {group.word} {one.name}", joint)
+        (f"the {group.noun} {one.name}", joint)
         for group, members in grouped(mechanism)
         for one in (() if group.measures else members)
         for _, name, _ in joints_named(one)

@@ -12,6 +12,7 @@ import scipy
 
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
+from paraflex.dynamics.change_points import branches_from_rest, change_point_at
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.joint_coordinates import marker_position
 from paraflex.dynamics.projection import (
@@ -27,7 +28,6 @@ from paraflex.dynamics.projection import (
 )
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
-from paraflex.dynamics.special import branches_from_rest, special_start
 from paraflex.dynamics.system import System, build_system
 from paraflex.errors import AssemblyError, InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import Signals
@@ -318,7 +318,7 @@ def consistent_state(
         check_accelerations(system, signals, time, q, v)
     except InconsistentConstraintsError as error:
         target = -system.constraints(signals, time, q)[1]
-        found = special_start(system, signals, time, q, system.jacobian(q), target)
+        found = change_point_at(system, signals, time, q, system.jacobian(q), target)
         if not found.cause:
             raise
         raise InconsistentConstraintsError(f"{found.cause},", error.moment, remedy=found.remedy) from None

@@ -149,7 +149,7 @@ class Branch:
         raise self._ended(turned, furthest)
 
     def _ended(self, turned: bool, furthest: float) -> EquilibriumError:
-        given = self.equations.conditions.words
+        given = self.equations.conditions.description
         if turned:
             cause = (
                 f"no equilibrium beyond load factor {furthest:.6g} ({given}): the branch turns back there, "
@@ -172,7 +172,7 @@ class Branch:
                 remedy="leave it out, or hold and move less",
             )
         return EquilibriumError(
-            f"no equilibrium is found beyond load factor {at.s:.6g} ({self.equations.conditions.words})",
+            f"no equilibrium is found beyond load factor {at.s:.6g} ({self.equations.conditions.description})",
             remedy="joints may not allow more, or links touch parts that the model lacks: give less",
         )
 

@@ -96,7 +96,7 @@ class Conditions(NamedTuple):
         return tuple(dict.fromkeys((*self.moved, *self.loads, *self.measured, *self.held)))
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Displacements and loads in words: "travel of stage.T.x by 0.01 m and -20 N at stage.T.y"."""
         travels = [f"travel of {one.name} by {value:g} {one.unit}" for one, value in self.moved.items()]
         loads = [f"{value:g} {one.effort_unit} at {one.name}" for one, value in self.loads.items()]

@@ -56,8 +56,8 @@ class ExpressionProfile:
     def __post_init__(self) -> None:
         with expressed_in(self.field, self.text):
             check_in_time(self.text, self.parameters)
-        spoken_of = names_in(self.text)
-        used = {name: value for name, value in self.parameters.items() if name in spoken_of}
+        occurring = names_in(self.text)
+        used = {name: value for name, value in self.parameters.items() if name in occurring}
         object.__setattr__(self, "parameters", used)
 
     def evaluate(self, t: Array) -> Values:

@@ -67,7 +67,7 @@ class ResultsFolder:
             yield new
 
     @contextmanager
-    def amended(self) -> Iterator[Path]:
+    def added_files(self) -> Iterator[Path]:
         """Yield a temporary folder for files that are added to the results."""
         with self._changed(lambda name: False) as new:
             yield new
@@ -185,6 +185,6 @@ def added_to(folder: Path) -> Iterator[Path]:
                     if kind != STUDY_OF_RUNS:
                         raise
                     break
-                yield stack.enter_context(held.amended()) / folder.relative_to(results)
+                yield stack.enter_context(held.added_files()) / folder.relative_to(results)
                 return
         yield folder

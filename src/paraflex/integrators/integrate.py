@@ -13,8 +13,8 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, dependence
+from paraflex.dynamics.change_points import dependent_drives
 from paraflex.dynamics.rank import DENSE_ROWS
-from paraflex.dynamics.special import blocked_drives
 from paraflex.errors import (
     ConstraintDriftError,
     IntegrationError,
@@ -316,7 +316,9 @@ class Integration:
         # Near a singular position either Newton's iteration or the error test may fail first.
         stopped = code != PAUSED and self._broken is None
         lost, near = (dependence(system, now.q, part) for part in (_NEARLY_DEPENDENT, _NEAR))
-        drives = "" if self._drifts or near.dropped.size <= run.dependent_rows else blocked_drives(system, now.q, near)
+        drives = (
+            "" if self._drifts or near.dropped.size <= run.dependent_rows else dependent_drives(system, now.q, near)
+        )
         error = ConstraintDriftError if self._drifts else IntegrationError
         if drives:
             error, cause = SingularPositionError, f"the constraints lose rank at the limit of reach, {drives},"

@@ -124,14 +124,14 @@ def linearise(
         The position is singular, so that no coordinates describe the motion.
     """
     return linear_model(
-        *sought_motion(
+        *operating_point(
             source, mode=mode, at=at, assembly=assembly, start=start, balanced=balanced, forces=forces,
             prescribed=prescribed, coordinates=coordinates,
         )
     )  # fmt: skip
 
 
-class Sought(NamedTuple):
+class OperatingPoint(NamedTuple):
     """Arguments of `linear_model` without the choice of coordinates: operating point, inputs and outputs."""
 
     coordinates: Coordinates
@@ -141,7 +141,7 @@ class Sought(NamedTuple):
     unbalanced: float = 0.0
 
 
-def sought_motion(
+def operating_point(
     source: Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun,
     *,
     mode: str | ActuationMode | None = None,
@@ -152,7 +152,7 @@ def sought_motion(
     forces: Sequence[str] = (),
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
-) -> Sought:
+) -> OperatingPoint:
     """Return the operating point, inputs and outputs of a linear model: see `linearise`."""
     moves = isinstance(source, TrackingTask | TrackingRun | MotionRun)
     others = {"assembly": assembly, "start": start, "balanced": balanced or None} if moves else {"at": at}
@@ -165,7 +165,7 @@ def sought_motion(
     if moves:
         motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
         point = motion.point(0 if at is None else nearest_sample(motion.times, at))
-        return Sought(chart, point, ports, motion.about)
+        return OperatingPoint(chart, point, ports, motion.about)
     mechanism = Mechanism.from_source(source)
     chosen = mode_of(source, mechanism, mode)
     ports = ports_of(mechanism, chosen, forces, prescribed)
@@ -177,7 +177,7 @@ def sought_motion(
         state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
     chart = coordinates_of(system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
     point, unbalanced = resting_point(chart, state, chosen)
-    return Sought(chart, point, ports, "static equilibrium" if balanced else "a pose at rest", unbalanced)
+    return OperatingPoint(chart, point, ports, "static equilibrium" if balanced else "a pose at rest", unbalanced)
 
 
 def linear_model(

@@ -18,7 +18,7 @@ from paraflex.limits import solvable
 from paraflex.linear.balancing import balanced as balanced_truncation
 from paraflex.linear.bases import Basis, carried, craig_bampton, independent_rows, interpolated, lowest_modes, rubin
 from paraflex.linear.coordinates import Variable
-from paraflex.linear.linearise import linear_model, linearise, sought_motion
+from paraflex.linear.linearise import linear_model, linearise, operating_point
 from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
 from paraflex.linear.varying import describes
@@ -151,13 +151,13 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
         return source
     if not given:
         return linearise(source, **options)
-    first, sought = given[0].full, sought_motion(source, **options)
-    same = len(sought.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
-    if not same or [body.all for body in sought.coordinates.system.bodies] != [
+    first, point = given[0].full, operating_point(source, **options)
+    same = len(point.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
+    if not same or [body.all for body in point.coordinates.system.bodies] != [
         body.all for body in first.minimal.system.bodies
     ]:
-        raise _of_another(given[0], sought.coordinates.system.mechanism.name)
-    model = linear_model(*sought, chosen=first.minimal.chosen)
+        raise _of_another(given[0], point.coordinates.system.mechanism.name)
+    model = linear_model(*point, chosen=first.minimal.chosen)
     _check_alike(given[0], model)
     if not describes(model.minimal, first.minimal):
         raise InputError(

@@ -27,7 +27,7 @@ _NUMBERS = (*HEADLINE.values(), "wall_time", "steps")
 _FAR = 0.1
 
 
-def beside_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> xr.Dataset:
+def compared_with_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> xr.Dataset:
     """Return the dataset of reduced runs with numbers of the full runs, distances to them, and findings on large ones.
 
     Parameters

@@ -13,7 +13,7 @@ from paraflex.errors import ValidityWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import Solution
 from paraflex.validity.bending import bending_of
-from paraflex.validity.blame import to_blame as to_blame, with_blame as with_blame
+from paraflex.validity.causes import likely_cause as likely_cause, with_likely_cause as with_likely_cause
 from paraflex.validity.indicators import (
     AXIAL_LIMIT as AXIAL_LIMIT,
     DRIVEN_AXIAL_LIMIT as DRIVEN_AXIAL_LIMIT,

@@ -22,7 +22,7 @@ from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_poses, grouped
 from paraflex.units import STRESS, speed_text
 from paraflex.validity.bending import bending_of
-from paraflex.validity.blame import most_likely
+from paraflex.validity.causes import cause_among
 from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, implausible_numbers, mechanism_size
 
 # Energy error relative to the largest energy: the library's runs have up to 3e-4 with the default tolerance. Energies
@@ -88,9 +88,9 @@ class _Where(NamedTuple):
     place: str
     mechanism: Mechanism
 
-    def blame(self, *bodies: str) -> str:
+    def likely_cause(self, *bodies: str) -> str:
         """Return the number of the model that is the most likely cause, named bodies first; empty for none."""
-        return most_likely(implausible_numbers(self.mechanism), bodies)
+        return cause_among(implausible_numbers(self.mechanism), bodies)
 
 
 def stiff_modes(system: System) -> Iterator[Finding]:
@@ -191,7 +191,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
     worst = max(slopes, key=lambda name: np.max(slopes[name]))
     k = int(np.argmax(slopes[worst]))
     if slopes[worst][k] > STEEP:
-        blame = where.blame(worst) or (
+        blame = where.likely_cause(worst) or (
             f"look at section and Young's modulus of {worst}, and at its motion and loads"
             + _moving(where.mechanism, solution)
         )
@@ -218,7 +218,7 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
             f"a stress of {stress:.3g} {STRESS.name} in {name} at {start + loads.x[k, station]:.3g} m, "
             f"{solution.instant(int(k), 4)}: its material bears {strength:.3g} {STRESS.name}, the safety factor is "
             f"{1.0 / used[k, station]:.2g}",
-            where.blame(name) or (
+            where.likely_cause(name) or (
                 f"give {name} a stronger section or material, or move and load it less"
                 + _moving(where.mechanism, solution)
             ),
@@ -314,7 +314,7 @@ def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding
         yield Finding(
             "speed-large", where.place,
             f"{name} moves at {speeds[k, b]:.3g} m/s at {solution.instant(int(k), 4)}",
-            where.blame() or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
+            where.likely_cause() or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
         )  # fmt: skip
 
 
@@ -330,7 +330,7 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
         yield Finding(
             "error-large", where.place,
             f"the tracking error is {error:.3g} m on a path that is {extent:.3g} m large: it is not followed",
-            where.blame() or (f"{others}; {soft}" if others else soft),
+            where.likely_cause() or (f"{others}; {soft}" if others else soft),
         )  # fmt: skip
 
 
@@ -346,7 +346,7 @@ def _large_torques(where: _Where, system: System, driven: Driven, t: Array) -> I
                 "torque-large", where.place,
                 f"motor {motor} gives up to {peak:.3g} {unit}, where mass, size, acceleration and loads come to "
                 f"{expected:.2g} {unit}",
-                _resisting(mechanism) or where.blame() or _singular(driven),
+                _resisting(mechanism) or where.likely_cause() or _singular(driven),
             )  # fmt: skip
 
 
@@ -378,7 +378,9 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
             "force-large", where.place,
             f"{joint} takes {forces[k]:.3g} N for a tenth of the time or more, where mass, acceleration and loads come "
             f"to {expected + turning / size:.2g} N",
-            where.blame() or _resisting(where.mechanism) or "look at masses (kg), stiffnesses and prescribed motions",
+            where.likely_cause()
+            or _resisting(where.mechanism)
+            or "look at masses (kg), stiffnesses and prescribed motions",
         )  # fmt: skip
 
 

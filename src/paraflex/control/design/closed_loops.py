@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.design.reach import frequency_of
+from paraflex.control.design.controllability import frequency_of
 from paraflex.control.design.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.errors import InputError, ResultWarning, warn_user, within

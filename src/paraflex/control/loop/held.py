@@ -82,7 +82,7 @@ class HeldTorques:
         self.held: Array = np.zeros(len(own))
         self.log: TorqueLog = TorqueLog(lags, start, self.held)
 
-    def given(self, torques: Torques) -> Array:
+    def of_motors(self, torques: Torques) -> Array:
         """Return the torques of all motors (all,) from those of `motors`, or from values by name.
 
         Raises
@@ -153,12 +153,12 @@ class HeldTorques:
     def _write(self) -> None:
         """Write the held torques into the signals."""
         breaks, coefficients, start = self.signals.breaks, self.signals.coefficients, self.signals.start
-        since, begun, given = self.log.last
+        since, begun, commanded = self.log.last
         for k, lag in enumerate(self.amplifiers.lags):
             pieces = slice(start[k], start[k + 1] - 1)
             if not lag:
-                coefficients[pieces, 0] = self.base[pieces] + given[k]
+                coefficients[pieces, 0] = self.base[pieces] + commanded[k]
                 continue
-            signal = relaxing(self.planned.signals[k], since, begun[k], given[k], lag)
+            signal = relaxing(self.planned.signals[k], since, begun[k], commanded[k], lag)
             whole = padded_signal(signal, pieces.stop - pieces.start)
             breaks[pieces], coefficients[pieces] = whole.breaks[:-1], whole.coefficients

@@ -235,12 +235,12 @@ class Loop:
     def _step(self, k: int, number: int, t: float, y: Array) -> Array:
         name, controller, outputs = self.names[k], self.controllers[k], self._plants[k].outputs
         try:
-            given = controller.step(number, t, y)
+            returned = controller.step(number, t, y)
         except Exception as error:
             raise _raised(name, error) from error
-        torques = None if given is None else real_numbers(given)
+        torques = None if returned is None else real_numbers(returned)
         if torques is None:
-            kind = "complex numbers" if given is not None and np.iscomplexobj(given) else type(given).__name__
+            kind = "complex numbers" if returned is not None and np.iscomplexobj(returned) else type(returned).__name__
             raise LawFailure(f'controller "{name}" returned {kind}, not torques')
         torques = np.atleast_1d(torques)
         if torques.shape != (len(outputs),):
@@ -379,15 +379,15 @@ def _bounds(controller: Controller, outputs: int) -> tuple[str, Array, Array]:
 
 def _names(controllers: Sequence[Controller]) -> list[str]:
     """Return the names of controllers, numbered where names are equal."""
-    given = [getattr(each, "name", "controller") for each in controllers]
-    for name in given:
+    names = [getattr(each, "name", "controller") for each in controllers]
+    for name in names:
         check_name(name)
-    if len(set(given)) == len(given):
-        return given
-    twice = [name for name in given if given.count(name) > 1]
+    if len(set(names)) == len(names):
+        return names
+    twice = [name for name in names if names.count(name) > 1]
     numbers = dict.fromkeys(twice, 0)
     found = []
-    for name in given:
+    for name in names:
         if name in numbers:
             numbers[name] += 1
             name = f"{name}{numbers[name]}"

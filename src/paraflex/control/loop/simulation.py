@@ -34,7 +34,7 @@ from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import finite
 from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask
-from paraflex.validity import warn, with_blame
+from paraflex.validity import warn, with_likely_cause
 
 # Samples within this fraction of the run after a change of torques show the state just before it.
 _ROUNDING = 1e-12
@@ -218,13 +218,13 @@ class Simulation:
             The integration cannot continue, or an event of the options has ended the run; the error carries the run so
             far.
         """
-        given = self._torques.given(torques)
+        held = self._torques.of_motors(torques)
         if not is_number(until) or not self.time < until <= self.end * (1.0 + SAME):
             raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
                              value=until, remedy="give a later time in it, or reset the simulation")  # fmt: skip
         with self._alone():
             self._use(None)
-            self._apply(given)
+            self._apply(held)
             self._march(min(until, self.end))
         if self._integration.status == "stopped":
             cause = f"the run has ended: {self._integration.message}"
@@ -394,7 +394,7 @@ class Simulation:
         try:
             solution = self._integration.solution()
         except IntegrationError as error:
-            with_blame(error, self.mechanism)
+            with_likely_cause(error, self.mechanism)
             error.partial = self._as_controlled(error.partial)
             raise
         if solution.status == "complete" and self.time < self.end:
@@ -409,18 +409,18 @@ class Simulation:
         k = solution.t.size - bool(solution.event)
         slack = _ROUNDING * (self.end - self._initial.time)
         log = self._torques.log
-        given, commanded = log.at(solution.t, slack), log.given(solution.t, slack)
+        applied, commanded = log.at(solution.t, slack), log.given(solution.t, slack)
         motors = {motor.name: unit for motor, unit in zip(self.mechanism.motors, self.mechanism.motor_units(),
                                                            strict=True)}  # fmt: skip
         records = () if self._loop is None else self._loop.records(motors.__getitem__)
         if self.task is None:
             times = solution.t if solution.event else self._times
             none = dict.fromkeys(motors, 0.0)
-            return ControlledMotion(self.system, times, none, solution, given, commanded, records)
+            return ControlledMotion(self.system, times, none, solution, applied, commanded, records)
         planned = self._torques.planned.evaluate(solution.t[:k])
         title = self._options.method.title
         return ControlledTracking(self.task, self._torques.planned, self._condition, solution, title,
-                                  acting=given[:k] + planned, commanded=commanded[:k] + planned,
+                                  acting=applied[:k] + planned, commanded=commanded[:k] + planned,
                                   controllers=records)  # fmt: skip
 
     def _use(self, loop: Loop | None) -> None:

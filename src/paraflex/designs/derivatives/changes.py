@@ -14,7 +14,7 @@ from paraflex.actuation.feed_forward import splines
 from paraflex.arguments import with_fields
 from paraflex.arrays import Array, Numbers
 from paraflex.control.shaping.shaped import ShapedPath
-from paraflex.designs.derivatives.plans import Given
+from paraflex.designs.derivatives.plans import RunInputs
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
 from paraflex.designs.derivatives.steps import Stepped, another_layout, complex_step, part, stepped
 from paraflex.designs.run import Task
@@ -254,7 +254,7 @@ class Change:
             return self.closure.signals
         return still_signals(mechanism, near.end)[0]
 
-    def of_mode(self, nominal: Given) -> ModeChange:
+    def of_mode(self, nominal: RunInputs) -> ModeChange:
         """Return the derivatives of the inputs of the run of a mode."""
         torques = self._torques(nominal.torques)
         signals, stops = self._signals(nominal, torques)
@@ -308,7 +308,7 @@ class Change:
         )
         return replace(nominal, signals=signals, knots=stepped(knots, d_knots), times=stepped(nominal.times, d_times))
 
-    def _signals(self, nominal: Given, torques: FeedForward) -> tuple[Difference, Array]:
+    def _signals(self, nominal: RunInputs, torques: FeedForward) -> tuple[Difference, Array]:
         """Return the derivatives of the signals and of the stops."""
         problem, found, stops = nominal.problem, [], []
         d_knots, d_times = part(torques.knots), part(self.sampled.times)

@@ -100,7 +100,7 @@ class IdentificationStudy(DesignStudy[IdentificationResult]):
         """Metrics of the targets."""
         return tuple(dict.fromkeys(target.column for target in self.targets))
 
-    def sought(self) -> dict[str, Any]:
+    def goal(self) -> dict[str, Any]:
         """Return the targets as plain values."""
         return {"targets": [vars(target) for target in self.targets]}
 

@@ -36,7 +36,7 @@ class OptimisationResult(SearchResult):
     ----------
     method : str
         Name of the optimisation method.
-    sought : mapping
+    goal : mapping
         Objective function as plain values.
     objective, start_objective : float or None
         Objective at the best design and at the start; None before the start has run.
@@ -48,7 +48,7 @@ class OptimisationResult(SearchResult):
 
     kind: ClassVar[str] = "optimisation"
     method: str
-    sought: Mapping[str, Any]
+    goal: Mapping[str, Any]
     objective: float | None
     start_objective: float | None
     metrics: Mapping[str, float]
@@ -74,7 +74,7 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
         """Metrics of the objective and its limits."""
         return self.objective.columns
 
-    def sought(self) -> dict[str, Any]:
+    def goal(self) -> dict[str, Any]:
         """Return the objective as plain values."""
         return {"objective": vars(self.objective) | {"weights": dict(self.objective.weights)}}
 
@@ -190,7 +190,7 @@ def _result(study: OptimisationStudy, folder: Path, session: Session) -> Optimis
     return OptimisationResult(
         **of_session(study, folder, session, best),
         method=study.search.method or DEFAULT_SEARCH,
-        sought=study.sought()["objective"],
+        goal=study.goal()["objective"],
         objective=None if best is None else objective.value(best, scales),
         start_objective=objective.value(start, scales) if start is not None and running else None,
         metrics={} if best is None else objective.metrics(best),

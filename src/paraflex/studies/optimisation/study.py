@@ -117,7 +117,7 @@ class DesignStudy(Study[R_co]):
         """Metrics of the objective or targets."""
 
     @abstractmethod
-    def sought(self) -> dict[str, Any]:
+    def goal(self) -> dict[str, Any]:
         """Return the objective or the targets as plain values."""
 
     def design(self, unit: Array) -> tuple[float, ...]:
@@ -139,8 +139,8 @@ class DesignStudy(Study[R_co]):
         """Return everything that the results depend on as plain values, without the limit of evaluations."""
         search = {name: value for name, value in vars(self.search).items() if name != "evaluations"}
         ranges = [[p.low, p.high, p.log] for p in self.parameters]
-        sought = {"objective": None, "targets": []} | self.sought()
-        return self.base.content() | {"ranges": ranges} | sought | {"search": search}
+        goal = {"objective": None, "targets": []} | self.goal()
+        return self.base.content() | {"ranges": ranges} | goal | {"search": search}
 
 
 def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> SweepStudy:
