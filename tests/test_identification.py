@@ -156,9 +156,9 @@ def test_all_parameters_at_bounds(tmp_path):
     folder = tmp_path / "out"
     result = identify(study, folder, run=made_up(**METRICS))
     assert result.confidence is not None
-    from paraflex.studies.optimisation.evaluate import Evaluated
+    from paraflex.studies.optimisation.evaluate import EvaluatedDesign
 
-    design = Evaluated(0, tuple(result.values.values()), (), ())
+    design = EvaluatedDesign(0, tuple(result.values.values()), (), ())
     slopes = {name: np.ones((1, 2)) for name in METRICS}
     found = confidence(study, study.targets, design, residual_slopes(study.targets, slopes), {"x": "low", "y": "low"})
     assert found.free == ()

@@ -34,7 +34,7 @@ from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, implausible_results, moved_far, warn, with_likely_cause
+from paraflex.validity import Validity, assess, implausible_results, large_rotations, warn, with_likely_cause
 
 # Remedy for a balanced start that is not found.
 UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
@@ -229,7 +229,7 @@ def motion_start(
     placed = isinstance(start, State) or (isinstance(start, Start) and start.places)
     if warning and not placed and system.mechanism.assemblies:
         assembly = system.mechanism.assembly(start if isinstance(start, str) else None)
-        warn_of(moved_far(system, assembly, state.q), ResultWarning)
+        warn_of(large_rotations(system, assembly, state.q), ResultWarning)
     return system, state, np.linspace(state.time, state.time + duration, samples)
 
 

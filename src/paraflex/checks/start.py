@@ -21,14 +21,14 @@ def start_findings(model: Model, seen: Examination, assembly: str | None) -> Ite
     chosen = model.mechanism.assembly(assembly) if seen.starts else None
     try:
         start_state(seen.system, model.start, chosen)
-        yield from _fast(model.mechanism, model.start)
+        yield from _high_speeds(model.mechanism, model.start)
     except InputError as error:
         yield Finding("start-refused", error.field, error.problem, error.remedy)
     except NumericalError as error:
         yield Finding("start-refused", "start", str(error), "give a start that the joints allow")
 
 
-def _fast(mechanism: Mechanism, start: Start) -> Iterator[Finding]:
+def _high_speeds(mechanism: Mechanism, start: Start) -> Iterator[Finding]:
     """Yield angular velocities above those of any body."""
     size = mechanism_size(mechanism)
     for body, rate in start.angular.items():

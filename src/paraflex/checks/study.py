@@ -127,7 +127,7 @@ def path_findings(model: Model, path: Path, name: str, duration: float) -> Itera
     """Yield findings about a path before it is planned."""
     yield from profiles_cut_short(model.mechanism, duration)
     yield from _too_fast(name, path, duration)
-    yield from _idle(model.mechanism, name, path)
+    yield from _unfollowed_motion(model.mechanism, name, path)
     if duration > DWELL * path.duration > 0.0:
         yield Finding(
             "duration-long", "study.duration", f"{duration:.4g} s, where the path takes {path.duration:.4g} s",
@@ -148,7 +148,7 @@ def _too_fast(name: str, path: Path, duration: float) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _idle(mechanism: Mechanism, name: str, path: Path) -> Iterator[Finding]:
+def _unfollowed_motion(mechanism: Mechanism, name: str, path: Path) -> Iterator[Finding]:
     """Yield a path that moves, but not along the coordinates that the end-effector follows."""
     if mechanism.end_effector is None:
         return

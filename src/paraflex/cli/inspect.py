@@ -13,7 +13,7 @@ from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.frequencies import frequencies, hertz
 from paraflex.cli.inspect_tables import print_facts, print_library
 from paraflex.cli.request import requested_model
-from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, closure_of, mobility
+from paraflex.dynamics import Closure, DrivenFreedoms, Mobility, System, build_system, closure_of, mobility
 from paraflex.errors import ProportionError
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
@@ -214,7 +214,7 @@ def _mobility_facts(free: Mobility) -> dict[str, Any]:
     }
 
 
-def _reach_facts(drives: Reach) -> dict[str, Any]:
+def _reach_facts(drives: DrivenFreedoms) -> dict[str, Any]:
     return {
         "all_motors": drives.all_motors,
         "modes": dict(drives.modes),

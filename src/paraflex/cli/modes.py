@@ -16,7 +16,7 @@ from paraflex.actuation.allocation import check_mode
 from paraflex.cli.commands.models import ModesRequest
 from paraflex.cli.request import find_path, requested_model
 from paraflex.cli.tables import framed_table, plain_console
-from paraflex.dynamics import build_system, closure_of, mobility, reach
+from paraflex.dynamics import build_system, closure_of, driven_freedoms, mobility
 from paraflex.errors import ActuationError
 from paraflex.files import Model
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
@@ -103,7 +103,7 @@ def _sets_of_pose(model: Model) -> Iterable[tuple[str, ...]]:
         return ()
     system = build_system(model.mechanism.rigid())
     start = closure_of(system, model.mechanism.assembly(model.study.assembly)).state
-    return () if start is None else reach(system, start, mobility(system, start).freedoms).sets
+    return () if start is None else driven_freedoms(system, start, mobility(system, start).freedoms).sets
 
 
 def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: int) -> list[str]:

@@ -35,7 +35,7 @@ STATUSES = (STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID)
 _ID_DIGITS = 16
 
 
-class UnderControl(NamedTuple):
+class ControlledTask(NamedTuple):
     """Planned motion, and the controllers that act in addition to its torques."""
 
     task: TrackingTask
@@ -43,12 +43,12 @@ class UnderControl(NamedTuple):
 
 
 # Inputs ready for `run_mode`.
-Planned = TrackingTask | UnderControl | OwnMotion | OwnStatics
+Planned = TrackingTask | ControlledTask | OwnMotion | OwnStatics
 
 
-def under_control(task: TrackingTask, controllers: Sequence[ControllerDescription]) -> TrackingTask | UnderControl:
+def under_control(task: TrackingTask, controllers: Sequence[ControllerDescription]) -> TrackingTask | ControlledTask:
     """Combine a planned motion with controllers; return the motion itself if there are none."""
-    return UnderControl(task, tuple(controllers)) if controllers else task
+    return ControlledTask(task, tuple(controllers)) if controllers else task
 
 
 class Task(NamedTuple):
@@ -245,7 +245,7 @@ def run_mode(planned: Planned, mode: str, options: IntegrationOptions, watch: Ca
         return planned.found()
     if isinstance(planned, OwnMotion):
         run = planned.simulate(options, watch)
-    elif isinstance(planned, UnderControl):
+    elif isinstance(planned, ControlledTask):
         run = simulate_controlled(planned.task, mode, planned.controllers, options=options, on_progress=watch)
     else:
         run = simulate(planned, mode, options=options, on_progress=watch, warning=False)

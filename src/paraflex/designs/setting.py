@@ -14,7 +14,7 @@ from typing import Any
 from paraflex.designs.measure import metrics_of
 from paraflex.designs.own_motion import own_duration
 from paraflex.designs.own_statics import check_of_statics
-from paraflex.designs.samples import Varied
+from paraflex.designs.samples import SweptParameter
 from paraflex.designs.schema import SweepTable, VaryTable
 from paraflex.designs.units import check_unit_of
 from paraflex.equilibria.conditions import chosen_over
@@ -31,7 +31,7 @@ from paraflex.integrators import IntegrationOptions, check_times
 from paraflex.limits import WHOLE, at_most, of_size
 from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
-from paraflex.results.following import Part
+from paraflex.results.following import PathPart
 from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS
 from paraflex.validity import implausible_numbers
 
@@ -140,7 +140,7 @@ class Setting:
         model = model_from(overlaid(dict(self.data), inside), self.source, self.text)
         return model, self.options(model, chosen)
 
-    def parts(self) -> dict[str, Part]:
+    def parts(self) -> dict[str, PathPart]:
         """Return the covered part of each path that runs do not complete, for the design that the file describes."""
         model = model_from(dict(self.data), self.source)
         found = {}
@@ -167,7 +167,7 @@ class Setting:
         return model.study.integration(dict(self.integration) | dict(chosen or {}))
 
 
-def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Varied, ...], Model]:
+def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[SweptParameter, ...], Model]:
     """Return the common settings of a study, its parameters, and the mechanism's model as in its file.
 
     Raises
@@ -233,7 +233,7 @@ def _with_statics(model: Model, changes: Mapping[str, Any]) -> Model:
         raise error.in_file("") from None
 
 
-def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> Varied:
+def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> SweptParameter:
     fields = tuple(entry.fields) or (name,)
     for place in _places(data, name, fields):
         for key in ("low", "high", "start"):
@@ -248,7 +248,7 @@ def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> Varied:
         )
     for value in (*(values or ()), entry.low or 0.0, entry.high or 0.0) if whole else ():
         at_most(abs(value), WHOLE, f"vary.{name}", "too large for a whole number")
-    return Varied(
+    return SweptParameter(
         name=name,
         fields=fields,
         values=None if values is None else tuple(map(float, values)),
@@ -353,7 +353,7 @@ def _check(setting: Setting, model: Model) -> None:
     model.mechanism.assembly(setting.assembly)
 
 
-def _check_columns(parameters: tuple[Varied, ...]) -> None:
+def _check_columns(parameters: tuple[SweptParameter, ...]) -> None:
     # The columns of a metric of members are NAME.MEMBER, so a parameter may have the name of such a metric.
     taken = {*FIXED_COLUMNS, *(metric.name for metric in METRICS.values() if not metric.each)}
     for parameter in parameters:

@@ -35,7 +35,7 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import members_of
 from paraflex.designs.reopen import study_account
 from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, is_row_of, lost, run_id, run_task, table_schema
-from paraflex.designs.samples import Varied, check_varied, designs
+from paraflex.designs.samples import SweptParameter, check_varied, designs
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
 from paraflex.equilibria.conditions import conditions
@@ -137,7 +137,7 @@ class SweepStudy(Study["SweepResult"]):
         Name of the study.
     setting : Setting
         Common settings of all runs.
-    parameters : tuple of Varied
+    parameters : tuple of SweptParameter
         Parameters.
     kind : str
         Kind of sampling.
@@ -149,7 +149,7 @@ class SweepStudy(Study["SweepResult"]):
 
     name: str
     setting: Setting
-    parameters: tuple[Varied, ...]
+    parameters: tuple[SweptParameter, ...]
     kind: str
     designs: Array
     members: Members

@@ -1,6 +1,6 @@
 """Equations of motion of a mechanism: its system of constant arrays, consistent states, equilibria, linearisation."""
 
-from paraflex.dynamics.brake import Braked as Braked, brake as brake
+from paraflex.dynamics.brake import BrakedSystem as BrakedSystem, brake as brake
 from paraflex.dynamics.chord import across_chord as across_chord
 from paraflex.dynamics.coordinates import (
     BodyCoordinates as BodyCoordinates,
@@ -8,7 +8,7 @@ from paraflex.dynamics.coordinates import (
     end_markers as end_markers,
     node_marker as node_marker,
 )
-from paraflex.dynamics.drive import Reach as Reach, reach as reach
+from paraflex.dynamics.drive import DrivenFreedoms as DrivenFreedoms, driven_freedoms as driven_freedoms
 from paraflex.dynamics.equilibrium import static_equilibrium as static_equilibrium
 from paraflex.dynamics.inputs import Inputs as Inputs, inputs_of as inputs_of
 from paraflex.dynamics.joint_coordinates import (

@@ -224,11 +224,11 @@ def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
     aside[[body.angle for body in system.bodies]] += _ASIDE * np.random.default_rng(0).standard_normal(
         len(system.bodies)
     )
-    q = close_downhill(system, signals, t, aside)
+    q = minimise_gaps(system, signals, t, aside)
     return reference_pose(system, Assembly("closest", {body.name: float(q[body.angle]) for body in system.bodies}))
 
 
-def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Array:
+def minimise_gaps(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Return coordinates near q with the smallest gaps of all joints, by the Levenberg-Marquardt method.
 
     The method is slower and less accurate than `project_position`, but suits singular configurations and loops that

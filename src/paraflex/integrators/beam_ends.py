@@ -54,7 +54,7 @@ class BeamEnds:
                 self._left += (Departure(function, start.time),)
         self.functions: tuple[EventFunction, ...] = tuple(within)
 
-    def pass_over(
+    def after_crossing(
         self, crossing: Crossing, functions: Sequence[EventFunction]
     ) -> tuple[tuple[EventFunction, ...], Crossing | None]:
         """Return the events that remain after a crossing, and the crossing that ends the run in this step or None."""
@@ -89,12 +89,12 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
         if end.at_end is AtEnd.ERROR:
             moment = Moment(one.time, k)
             raise UnreachablePathError(_planned(end, one.function.value(q)), moment, remedy=STAY_ON_BEAM)
-    return _going_on(departures, q)
+    return _continuing(departures, q)
 
 
 def beyond_ends(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
     """Return findings on points that continue beyond the ends of their beams, in a motion at samples t, q, v."""
-    return _going_on(_departures(system, t, q, v), q)
+    return _continuing(_departures(system, t, q, v), q)
 
 
 def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Departure | None:
@@ -112,7 +112,7 @@ def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Departure | N
     return min((one for one, _ in ending), key=lambda one: one.time, default=None)
 
 
-def _going_on(departures: Iterable[tuple[Departure, int]], q: Array) -> tuple[Finding, ...]:
+def _continuing(departures: Iterable[tuple[Departure, int]], q: Array) -> tuple[Finding, ...]:
     return tuple(_finding(one, one.function.value(q)) for one, _ in departures if not one.function.ends_run)
 
 

@@ -142,7 +142,7 @@ def integrate(
     return integration.solution()
 
 
-class Kept(NamedTuple):
+class IntegrationState(NamedTuple):
     """State of an integration: the arrays of its run, and further attributes."""
 
     arrays: tuple[np.ndarray, ...]
@@ -233,7 +233,7 @@ class Integration:
                 self._code = FINISHED
                 return
             if crossing is not None:
-                self._functions, crossing = self._ends.pass_over(crossing, self._functions)
+                self._functions, crossing = self._ends.after_crossing(crossing, self._functions)
             if crossing is not None:
                 self.status, self.message, self._crossing = "stopped", crossing.message, crossing
                 return
@@ -247,13 +247,13 @@ class Integration:
         """Mark the run as interrupted by the user; the solution so far is kept."""
         self.status, self.message = "interrupted", f"interrupted at t = {self.time:.6g} s"
 
-    def saved(self) -> Kept:
+    def saved(self) -> IntegrationState:
         """Return the complete state of the integration, exact to the last bit; for own methods only."""
         more = {name: getattr(self, name) for name in _KEPT}
         arrays = tuple(one.copy() for one in native.own(self.run).arrays())
-        return Kept(arrays, more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
+        return IntegrationState(arrays, more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
 
-    def restore(self, kept: Kept) -> None:
+    def restore(self, kept: IntegrationState) -> None:
         """Restore a state from `saved`, of this integration or of one made with the same arguments."""
         # Copy into the existing arrays: their position in memory must not change, as rounding may depend on it.
         for mine, array in zip(native.own(self.run).arrays(), kept.arrays, strict=True):
@@ -263,7 +263,7 @@ class Integration:
         self._ends, self._pace = copy.copy(self._ends), self._pace.copy()
 
     @property
-    def goes_on(self) -> bool:
+    def can_continue(self) -> bool:
         """Whether the run has reached the time that it was advanced to, and can go on."""
         return self.status == "complete" and self._code == FINISHED and self._broken is None
 
@@ -287,7 +287,7 @@ class Integration:
         if self._crossing is not None and isinstance(end, BeamEnd) and end.at_end is AtEnd.ERROR:
             moment = Moment(self._crossing.t, solution.steps)
             raise _failed(SliderOffBeamError(self._crossing.reached, moment, solution, STAY_ON_BEAM))
-        if self.goes_on or self.status in ("interrupted", "stopped"):
+        if self.can_continue or self.status in ("interrupted", "stopped"):
             return solution
         raise _failed(self._error(solution))
 

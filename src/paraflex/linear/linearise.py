@@ -20,8 +20,8 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, as_enum
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, coordinates_of
-from paraflex.linear.minimal import Minimal
+from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable, coordinates_of
+from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import planned_point, resting_point, run_point
 from paraflex.mechanism import (
@@ -187,7 +187,7 @@ def linear_model(
     about: str,
     unbalanced: float = 0.0,
     *,
-    chosen: Chosen | None = None,
+    chosen: CoordinateChoice | None = None,
 ) -> LinearModel:
     """Linearise at an operating point, in the given minimal coordinates or, by default, in those chosen there."""
     system = coordinates.system
@@ -197,7 +197,7 @@ def linear_model(
         raise InputError("has no freedom to move", field="mechanism", value=mechanism.name, remedy="free a joint")
     motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in ports.mode.motors]
     forces = _forces(system, point.q, tangents.motors[motors], ports.forces)
-    minimal = Minimal(
+    minimal = MinimalEquations(
         system, point, tangents, chosen, coordinates.scale, forces,
         np.array(motors, dtype=int), len(ports.prescribed),
     )  # fmt: skip
@@ -223,7 +223,7 @@ def linear_model(
 def charted(
     source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
     prescribed: Sequence[str], coordinates: FirstCoordinates | str,
-) -> tuple[Moving, Ports, Coordinates]:  # fmt: skip
+) -> tuple[OperatingPoints, Ports, Coordinates]:  # fmt: skip
     """Return a motion, the inputs and outputs of linear models along it, and their candidate coordinates."""
     task = source.task if isinstance(source, TrackingRun) else source
     mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism
@@ -258,7 +258,7 @@ def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], p
     return Ports(mode, points, tuple(prescribed), measured_sensors(in_frames(mechanism)))
 
 
-class Moving(NamedTuple):
+class OperatingPoints(NamedTuple):
     """Planned motion or run: description, system, sample times (k,) [s], and the operating point of each sample."""
 
     about: str
@@ -267,13 +267,13 @@ class Moving(NamedTuple):
     point: Callable[[int], MotionPoint]
 
 
-def moving(source: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode) -> Moving:
+def moving(source: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode) -> OperatingPoints:
     """Return the operating points along a planned motion or a run."""
     if isinstance(source, TrackingTask):
-        return Moving("a planned motion", source.system, source.motion.t, partial(planned_point, source, mode))
+        return OperatingPoints("a planned motion", source.system, source.motion.t, partial(planned_point, source, mode))
     system = source.system if isinstance(source, MotionRun) else source.task.system
     # A run along a path that ends at an event has one more state than torques.
-    return Moving("a run", system, source.solution.t[: len(source.applied)], partial(run_point, source))
+    return OperatingPoints("a run", system, source.solution.t[: len(source.applied)], partial(run_point, source))
 
 
 def nearest_sample(times: Array, at: float) -> int:

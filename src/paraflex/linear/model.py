@@ -22,7 +22,7 @@ from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
-from paraflex.linear.minimal import Minimal
+from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
 from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, Vibrating, by_size, vibrating_zeros, zeros
@@ -53,7 +53,7 @@ class LinearModel(NamedModel):
         forces that hold it.
     states, inputs, outputs : tuple of Variable
         Names and units of states, inputs and outputs.
-    minimal : Minimal
+    minimal : MinimalEquations
         Linearised equations in minimal coordinates.
     rows : SensorRows
         Derivatives of the sensor readings with respect to the motion.
@@ -68,7 +68,7 @@ class LinearModel(NamedModel):
     states: tuple[Variable, ...]
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
-    minimal: Minimal
+    minimal: MinimalEquations
     rows: SensorRows
     selected: tuple[NDArray[np.int64], NDArray[np.int64]]
 

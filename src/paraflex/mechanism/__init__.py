@@ -90,7 +90,7 @@ from paraflex.mechanism.sections import (
 from paraflex.mechanism.segments import (
     FIRST_END as FIRST_END,
     LAST_END as LAST_END,
-    Segmented as Segmented,
+    SegmentedMechanism as SegmentedMechanism,
     check_segmentable as check_segmentable,
     finite_segments as finite_segments,
     is_hinge as is_hinge,

@@ -118,10 +118,10 @@ def check_assemblies(mechanism: Members) -> None:
             _on_body(ref, field, "the places of ground points are given in [ground]")
         # Raises an error with the name of a body whose angle is not determined.
         approximate_poses(mechanism, assembly)
-        _check_hung(mechanism, assembly)
+        _check_suspended(mechanism, assembly)
 
 
-def _check_hung(mechanism: Members, assembly: Assembly) -> None:
+def _check_suspended(mechanism: Members, assembly: Assembly) -> None:
     """Check that bodies with distance joints only have a position, unless the mechanism was derived from another."""
     hung = [name for name, joints in mechanism.joints_at.items() if {each.holds for each in joints} == {("distance",)}]
     placed = placed_poses(mechanism, assembly) if hung and mechanism.cut is None else hung

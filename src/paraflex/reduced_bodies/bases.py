@@ -38,7 +38,7 @@ def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[s
         The count exceeds the number of flexible coordinates, or of independent directions in the deflections.
     """
     _check(system, count)
-    together = of_one_energy(system, deflections)
+    together = normalised_by_energy(system, deflections)
     found = []
     for body in system.bodies:
         energies = body.modes.omega * together[:, body.flexible]
@@ -71,7 +71,7 @@ def _check(system: System, count: int) -> None:
         )  # fmt: skip
 
 
-def of_one_energy(system: System, parts: Sequence[Array]) -> Array:
+def normalised_by_energy(system: System, parts: Sequence[Array]) -> Array:
     """Scale deflections (k, n) to one unit of strain energy in total, with equal shares of each part (any, n)."""
     stiffness = stiffness_diagonal(system)
     energies = [np.sum(part**2 @ stiffness) for part in parts]

@@ -9,7 +9,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import ActuationError, InputError, SingularActuationError
 from paraflex.mechanism import ActuationMode, Mechanism, mode_of_motors
 from paraflex.motion import MotionRun
-from paraflex.reduced_bodies.bases import bases_of, of_one_energy
+from paraflex.reduced_bodies.bases import bases_of, normalised_by_energy
 from paraflex.reduced_bodies.deflections import PlannedDeflections
 from paraflex.tracking import TrackingRun, TrackingTask
 
@@ -70,7 +70,7 @@ def _along_plan(task: TrackingTask, count: int, modes: Sequence[str | ActuationM
             refused = error
     if refused is not None and not driven:
         raise refused
-    groups = [of_one_energy(task.system, driven), planned.of_end_effector()]
+    groups = [normalised_by_energy(task.system, driven), planned.of_end_effector()]
     return replace(mechanism, bases=bases_of(task.system, groups, count))
 
 
@@ -79,6 +79,6 @@ def _from_runs(runs: Sequence[TrackingRun | MotionRun], count: int) -> Mechanism
     systems = [run.task.system if isinstance(run, TrackingRun) else run.system for run in runs]
     if not systems or any(system.mechanism != systems[0].mechanism for system in systems):
         raise InputError("are not of one mechanism", field="along", remedy="give one or several runs of one")
-    groups = [of_one_energy(systems[0], [run.solution.q for run in runs])]
+    groups = [normalised_by_energy(systems[0], [run.solution.q for run in runs])]
     groups += [PlannedDeflections(run.task).of_end_effector() for run in runs[:1] if isinstance(run, TrackingRun)]
     return replace(systems[0].described, bases=bases_of(systems[0], groups, count))

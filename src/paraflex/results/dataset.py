@@ -17,7 +17,7 @@ from paraflex.kinematics import Path, length_fraction
 from paraflex.results.acting import load_variables
 from paraflex.results.controllers import INTERNAL, with_controllers
 from paraflex.results.findings import MODE, keep_findings
-from paraflex.results.following import KEPT_METRICS, ErrorSpan, Part, metric_variables, too_short
+from paraflex.results.following import KEPT_METRICS, ErrorSpan, PathPart, metric_variables, too_short
 from paraflex.results.labelled import (
     Variables,
     error_variables,
@@ -149,6 +149,6 @@ def _frame(one: Record) -> Variables:
     }
 
 
-def part_of(path: Path, end: float) -> Part | None:
+def part_of(path: Path, end: float) -> PathPart | None:
     """Return the part of a path covered by runs that end at a time [s]; None if they reach the end of the path."""
-    return Part(end, path.duration, length_fraction(path, end)) if too_short(end, path.duration) else None
+    return PathPart(end, path.duration, length_fraction(path, end)) if too_short(end, path.duration) else None

@@ -86,7 +86,7 @@ def settling_time(t: Numbers, distance: Numbers, motion_end: float, band: float 
     motion_end : float
         End of the motion [s].
     band : float, optional
-        Width of the band [m]; by default the fraction `SETTLED` of the largest distance.
+        Width of the band [m]; by default the fraction `SETTLING_BAND` of the largest distance.
     """
     moving = during_motion(t, motion_end)
     if moving.all() or not np.isfinite(distance).all():

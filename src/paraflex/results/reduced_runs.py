@@ -53,11 +53,11 @@ def compared_with_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Si
             added[f"{FULL}{name}"] = number.assign_attrs(data[name].attrs | {"long_name": meaning})
     out = data.assign(added)
     out.attrs |= kept._asdict() | {f"{FULL}{name}": count for name, count in whole._asdict().items()}
-    keep_findings(out, [*verdict_of(data), *_far(out, full)])
+    keep_findings(out, [*verdict_of(data), *_distant_runs(out, full)])
     return out
 
 
-def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
+def _distant_runs(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
     """Yield findings on runs that are far from the full ones."""
     along = "mode" in data.dims
     name = HEADLINE[ErrorSpan(data.attrs["error"])] if along else ""

@@ -110,7 +110,7 @@ class ComparisonStudy(WholeStudy[MethodComparison], CheckedFields):
     options: ComparisonOptions | None = None
     parameters: dict[str, Any] | None = None
 
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], MethodComparison]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], MethodComparison]:
         no_workers(workers, "runs are made one after another")
         return self._run
 

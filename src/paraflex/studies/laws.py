@@ -105,7 +105,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
             law if len(self.tasks) == 1 else f"{law}, {path}": (law, path) for law in self.laws for path in self.tasks
         }
 
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], LawComparison]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], LawComparison]:
         workers = workers or Workers()
         if workers.engine != THREADS:
             raise InputError("laws run in threads", field="workers", value=workers.engine, remedy="leave it out")

@@ -133,7 +133,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     full: TrackingTask | None = None
     controllers: Sequence[ControllerDescription] = ()
 
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
         if self.method is not None and not callable(self.method):
             remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in its own way"
             raise refused(self.method, "method", "a function", remedy)

@@ -31,7 +31,7 @@ from paraflex.validity.plausibility import (
     Driven as Driven,
     implausible_results as implausible_results,
     implausible_stresses as implausible_stresses,
-    moved_far as moved_far,
+    large_rotations as large_rotations,
     shared_loads as shared_loads,
     stiff_modes as stiff_modes,
     unresolved_loads as unresolved_loads,

@@ -42,17 +42,17 @@ def implausible_actions(mechanism: Mechanism, size: float, mass: float, times: A
     times : (k,) array
         Times at which loads in time are evaluated [s].
     """
-    yield from _twice(mechanism)
+    yield from _duplicates(mechanism)
     yield from _beside(mechanism)
     yield from _springs(mechanism, size)
     yield from _damped(mechanism)
-    yield from _sharp(mechanism)
+    yield from _sharp_friction(mechanism)
     if mass > 0.0 and size > 0.0:
-        yield from _rubbing(mechanism, size, mass * _G)
+        yield from _excessive_friction(mechanism, size, mass * _G)
         yield from _loaded(mechanism, size, mass * _G, times)
 
 
-def _twice(mechanism: Mechanism) -> Iterator[Finding]:
+def _duplicates(mechanism: Mechanism) -> Iterator[Finding]:
     first: dict[frozenset[PointRef], str] = {}
     for joint in mechanism.joints:
         held = frozenset((joint.a, joint.b))
@@ -137,7 +137,7 @@ def _damping_ratio(body: Body) -> tuple[float, str]:
     return 0.0, ""
 
 
-def _sharp(mechanism: Mechanism) -> Iterator[Finding]:
+def _sharp_friction(mechanism: Mechanism) -> Iterator[Finding]:
     for one in mechanism.frictions:
         if 0.0 < one.speed < SHARP:
             unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
@@ -148,7 +148,7 @@ def _sharp(mechanism: Mechanism) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _rubbing(mechanism: Mechanism, size: float, weight: float) -> Iterator[Finding]:
+def _excessive_friction(mechanism: Mechanism, size: float, weight: float) -> Iterator[Finding]:
     for one in mechanism.frictions:
         slides = mechanism.slides(one.joint)
         bound, unit = (RUBBING_SLIDE * weight, "N") if slides else (RUBBING_TURN * weight * size, "N m")

@@ -82,7 +82,7 @@ class Driven:
         return float(np.sqrt(np.mean(np.sum((self.actual - self.desired) ** 2, axis=1))))
 
 
-class _Where(NamedTuple):
+class _Context(NamedTuple):
     """Place of the findings of a run, and the mechanism whose numbers may have caused them."""
 
     place: str
@@ -128,7 +128,7 @@ def implausible_results(
     if not solution.t.size:
         return []
     mechanism = mechanism or system.described
-    where = _Where("" if driven is None else f"mode {driven.mode}", mechanism)
+    where = _Context("" if driven is None else f"mode {driven.mode}", mechanism)
     undamped = any(body.damping.size > 0 and not body.damping.any() for body in system.bodies)
     found = [
         *stiff_modes(system),
@@ -137,18 +137,18 @@ def implausible_results(
         *_unbalanced(where, system, solution),
         # No default method resolves axial vibrations of undamped beams: tables give the errors with the values.
         *(_begun_singular(solution, where.place) if undamped else unresolved_loads(system, solution, where.place)),
-        *_fast(where, system, solution),
+        *_excessive_speeds(where, system, solution),
         *_large_forces(where, system, solution),
         *shared_loads(system, solution),
     ]
     if driven is not None:
-        found += [*_lost(where, driven), *_large_torques(where, system, driven, solution.t)]
+        found += [*_lost_control(where, driven), *_large_torques(where, system, driven, solution.t)]
     return found
 
 
 def implausible_stresses(system: System, solution: Solution) -> list[Finding]:
     """Return findings about the stresses of equilibria or a run."""
-    return list(_overstressed(_Where("", system.described), system, solution))
+    return list(_overstressed(_Context("", system.described), system, solution))
 
 
 def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
@@ -177,10 +177,10 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
 
 def implausible_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
     """Return findings about the torques and forces of a plan at times t (k,), before a run."""
-    return list(_large_torques(_Where(f"mode {driven.mode}", system.mechanism), system, driven, t))
+    return list(_large_torques(_Context(f"mode {driven.mode}", system.mechanism), system, driven, t))
 
 
-def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _large_slopes(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     bendings = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
     slopes = {
         name: np.max([one.slope for one in bendings if one.name == name], axis=0)
@@ -202,7 +202,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
         )  # fmt: skip
 
 
-def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _overstressed(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     """Yield beams stressed beyond the strength of their material."""
     sections = sections_of(system)
     if sections is None or not np.isfinite(sections.strength).any():
@@ -225,7 +225,7 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
         )  # fmt: skip
 
 
-def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _unbalanced(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     """Yield runs whose energy does not balance the work."""
     energy = np.abs(solution.kinetic_energy) + np.abs(solution.strain_energy)
     # Models without energies have NaN.
@@ -306,7 +306,7 @@ def _loads(system: System, multipliers: Array) -> dict[tuple[str, str], float]:
     return forces | moments | drives
 
 
-def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _excessive_speeds(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     speeds = np.stack([np.linalg.norm(solution.v[:, body.position], axis=1) for body in system.bodies], axis=1)
     k, b = np.unravel_index(np.argmax(np.where(np.isfinite(speeds), speeds, -1.0)), speeds.shape)
     if speeds[k, b] > FAST:
@@ -318,7 +318,7 @@ def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding
         )  # fmt: skip
 
 
-def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
+def _lost_control(where: _Context, driven: Driven) -> Iterator[Finding]:
     extent = float(np.linalg.norm(np.ptp(driven.desired, axis=0)))
     error = driven.deviation
     if error > LOST * extent > 0.0:
@@ -334,7 +334,7 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _large_torques(where: _Where, system: System, driven: Driven, t: Array) -> Iterator[Finding]:
+def _large_torques(where: _Context, system: System, driven: Driven, t: Array) -> Iterator[Finding]:
     mechanism = where.mechanism
     size = mechanism_size(mechanism) or system.size
     force, turning = _expected(system, mechanism, driven.acceleration, t)
@@ -358,7 +358,7 @@ def _expected(system: System, mechanism: Mechanism, acceleration: float, t: Arra
     return system.total_mass * felt + loads, turning
 
 
-def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _large_forces(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     """Yield large forces of joints and of prescribed motions; drives of a path have motors."""
     if not solution.multipliers.size:
         return
@@ -408,7 +408,7 @@ def _singular(driven: Driven) -> str:
     return "look at masses (kg) and the path's acceleration (m/s^2)"
 
 
-def moved_far(system: System, assembly: Assembly, q: Array) -> Iterator[Finding]:
+def large_rotations(system: System, assembly: Assembly, q: Array) -> Iterator[Finding]:
     """Yield bodies that rotated far while an assembly was closed or drives moved to their start; q (n,)."""
     given = {name: pose.angle for name, pose in approximate_poses(system.mechanism, assembly).items()}
     found = {body.name: float(q[body.angle]) for body in system.bodies}

@@ -246,7 +246,7 @@ class _Search:
         for _ in range(_ROUNDS if len(mean) > 1 else 0):
             before = best
             for k in range(len(mean)):
-                best = self._anew(best, k)
+                best = self._restarted_search(best, k)
             if self.least(best) <= self.least(before) * (1.0 + _GROWS):
                 break
         if not np.any(best.gains):
@@ -256,7 +256,7 @@ class _Search:
             )  # fmt: skip
         return best
 
-    def _anew(self, best: _Tried, k: int) -> _Tried:
+    def _restarted_search(self, best: _Tried, k: int) -> _Tried:
         """Search the gain of one pair again, from zero on, in both directions."""
         without = best.gains.copy()
         without[k] = 0.0

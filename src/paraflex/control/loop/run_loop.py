@@ -28,7 +28,7 @@ from paraflex.kernel.sampled import ACTED, SAMPLED, SampledLaw
 from paraflex.mechanism.quantities import not_negative
 
 
-class Due(NamedTuple):
+class PendingTorques(NamedTuple):
     """Torques (outputs,) of a controller, given by its index, that act from an instant on.
 
     The instant is `tick` + `part` shortest periods after the start.
@@ -153,7 +153,7 @@ class Loop:
         self._delays = [whole_and_part(each.delay / self.period) for each in self.controllers]
         # Index of the next sample of each controller, delayed torques, and acting torques of each.
         self._next = [0] * len(self.controllers)
-        self._due: list[Due] = []
+        self._due: list[PendingTorques] = []
         self.acting: Array = np.zeros((len(self.controllers), len(motors)))
         for k, each in enumerate(self.controllers):
             self.acting[k, self._outputs[k]] = getattr(each, "holding_torques", 0.0)
@@ -222,7 +222,7 @@ class Loop:
             for k in sampled:
                 torques = self._step(k, self._next[k], self._start + tick * self.period, y[self._inputs[k]])
                 whole, rest = self._delays[k]
-                self._due.append(Due(tick + whole, rest, k, torques))
+                self._due.append(PendingTorques(tick + whole, rest, k, torques))
                 self._next[k] += 1
         acting = [due for due in self._due if (due.tick, due.part) <= (tick, part)]
         if not acting:

@@ -26,7 +26,7 @@ from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
 from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, Treatment, choose
-from paraflex.integrators.integrate import Integration, Kept
+from paraflex.integrators.integrate import Integration, IntegrationState
 from paraflex.kernel.sampled import SampledLaw
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
@@ -53,7 +53,7 @@ class Saved:
 
     time: float
     identity: str
-    kept: Kept
+    kept: IntegrationState
     torques: tuple[Array, TorqueLog]
     loop: Loop | None
     controllers: Any
@@ -336,7 +336,7 @@ class Simulation:
                 if controllers is not None:
                     self._begin(controllers if isinstance(controllers, list | tuple) else [controllers])
                 while self.time < end and not self.ended:
-                    self._go_on(end, on_progress)
+                    self._advance_to_next(end, on_progress)
                     if on_progress is not None:
                         on_progress(self.time)
         except KeyboardInterrupt:
@@ -368,7 +368,7 @@ class Simulation:
             self._integration.start()
         self._use(loop)
 
-    def _go_on(self, end: float, on_progress: Callable[[float], None] | None) -> None:
+    def _advance_to_next(self, end: float, on_progress: Callable[[float], None] | None) -> None:
         """Advance to the next instant of the controllers, or to the end."""
         loop = self._loop
         if loop is None or loop.inside is not None:
@@ -487,7 +487,7 @@ class Simulation:
         failure = None if self._loop is None else self._loop.failure
         if failure is not None:
             raise failure
-        if not (self._integration.goes_on or self.ended):
+        if not (self._integration.can_continue or self.ended):
             self.result()
 
 

@@ -14,7 +14,7 @@ from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
 from paraflex.results.metrics import Members
-from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.problem import DesignProblem, best_of, holds_limits
@@ -103,7 +103,7 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
             Start that cannot be run; see `Study.run` for other reasons.
         """
         folder = kept_in(folder)
-        watch = _Watch(self, on_progress)
+        watch = _ProgressCallback(self, on_progress)
         result, solve = partial(_result, self, folder), partial(_solve, self)
         return search(self, folder, (workers or Workers()).open, solve, watch, run=run, result=result)
 
@@ -205,15 +205,15 @@ def _result(study: OptimisationStudy, folder: Path, session: Session) -> Optimis
     )
 
 
-class _Watch:
+class _ProgressCallback:
     """Callback that reports the progress of an optimisation, with the best objective so far."""
 
     def __init__(self, study: OptimisationStudy, on_progress: OnProgress | None) -> None:
         self.study, self.objective, self.on_progress = study, study.objective, on_progress
-        self.best: Evaluated | None = None
+        self.best: EvaluatedDesign | None = None
         self.scales: Mapping[str, float] | None = None
 
-    def __call__(self, evaluate: Evaluate, done: Evaluated) -> None:
+    def __call__(self, evaluate: Evaluate, done: EvaluatedDesign) -> None:
         """Record an evaluated design and report the progress; the first design is the start."""
         if self.on_progress is None:
             return

@@ -16,7 +16,7 @@ from paraflex.designs.reopen import study_account
 from paraflex.designs.run import is_row_of, run_task, table_schema
 from paraflex.designs.samples import SOBOL, designs
 from paraflex.errors import InputError
-from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, WITH_SLOPES
 from paraflex.studies.optimisation.slopes import (
     DIFFERENCES,
@@ -54,14 +54,14 @@ class Session:
     seconds: float
 
 
-class Found(Protocol):
+class SearchOutcome(Protocol):
     """Protocol of the result of a search."""
 
     def write(self, study: DesignStudy[Result], folder: Path) -> None:
         """Write the result into a folder."""
 
 
-R = TypeVar("R", bound=Found)
+R = TypeVar("R", bound=SearchOutcome)
 
 
 def search(
@@ -69,7 +69,7 @@ def search(
     folder: Path,
     open_workers: Callable[[], Engine],
     solve: Callable[[Evaluate], str],
-    on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
+    on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None,
     *,
     run: RunTask | None = None,
     result: Callable[[Session], R],
@@ -129,8 +129,8 @@ def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
 
 
 def sampled_start(
-    study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[Evaluated]], Evaluated | None]
-) -> Evaluated:
+    study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[EvaluatedDesign]], EvaluatedDesign | None]
+) -> EvaluatedDesign:
     """Evaluate the start and the initial samples of the study, and return the best of them."""
     number, batch = study.search.samples, [study.start]
     if number:

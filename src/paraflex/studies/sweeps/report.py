@@ -12,7 +12,7 @@ import xarray as xr
 from paraflex.campaign import LostWorker, Workers, outcomes, tables_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
-from paraflex.designs.reopen import StudyFolder, open_study, run_again
+from paraflex.designs.reopen import StudyFolder, open_study, rerun
 from paraflex.designs.schema import DEFAULT_NAME
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError, ParaflexError
@@ -95,7 +95,7 @@ def _again(
     def again(row: int, watch: Callable[[float], None]) -> tuple[xr.Dataset, bool] | str:
         values, path, mode = designs.values(row), str(designs.path[row]), str(designs.mode[row])
         try:
-            data, metrics = run_again(study.setting, values, path, mode, watch)
+            data, metrics = rerun(study.setting, values, path, mode, watch)
         except ParaflexError as error:
             return " ".join(str(error).split())
         rows = {name: designs.metrics[name][row] for name in metrics if name in designs.metrics}
