@@ -321,7 +321,7 @@ class Branch:
         longest: float = np.inf,
         counted: list[int] | None = None,
     ) -> Unknowns:
-        """Find an equilibrium by Newton iteration, normal to a direction or at a fraction, or raise `_NewtonFailure`."""
+        """Find an equilibrium by Newton iteration, normal to a direction or at a fraction; `_NewtonFailure` otherwise."""
         at, before = begin, np.inf
         for number in range(1, _MOST_ITERATIONS + 1):
             f, phi = self.equations.residual(at)
