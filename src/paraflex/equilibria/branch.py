@@ -321,7 +321,10 @@ class Branch:
         longest: float = np.inf,
         counted: list[int] | None = None,
     ) -> Unknowns:
-        """Find an equilibrium by Newton iteration, normal to a direction or at a fraction; `_NewtonFailure` otherwise."""
+        """Find an equilibrium by Newton iteration, normal to a direction or at a fraction.
+
+        Raises `_NewtonFailure` if it fails.
+        """
         at, before = begin, np.inf
         for number in range(1, _MOST_ITERATIONS + 1):
             f, phi = self.equations.residual(at)
